@@ -29,7 +29,6 @@ def build_mission_result(task: MarchTask, history: MissionHistory) -> MarchResul
     deepest = np.nan_to_num(history.wear_depth[rows]).argmax(axis=1)[:, None]
     reached = np.flatnonzero(np.isfinite(history.worn_volume[rows]))
     last = rows[reached[-1]] if reached.size else 0
-    stops = np.array([block.frequency if block.passage is None else block.passage[0] for block in task.blocks])
     of_task: Mapping[str, object] = {
         "worn_volume": history.worn_volume[rows],
         "wear_rate": np.where(np.isfinite(history.worn_volume[rows]), rate, np.nan),
@@ -38,12 +37,16 @@ def build_mission_result(task: MarchTask, history: MissionHistory) -> MarchResul
         "wear_depth_max_error": np.take_along_axis(history.wear_depth_error[rows], deepest, axis=1)[:, 0],
         "wear_depth_last": history.wear_depth[last],
         "block_worn_volume": history.block_volume[rows],
+        "block_worn_volume_error": history.block_volume_error[rows],
         "block_share": _shares(in_mission, rate),
         "response_amplitude": np.abs(history.response_end[rows]),
         "response_phase": np.angle(history.response_end[rows]),
         "response_amplitude_begin": np.abs(history.response_begin[rows]),
-        "excitation_frequency": stops,
-        "excitation_frequency_begin": np.array([block.frequency for block in task.blocks]),
+        "response_peak": history.response_peak_end[rows],
+        "response_peak_begin": history.response_peak_begin[rows],
+        "response_error": history.response_error[rows],
+        "excitation_frequency": history.excitation_frequency[:, 1],
+        "excitation_frequency_begin": history.excitation_frequency[:, 0],
         "block_cycles": np.array([block.cycles for block in task.blocks]),
         "sweep_rate": history.sweep_rate,
         "worn_volume_error": history.worn_volume_error[rows],

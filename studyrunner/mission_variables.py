@@ -25,6 +25,12 @@ OF_MISSIONS = {
     "block_worn_volume": Variable(
         ("mission", "block"), "m3", "worn volume by block", comment="The blocks add up to worn_volume."
     ),
+    "block_worn_volume_error": Variable(
+        ("mission", "block"),
+        "1",
+        "estimated relative error of the worn volume by block",
+        comment="0 where a block wears nothing.",
+    ),
     "block_share": Variable(
         ("mission", "block"),
         "1",
@@ -49,11 +55,32 @@ OF_MISSIONS = {
         "amplitude of the first harmonic of the response at the begin of a block",
         comment=_OF_ONE,
     ),
+    "response_peak": Variable(
+        ("mission", "block", "response"),
+        "m",
+        "largest magnitude of the response over a period at the end of a block",
+        comment=ASKED["response_peak"].comment,
+    ),
+    "response_peak_begin": Variable(
+        ("mission", "block", "response"),
+        "m",
+        "largest magnitude of the response over a period at the begin of a block",
+        comment=_OF_ONE,
+    ),
+    "response_error": Variable(
+        ("mission", "block"),
+        "1",
+        "estimated relative error of the responses of a block",
+        comment="At its begin and its end; NaN where it was not estimated.",
+    ),
     "excitation_frequency": Variable(
         ("block",), "Hz", "frequency of the excitation at the end of a block", comment="Of a passage: where it stops."
     ),
     "excitation_frequency_begin": Variable(
-        ("block",), "Hz", "frequency of the excitation at the begin of a block", comment="Of a passage: where it starts."
+        ("block",),
+        "Hz",
+        "frequency of the excitation at the begin of a block",
+        comment="Of a passage: where it starts.",
     ),
     "block_cycles": Variable(("block",), "1", "vibration cycles of a block in one mission"),
     "sweep_rate": Variable(
@@ -64,8 +91,8 @@ OF_MISSIONS = {
     ),
     "worn_volume_error": replace(
         _by_mission("worn_volume_error"),
-        comment="Steps over missions, blocks with their propagation, harmonics, samples and start states; 0 where nothing"
-        " has worn.",
+        comment="Steps over missions, blocks with their propagation, harmonics, samples and start states; 0 where"
+        " nothing has worn.",
     ),
     "wear_depth_error": _by_mission("wear_depth_error"),
 }
@@ -91,7 +118,9 @@ OF_A_MISSION = {
         (), "1", "estimated error of missions_to_target", comment="Missions; NaN where the target is never reached."
     ),
     "newton_iterations": replace(
-        KEPT["newton_iterations"], long_name="Newton iterations of the point", comment="Of all blocks, start states included."
+        KEPT["newton_iterations"],
+        long_name="Newton iterations of the point",
+        comment="Of all blocks, start states included.",
     ),
     "run_time": replace(
         KEPT["run_time"],
@@ -105,11 +134,10 @@ OF_A_MISSION = {
         (),
         "1",
         "number of missions up to which the point was computed",
-        comment="Values after it are NaN; NaN where there is no state at all. A point that reaches slow_time.until ends,"
-        " as converged, with the step that does so.",
+        comment="Values after it are NaN; NaN where there is no state at all. A point that reaches slow_time.until"
+        " ends, as converged, with the step that does so.",
     ),
     "largest_wear_depth": KEPT["largest_wear_depth"],
     "message": KEPT["message"],
 }
 """Those that every result of missions holds."""
-

@@ -18,7 +18,6 @@ from studyrunner.plan.sharing import ScaledHistory
 from studyrunner.plan.tasks import BranchTask, Joint, MarchTask
 from studyrunner.system.source_digest import package_digest
 
-
 _NO_JOINT = Joint(0, None)
 
 

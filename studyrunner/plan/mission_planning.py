@@ -66,16 +66,14 @@ def _blocks(
             getattr(study.axes, name)[0 if given.gives(name) else at[name]]
             for name in ("excitation_amplitude", "frequency")
         )
-        passage, begin = None, given.begin
+        passage, begin = None, str(given.begin)
         if isinstance(given.frequency, dict):
             frequency, stop = given.frequency["start"], given.frequency["stop"]
             passage, begin = (stop, given.frequency["rate"]), "up" if stop > frequency else "down"
         elif begin == "sweep":
             begin = sweep
         joint = joint_of(Realisation(study, part.place), scene, contact)
-        found.append(
-            PlannedBlock(given.name, joint, frequency, passage, amplitude, given.cycles_at(frequency), begin)
-        )
+        found.append(PlannedBlock(given.name, joint, frequency, passage, amplitude, given.cycles_at(frequency), begin))
     return tuple(found)
 
 

@@ -74,13 +74,12 @@ def build_tasks(
     scenes: of the study, where they are known already.
     """
     scenes = find_scenes(study) if scenes is None else scenes
-    if contacts is None:
-        contacts = (((),) * len(study.mission) if study.has_missions else (),) * len(scenes.parts)
+    drawn: Sequence[Any] = (((),) * len(study.mission),) * len(scenes.parts) if contacts is None else contacts
     n_scenes = len(scenes.studies)
     sizes = (n_displacements,) * n_scenes if isinstance(n_displacements, int) else tuple(n_displacements)
     if study.has_missions:
-        return build_mission_tasks(study, sizes, contacts, scenes)
-    return (build_mode_tasks if study.has_modes else _plan)(study, sizes, contacts, scenes)
+        return build_mission_tasks(study, sizes, drawn, scenes)
+    return (build_mode_tasks if study.has_modes else _plan)(study, sizes, drawn, scenes)
 
 
 def _plan(

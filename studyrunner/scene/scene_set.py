@@ -72,7 +72,9 @@ def check_blocks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) ->
     for numbers in scenes.of_blocks if study.has_missions else ():
         for block, number in zip(study.mission, numbers, strict=True):
             if not _same_pairs(facts[numbers[0]], facts[number]):
-                remedy = f"give parameters with which it has the contact pairs of {study.mission[0].name}: wear is carried"
+                remedy = (
+                    f"give parameters with which it has the contact pairs of {study.mission[0].name}: wear is carried"
+                )
                 raise UserError(study.source, f"mission.{block.name}", None, f"{remedy} from block to block")
 
 

@@ -1,4 +1,4 @@
-"""[[mission]]: blocks of vibration in order, flown `slow_time.missions` times in place of one vibration for all cycles."""
+"""[[mission]]: blocks of vibration in order, flown `slow_time.missions` times in place of one vibration."""
 
 from __future__ import annotations
 
@@ -133,9 +133,7 @@ def read_blocks(
     return tuple(blocks)
 
 
-def _read_block(
-    table: Mapping[str, Any], scene: type[BaseModel], axes: type[BaseModel], source: str
-) -> MissionBlock:
+def _read_block(table: Mapping[str, Any], scene: type[BaseModel], axes: type[BaseModel], source: str) -> MissionBlock:
     own = [name for name in MissionBlock.model_fields if name != "parameters"]
     place = f"mission.{table['name']}"
     parameters = {}
@@ -195,7 +193,9 @@ def engine_frequency(block: MissionBlock, parameters: BaseModel, source: str) ->
     assert block.engine_order is not None
     speed = dict(parameters).get("rotation_speed")
     if not isinstance(speed, int | float) or speed <= 0.0:
-        remedy = "give rotation_speed above 0, rpm, or a frequency: the frequency of an engine order is order times speed"
+        remedy = (
+            "give rotation_speed above 0, rpm, or a frequency: the frequency of an engine order is order times speed"
+        )
         if speed is None:
             remedy = "give a frequency: the scene has no rotation_speed"
         raise UserError(source, f"mission.{block.name}.engine_order", block.engine_order, remedy)

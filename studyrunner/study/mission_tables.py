@@ -55,7 +55,7 @@ def check_mission_tables(sections: Mapping[str, Any], source: str) -> None:
 def check_used_axes(axes: Sequence[str], blocks: Sequence[MissionBlock], source: str) -> None:
     """Raises UserError where all blocks give values of their own to an axis. axes: that the study file gives."""
     for name in axes:
-        if all(block.gives(name) for block in blocks):
+        if blocks and all(block.gives(name) for block in blocks):
             remedy = f"leave it out: every block under [[mission]] gives its own {name}"
             raise UserError(source, f"axes.{name}", None, remedy)
 
@@ -123,8 +123,8 @@ def with_room_of_all(study: Study) -> Study:
         for each in study.block_studies
     ]
     parameters = [each.scene.parameters for each in wearing]
-    widths = [dict(each).get("half_width") for each in parameters]
-    if len(set(widths)) > 1 and None not in widths:
+    widths = [width for each in parameters if isinstance(width := dict(each).get("half_width"), float)]
+    if len(set(widths)) > 1:
         parameters = [each.model_copy(update={"half_width": max(widths)}) for each in parameters]
     scenes = [
         each.scene.model_copy(update={"parameters": of_block})

@@ -178,7 +178,9 @@ def _samples(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
         yield study, ()
         return
     blocks = zip(*(_samples(block) for block in study.block_studies), strict=True)
-    for part, of_blocks in zip(_drawn_studies(study), blocks if study.block_studies else itertools.repeat(()), strict=False):
+    for part, of_blocks in zip(
+        _drawn_studies(study), blocks if study.block_studies else itertools.repeat(()), strict=False
+    ):
         given = tuple(block for block, _ in of_blocks)
         # blocks have equal pairs, with room for the wear of all
         yield (with_room_of_all(part[0].model_copy(update={"block_studies": given})), part[1]) if given else part

@@ -103,7 +103,8 @@ class Study(Section):
             if self.has_modes:
                 remedy = f"give names out of {', '.join(OF_MODES)}, mesh: with axes.modal_amplitude nothing wears"
             elif self.has_missions:
-                remedy = f"give names out of {', '.join((*OF_MISSIONS, 'mesh', 'natural_frequency'))}: it is of one vibration"
+                known = ", ".join((*OF_MISSIONS, "mesh", "natural_frequency"))
+                remedy = f"give names out of {known}: missions do not have it"
             elif name in OF_MISSIONS:
                 remedy = "leave it out, or give blocks under [[mission]]: only missions have it"
             else:

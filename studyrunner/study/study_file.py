@@ -238,7 +238,9 @@ def format_study(study: Study) -> str:
             continue
         for table in section if isinstance(section, list) else [section]:
             lines.append(f"[[{name}]]" if table is not section else f"[{name}]")
-            lines.extend(f"{_toml_key(key)} = {_toml_value(value)}" for key, value in table.items() if value is not None)
+            lines.extend(
+                f"{_toml_key(key)} = {_toml_value(value)}" for key, value in table.items() if value is not None
+            )
     return "\n".join(lines) + "\n"
 
 

@@ -85,5 +85,7 @@ class MissionTable:
             return f"not reached by {beyond}" if beyond else "nothing was computed"
         shortest, error, point = min(self._lives)
         where = describe_point(self._study, point)
-        text = f"{show_count(round(shortest))} +- {max(error, 0.0):.2g}" + (f" at {where}, the shortest" if where else "")
+        text = f"{show_count(round(shortest))} +- {max(error, 0.0):.2g}" + (
+            f" at {where}, the shortest" if where else ""
+        )
         return f"{text}; not reached by {beyond}" if beyond else text
