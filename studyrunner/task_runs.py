@@ -109,6 +109,8 @@ def run_tasks(
         n_branches = count(len(tasks.branches), "branch", "branches")
         n_starts = count(tasks.n_starts_left, "start state")
         progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
+    if completion.plan.n_missions:
+        progress.say(f"flying {count(completion.plan.n_missions, 'mission history', 'mission histories')}")
     progress.begin_tasks()
     handlers = Handlers(take, tick, tasks.keep, take_back, is_sick, scenes.with_model)
     serve_tasks(ranks, tasks.begin(), evaluate, handlers, tasks.costs)

@@ -55,7 +55,12 @@ def check_outputs(study: Study, model: ReducedModel) -> None:
     if size > _LARGEST_HISTORY:
         remedy = f"give fewer pairs or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
         raise UserError(study.source, "outputs.loops", list(loops), remedy)
-    sizes = {"cycle": len(study.cycles_kept), "contact": n_contact, "response": len(model.response_names)}
+    sizes = {
+        **study.sizes,
+        "cycle": len(study.cycles_kept),
+        "contact": n_contact,
+        "response": len(model.response_names),
+    }
     # the variables of the certificate are there whether they are asked for or not
     size += 8.0 * sum(math.prod(sizes[name] for name in entry.dimensions) for entry in study.variables.values())
     if size > _LARGEST_HISTORY:
