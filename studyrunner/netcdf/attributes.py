@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
+from studyrunner.coordinates import COORDINATES
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import PairArrays
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, Variable
+from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
 
 
 def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, object]:

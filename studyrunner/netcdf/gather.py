@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import variable_sizes
+from studyrunner.coordinates import COORDINATES
 from studyrunner.netcdf.attributes import attributes, coordinate_entry, coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.netcdf.sample_coordinates import InputCoordinate
@@ -33,7 +34,7 @@ from studyrunner.summary.findings import Findings
 from studyrunner.summary.table import table_of
 from studyrunner.system.files import find_fault, replacing
 from studyrunner.user_error import StorageError
-from studyrunner.variables import COORDINATES, COUNTS, LOOPS, Variable
+from studyrunner.variables import COUNTS, LOOPS, Variable
 
 _BYTES_A_SLAB = 16e6
 _BYTES_AT_ONCE = 2e6  # of records that are read: several copies of them are in memory for a moment

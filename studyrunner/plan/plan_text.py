@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from studyrunner.coordinates import SCENE
 from studyrunner.plan.estimate import (
     ADAPTIVE_STEPS,
     AUTOMATIC_HARMONICS,
@@ -25,7 +26,6 @@ from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 from studyrunner.system.progress import count, format_seconds
 from studyrunner.user_error import show_text
-from studyrunner.variables import SCENE
 
 _TASKS_A_RANK = 32
 """Tasks with which a rank is busy for 95 % of a run, where their times are not known before: with 8 it is for 87 %

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import scene_frequencies, scene_has, scene_mesh
+from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.computed import Computed, InMemory, frequencies_once
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim
-from studyrunner.variables import COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, SCENE, Variable
+from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel

@@ -10,6 +10,7 @@ from pydantic import BaseModel, BeforeValidator, Field, SerializeAsAny, TypeAdap
 
 from solver.settings import TARGETS
 from studies.fe_models.model_files import ModelFiles
+from studyrunner.coordinates import SCENE
 from studyrunner.mission_variables import OF_MISSIONS
 from studyrunner.mode_variables import OF_MODES
 from studyrunner.study.values import (
@@ -32,7 +33,7 @@ from studyrunner.study.values import (
 )
 from studyrunner.study.worn import Worn
 from studyrunner.user_error import WrongValueError
-from studyrunner.variables import ASKED, KEPT, SCENE, USUAL
+from studyrunner.variables import ASKED, KEPT, USUAL
 
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""

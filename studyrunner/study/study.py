@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from solver.contact.wear_law import WearLaw
 from solver.settings import TARGETS, Automatic, FollowedFrequency, WearTarget
+from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS, OF_MISSIONS_BY_DEFAULT, OF_SAMPLED_MISSIONS
 from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.scatter.section import ScatterSection
@@ -35,7 +36,7 @@ from studyrunner.study.study_of_result import Archived
 from studyrunner.study.values import Section
 from studyrunner.study.wear_section import WearSection
 from studyrunner.user_error import WrongValueError
-from studyrunner.variables import ASKED, COORDINATES, FOLLOWED_FREQUENCY, KEPT, OF_SAMPLES, SCENE, USUAL, Variable
+from studyrunner.variables import ASKED, FOLLOWED_FREQUENCY, KEPT, OF_SAMPLES, USUAL, Variable
 
 _MOST_POINTS = 1_000_000
 
