@@ -1,6 +1,6 @@
 """Other limits of the solver for a hard case, inside a `with` block in Python.
 
-    with solver.tuned(history_iterations=20_000, jump_iterations=3000):
+    with solver.tuned(history_iterations=20_000, search_iterations=3000):
         history = solver.march_wear(...)
 
 `TUNABLE` has the names. The file `options.py` of each room holds the constants, with the meaning of each constant and
@@ -14,8 +14,9 @@ from contextlib import contextmanager
 from importlib import import_module
 
 TUNABLE = {
+    "COMMON": ("", ("step_error_fraction",)),
     "NEWTON": ("newton", ("iterations", "forcing", "most_directions")),
-    "CONTINUATION": ("continuation", ("arc_correctors", "load_steps", "transient_effort", "longest_transient")),
+    "CONTINUATION": ("continuation", ("near_iterations", "search_iterations", "arc_correctors", "load_steps")),
     "ACCURACY": (
         "accuracy",
         ("penetration_limit", "energy_limit", "level_iterations", "refinement_work", "most_samples", "most_unknowns"),
@@ -27,10 +28,7 @@ TUNABLE = {
     "WEAR": (
         "wear",
         (
-            "step_error_fraction",
-            "step_iterations",
             "history_iterations",
-            "jump_iterations",
             "fold_resolution",
             "largest_moved_load",
             "steps_to_the_end",
@@ -60,7 +58,7 @@ def tuned(**values: float | tuple[float, ...]) -> Iterator[None]:
         if name not in of_name:
             raise ValueError(f"{name}: give one of {', '.join(sorted(of_name))}")
         room, options = of_name[name]
-        constants = getattr(import_module(f"solver.{room}.options"), options)
+        constants = getattr(import_module(f"solver.{room}.options".replace("..", ".")), options)
         old = getattr(constants, name)
         if isinstance(old, tuple) != isinstance(value, tuple) or isinstance(value, str | bool):
             raise ValueError(f"{name}: give a value like {old!r} instead of {value!r}")

@@ -15,28 +15,14 @@ class AccuracyOptions:
     # certificate
     penetration_limit: float = 0.1
     """Fraction of the largest relative motion. Good: 0.13 at one harmonic of vibro-impact, 0.02 on the dovetail."""
-    tension_limit: float = 0.01
-    """Fraction of the largest normal force. Good states: below 1e-12."""
-    cone_limit: float = 0.05
-    """Fraction of the largest friction limit. Good states: below 1e-12; 10 % more friction is found."""
     energy_limit: float = 0.05
     """Fraction of the largest work in a period. Good states: up to 0.01 (vibro-impact)."""
-    periodicity_limit: float = 1e-3
-    """Fraction of the largest friction limit. Good states: up to 8e-7; slip that does not repeat by 2 % is found."""
+    law_limit: float = 1e-3
+    """Violations of what the contact law fulfils but for round-off: tension over the largest normal force, friction
+    above its limit and change of the tangential force over a period, both over the largest friction limit. Good states:
+    below 1e-12, periodicity up to 8e-7; 10 % more friction, and slip that does not repeat by 2 %, are found."""
     residual_round_off: float = 1e-10
     """Lowest tolerance of the scaled residual: 1e-5 of its stiffness holds the mean position of a sliding mass."""
-    points_per_sample: int = 4
-    """Points per sample at which series are judged: at the samples alone their violations are too small."""
-    noticed_loss_factor: float = 1e-3
-    """Loss factor too small to influence any structure."""
-    round_off_vibration: float = 1e-6
-    """Fraction of the mean: a smaller vibration is round-off. Fraction of the largest force: a state with odd harmonics
-    only gets the even ones above."""
-
-    # events in a period
-    round_off_change: float = 1e-9
-    """Relative change of the tangential state in a period, or relative size of the even harmonics of the force. Less
-    is round-off (1e-12 and below in good states): the pair does not slip, or the state is symmetric."""
 
     # numbers of harmonics
     harmonic_levels: tuple[int, ...] = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
@@ -73,16 +59,16 @@ class AccuracyOptions:
     """Error over the difference to the state one level up: 3.4 to 1.5 for an error as 1/H to 1/H^3."""
     triple_samples_safety: float = 2.0
     """Error over the difference to three times the samples: 1.5 to 1.1, but the errors of single events scatter."""
-    small_slip_work: float = 1e-3
-    """Fraction of the work of the excitation: errors of a smaller slip work are relative to this fraction. Where the
-    slip work is below this fraction of this fraction, nothing wears."""
+    small_work: float = 1e-3
+    """Fraction of a larger work to which the error of a smaller one is relative. Slip work over the work of the
+    excitation; where it is below this fraction of this fraction, nothing wears. Balance of energy over the elastic work
+    (a loss factor too small to influence any structure). Oscillation of the wear rate of a pair over the wear rate of
+    the joint."""
     negligible: float = 0.1
     """Fraction of rtol: part of the slip work that may be creep, and normal force over the largest one below which a
     contact need not be resolved."""
     small_peak: float = 0.01
     """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
-    small_response: float = 1e-5
-    """Fraction of the response of the stiffness of the joint alone to the excitation: less has no meaning."""
     kept_fraction: float = 0.5
     """Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once."""
     spare_fraction: float = 0.3
@@ -128,10 +114,10 @@ class AccuracyOptions:
         """Limits of the violations of a certificate; response and wear rate have error estimates instead."""
         return {
             "penetration": self.penetration_limit,
-            "tension": self.tension_limit,
-            "cone_violation": self.cone_limit,
+            "tension": self.law_limit,
+            "cone_violation": self.law_limit,
             "energy_error": self.energy_limit,
-            "periodicity_error": self.periodicity_limit,
+            "periodicity_error": self.law_limit,
         }
 
 

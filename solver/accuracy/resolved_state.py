@@ -24,6 +24,7 @@ from solver.harmonic_balance.response_peak import largest_responses
 from solver.model import ComplexArray, FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
+from solver.options import COMMON
 from solver.settings import Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
@@ -119,13 +120,13 @@ class ResolvedState:
         It is the larger one of `usual_work` and a fraction of the work of the excitation.
         """
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
-        return max(ACCURACY.small_slip_work * abs(self.joint.structure.input_work(motion)), self.usual_work)
+        return max(ACCURACY.small_work * abs(self.joint.structure.input_work(motion)), self.usual_work)
 
     def without_even(self, budget: Budget) -> ResolvedState | None:
         """The state solved with odd harmonics only; None where it needs even harmonics or holds none already."""
         orders = self.case.resolution.orders
         odd = tuple(order for order in orders if order % 2)
-        if odd == orders or not half_wave_symmetric(self.point.evaluation, ACCURACY.round_off_change):
+        if odd == orders or not half_wave_symmetric(self.point.evaluation, COMMON.round_off):
             return None
         return self.solve_at(Resolution(odd, self.case.resolution.samples), budget)
 
@@ -266,7 +267,7 @@ class ResolvedState:
         structure = self.joint.structure
         moved = structure.harmonic_force / self.joint.relative_penalty
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
-        return max(ACCURACY.small_response * float(np.linalg.norm(response)), 1e-300)
+        return max(COMMON.negligible * float(np.linalg.norm(response)), 1e-300)
 
     def holds(self) -> bool:
         """Whether all violations of the certificate are below their limits."""
@@ -282,8 +283,8 @@ class ResolvedState:
         response = max(first, float((np.abs(mine_peak - its_peak) / size).max(initial=0.0)))
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
         work = max(self.least_work(), better.least_work())
-        if max(its_slip, mine_slip) <= ACCURACY.small_slip_work * work:
+        if max(its_slip, mine_slip) <= ACCURACY.small_work * work:
             return Estimate(response, 0.0)
         # the wear rate cannot be more accurate than the motion that causes it
-        slip = max(its_slip, ACCURACY.small_slip_work * work)
+        slip = max(its_slip, ACCURACY.small_work * work)
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))

@@ -17,10 +17,8 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance, solve_linearised
+from solver.options import COMMON
 from solver.packing import packable
-
-# step of a finite difference in natural lengths: a round-off of 1e-16 gives the difference an error of 1e-9
-_DIFFERENCE = 1e-7
 
 
 @dataclass(frozen=True)
@@ -163,7 +161,7 @@ class Arc:
 
         A finite difference is enough: the slope only gives directions to the corrector, whose residual is exact.
         """
-        step = _DIFFERENCE
+        step = COMMON.difference
         ahead = self.balance_at(parameter + step * self.span, self.history).evaluate(evaluation.predicted_h)
         return (ahead.residual - evaluation.residual) / step
 

@@ -150,7 +150,7 @@ def solve_first_state(
         return Outcome.CONVERGED, PathPoint(1.0, relaxed.evaluation, relaxed.history)
     if not arrived:
         # the last way, within a budget of its own: where the joint has no grip arc length does not come to an end
-        limit, budget.limit = budget.limit, min(budget.limit, budget.iterations + CONTINUATION.transient_effort)
+        limit, budget.limit = budget.limit, min(budget.limit, budget.iterations + CONTINUATION.search_iterations)
         span = CONTINUATION.load_length
         reached = follow_arc(balance_at, point, 1.0, span, solver, tolerance, budget, accepted).point
         budget.limit = limit

@@ -65,12 +65,10 @@ class ContinuationOptions:
     of the dovetail are unchanged; with 2 they take 60 iterations more."""
 
     # relaxation in time; a change is the norm of the change of the amplitudes over the larger norm of two motions
-    transient_effort: int = 800
-    """Budget of Newton iterations of one relaxation, including the iterations for the periodic state. A jump at a fold
-    of vibro-impact takes 400 to 500. A motion that does not settle (a blade whose 16 pairs all slip and lift) would
-    take thousands."""
-    longest_transient: float = 1e9
-    """Periods: longest step. It is practically infinite: the step is the harmonic balance itself."""
+    search_iterations: int = 800
+    """Most Newton iterations of one search behind the end of a branch: of a relaxation with its periodic state, of the
+    last way to a first state, of a jump while the joint wears. A jump at a fold of vibro-impact takes 400 to 500. A
+    motion that does not settle (a blade whose 16 pairs all slip and lift) would take thousands."""
     transient_cut: float = 0.35
     """Factor of the length of a step that fails, or whose change is twice `smooth_change`. Half the value takes 2.5
     times the iterations of a jump at a fold. With 0.5 a random scene (`THROWN_OFF` in `tests/solver/test_homotopy.py`)
@@ -83,9 +81,6 @@ class ContinuationOptions:
     """Natural length of the frequency in the search behind a fold, over the frequency."""
 
     # states at a given phase lag
-    frequency_difference: float = 1e-7
-    """Difference of two frequencies over the frequency, for derivatives. They agree to 1e-5 with central differences a
-    hundred times as long (`tests/solver/test_phase_lag.py`)."""
     largest_frequency_change: float = 0.02
     """Largest change of the frequency in an iteration, over the frequency."""
     derivative_solves: int = 4

@@ -12,9 +12,9 @@ from solver.harmonic_balance.converged import BalanceAt, PathPoint
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
+from solver.options import COMMON
 
 _FOLD_STEPS = 12  # of the secant search of a fold: halves a bracket to less than a thousandth at worst
-_FOLD_SLOPE = 1e-6  # parameter over arc length at which a point counts as the fold: the parameter is off by its square
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,8 @@ def _find_fold(
         part = float(ahead[-1] * (np.sign(ahead @ tangent) or 1.0))
         if (found.parameter - best.parameter) * sign > 0.0:
             best = found
-        if abs(part) < _FOLD_SLOPE:
+        # the parameter is off by the square of its part of the tangent
+        if abs(part) < COMMON.negligible:
             break
         if part * at_low > 0.0:
             low, at_low, at_high = place, part, 0.5 * at_high

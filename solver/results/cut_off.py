@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from solver.model import ContactInterface, FloatArray
+from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
-from solver.results.options import RESULTS
 
 
 def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: FloatArray, depth: FloatArray) -> float:
@@ -27,7 +27,7 @@ def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: Float
     """
     if contact.edge is None or not contact.edge.any():
         return math.nan
-    least = RESULTS.edge_load
+    least = COMMON.negligible
     reached = [values[:, contact.edge].max(axis=1) > least * values.max(axis=1) for values in (pressure, depth)]
     found = np.flatnonzero(np.logical_or(*reached))
     return float(cycles[found[0]]) if found.size else math.nan

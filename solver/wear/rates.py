@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.accuracy.options import ACCURACY
 from solver.model import FloatArray, IntArray
 from solver.packing import packable
 from solver.wear.options import WEAR
@@ -63,4 +64,4 @@ class WearRates:
         The tiny rate of a pair at the edge of the slip zone alternates with steps of any length. So the increments must
         be larger than `least`, m3 per cycle, and larger than a fraction of the wear rate of the whole joint.
         """
-        return bool(self.strongest.max(initial=0.0) > max(WEAR.noticeable_oscillation * self.largest[-1], least))
+        return bool(self.strongest.max(initial=0.0) > max(ACCURACY.small_work * self.largest[-1], least))

@@ -53,7 +53,7 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
             return _euler(work, state, end, length)
     # accuracy of the end of a branch: a fraction of the count, or of the step in the first step
     resolution = WEAR.fold_resolution * (state.cycle if state.cycle > 0.0 else length) / length
-    shortest = max(min(resolution, CONTINUATION.shortest_fraction), WEAR.smallest_fold_resolution)
+    shortest = min(resolution, CONTINUATION.shortest_fraction)
     if work.follow is not None:
         return _shortened(work, state, length, balance_at, shortest)
     last, arrived = follow_naturally(

@@ -159,8 +159,8 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch:
     idle = np.zeros(1)
     rest = first_point(case, 0.8 * NATURAL, 0.0, idle)
     outcomes = []
-    for most in (CONTINUATION.transient_effort, 10):
-        monkeypatch.setattr(transient, "CONTINUATION", replace(CONTINUATION, transient_effort=most))
+    for most in (CONTINUATION.search_iterations, 10):
+        monkeypatch.setattr(transient, "CONTINUATION", replace(CONTINUATION, search_iterations=most))
         budget = Budget()
         outcome, _ = relax_to_periodic(
             case, joint, idle, rest.evaluation, quiet, rest.history, JacobianSolver(), budget
