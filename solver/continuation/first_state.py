@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.continuation.arc_length import follow_arc
+from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.homotopy import solve_from_less_friction
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
@@ -151,8 +151,8 @@ def solve_first_state(
     if not arrived:
         # the last way, within a budget of its own: where the joint has no grip arc length does not come to an end
         limit, budget.limit = budget.limit, min(budget.limit, budget.iterations + CONTINUATION.search_iterations)
-        span = CONTINUATION.load_length
-        reached = follow_arc(balance_at, point, 1.0, span, solver, tolerance, budget, accepted).point
+        arc = Arc(balance_at, point, CONTINUATION.arc_span, solver, tolerance, budget)
+        reached = follow_arc(arc, 1.0, accepted).point
         budget.limit = limit
         if reached is not None:
             return Outcome.CONVERGED, reached

@@ -32,6 +32,9 @@ class ContinuationOptions:
     state of the dovetail is found at a friction coefficient of 1000."""
 
     # arc length, in unknowns divided by the norm of the first predicted force
+    arc_span: float = 0.05
+    """Natural length of a frequency over the frequency, and of a load factor. Distance from the end of a sweep to the
+    next attempt to begin it again, over the frequency."""
     arc_correctors: int = 300
     """Correctors of one continuation, converged or not."""
     longest_arc: float = 0.2
@@ -45,12 +48,8 @@ class ContinuationOptions:
     """Distance of a corrector from its start over the length of the step, above which the corrector is given up.
     Without it the branch of `tests/solver/test_arc_length.py` is left for another one. Four times the length takes 1 %
     more iterations."""
-    backward_cosine: float = 0.99
-    """Cosine to the backward tangent above which a point lies on the branch before the corner."""
     farthest: float = 10.0
     """Natural lengths of the parameter from start and target at which the search ends."""
-    fold_points: int = 3
-    """Points added around a fold. One moves a fold of vibro-impact by 1e-3, six move it by 2e-4."""
 
     # first state
     load_steps: int = 20
@@ -58,8 +57,6 @@ class ContinuationOptions:
     relief: tuple[float, ...] = (0.1, 0.4)
     """Fractions of the static friction forces that are removed where the excitation cannot be raised with the full
     forces. Other fractions lead to other states that friction allows: 5 % for a mass that ratchets."""
-    load_length: float = 0.2
-    """Natural length of the load factor of the excitation."""
     moderate_friction: float = 1.0
     """Friction coefficient up to which one static state was found for all joints, from any start. With 0.5 the states
     of the dovetail are unchanged; with 2 they take 60 iterations more."""
@@ -76,17 +73,9 @@ class ContinuationOptions:
     runaway: float = 1e3
     """Mean relative displacement over the largest displacement of vibration and start; above it parts run away."""
 
-    # states after a fold
-    fold_search_length: float = 0.01
-    """Natural length of the frequency in the search behind a fold, over the frequency."""
-
     # states at a given phase lag
     largest_frequency_change: float = 0.02
     """Largest change of the frequency in an iteration, over the frequency."""
-    derivative_solves: int = 4
-    """Most solves for a derivative of the motion, each of which gains the digits of a Newton direction."""
-    derivative_error: float = 1e-5
-    """Relative residual of a derivative of the motion."""
 
     # largest amplitudes over the frequency
     peak_rise: float = 2.0
@@ -94,12 +83,8 @@ class ContinuationOptions:
     as the largest one: its frequency is then within 2 rtol of half the width of the resonance, and the amplitude within
     2 rtol^2. The states of single samples change with the frequency, so that the rise is rough: by 0.005 for the
     dovetail with rtol 0.01, which would take five solves a step with 1e-4."""
-    largest_peak_rise: float = 0.02
-    """Upper limit of this rise, 1/rad."""
     peak_solves: int = 20
     """Most solves for the phase lag of the largest amplitude; a step takes one or two."""
-    least_peak_slope: float = 0.1
-    """Smallest fall of this rise with the lag, 1/rad2, in a secant step; it is 1 for one degree of freedom."""
     largest_lag_step: float = 0.2
     """Largest change of the phase lag between two solves, rad."""
 

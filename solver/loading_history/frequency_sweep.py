@@ -13,6 +13,7 @@ from solver.accuracy.certificate import certify
 from solver.accuracy.error_estimate import UNKNOWN
 from solver.accuracy.refinement import Refined, refine, state_difference
 from solver.continuation.first_state import solve_first_state
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint
 from solver.loading_history.options import LOADING
 from solver.loading_history.path_step import Step
@@ -275,7 +276,7 @@ class FrequencySweep:
                 nodes.lose()
             if nodes.here is not None or nodes.path.omega is not None or np.isnan(nodes.state.lost_at):
                 return
-            behind = nodes.state.lost_at * (1.0 + LOADING.search_distance * nodes.direction)
+            behind = nodes.state.lost_at * (1.0 + CONTINUATION.arc_span * nodes.direction)
             if (behind - target) * nodes.direction >= 0.0:
                 return
             # budget of all attempts: where every pair slips, all of them fail

@@ -27,9 +27,6 @@ class LoadingOptions:
     free_step: float = 1e-3
     """Fraction of the parameter: length of the steps with continuation through folds, or settling in time, where a
     branch ends. The load factor at which a ramp begins."""
-    search_distance: float = 0.05
-    """Fraction of the parameter: natural length of arc-length steps, and distance from the end of a sweep to the next
-    attempt to begin it again."""
 
     # steps of a sweep: dovetail of 48 pairs, compared with steps twenty times as short. Errors of the motion at 211,
     # 211.5, 212 and 212.5 Hz: 0.25, 0.05, 0.18 and 0.8 % with a largest change of 0.2 (48 nodes in all), 0.06, 0.04,
@@ -68,11 +65,6 @@ class LoadingOptions:
     few_pairs: int = 12
     """Most pairs of a joint whose inaccurate state is sought again from the static state: with impacts there are many
     other states."""
-
-    # resonance between two nodes
-    resonance_accuracy: float = 1e-8
-    """Accuracy of the frequency of a resonance on the way of a sweep, over the frequency. The start of a history is
-    solved to the tolerance of a state."""
 
     @property
     def node_iterations(self) -> int:

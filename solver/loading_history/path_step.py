@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from solver.contact.coulomb import STICK
-from solver.continuation.arc_length import follow_arc
+from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import relax_to_periodic
@@ -136,14 +136,14 @@ class LoadingPath:
                 return Step(point, tuple(folds))
             # natural steps may have passed the unknown start of an unstable part: then the search begins before them
             end = start if arrived else point
-            span = LOADING.search_distance * scale
-            arc = follow_arc(self.balance_at, end, target, span, solver, tolerance, budget, accepted, beyond=False)
-            if arc.point is not None:
-                return Step(arc.point, (*folds, *arc.jumps))
-            if arrived and not arc.folds and abs(target - end.parameter) > LOADING.free_step * scale:
+            arc = Arc(self.balance_at, end, CONTINUATION.arc_span * scale, solver, tolerance, budget)
+            found = follow_arc(arc, target, accepted, beyond=False)
+            if found.point is not None:
+                return Step(found.point, (*folds, *found.jumps))
+            if arrived and not found.folds and abs(target - end.parameter) > LOADING.free_step * scale:
                 # a shorter step comes closer to the loss of stability without a fold
                 return Outcome.UNSTABLE
-            landed = self._settled(end, target, arc.folds, solver, budget)
+            landed = self._settled(end, target, found.folds, solver, budget)
             if isinstance(landed, Outcome):
                 return landed
             folds.extend(landed.folds)

@@ -23,6 +23,7 @@ from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.modes.options import MODES
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
+from solver.options import COMMON
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,8 @@ class AmplitudeSweep:
         ratio = self._ratio
         while True:
             found = self.nodes.reach(here.amplitude * ratio**self.direction, self._solver, self.budget)
-            shortest = ratio <= MODES.shortest_ratio
+            # where a smaller ratio is needed the mode is lost; with a tenth of the step modes are equal
+            shortest = ratio <= 1.0 + LOADING.free_step
             change = 1.0
             if found is not None:
                 sticks = all((at.point.evaluation.status_t == STICK).all() for at in (here, found))
@@ -131,12 +133,13 @@ class AmplitudeSweep:
                 change = shape_change(here, found) / (CONTINUATION.linear_change if sticks else limit)
                 if change <= 1.0 or shortest:
                     wider = float(np.clip(LOADING.aimed_change / max(change, 1e-12), *LOADING.lengthening))
-                    self._ratio = float(np.clip(ratio**wider, MODES.shortest_ratio, MODES.longest_ratio))
+                    self._ratio = float(np.clip(ratio**wider, 1.0 + LOADING.free_step, MODES.longest_ratio))
                     return found
             if shortest:
                 return None
-            shorter = 0.25 if found is None else float(np.clip(LOADING.aimed_change / change, 0.1, 0.75))
-            ratio = max(ratio**shorter, MODES.shortest_ratio)
+            wanted = float(np.clip(LOADING.aimed_change / change, LOADING.lengthening[0], LOADING.aimed_change))
+            shorter = COMMON.smallest_step_ratio if found is None else wanted
+            ratio = max(ratio**shorter, 1.0 + LOADING.free_step)
 
     def _take(self, following: ModeState) -> None:
         """Make the next node the current one."""

@@ -16,14 +16,9 @@ class ModeOptions:
     """First amplitude of a joint without static normal forces, m sqrt(kg)."""
     longest_ratio: float = 2.0
     """Largest ratio of the amplitudes of two nodes. With 1.4 the damping of the dovetail changes by 5e-6."""
-    shortest_ratio: float = 1.001
-    """Smallest ratio of the amplitudes of two nodes; where a smaller one is needed, the mode is lost. With 1.0001 the
-    modes of dovetail and foot are equal."""
     top_base: float = 4.0
     """Amplitudes are lowered from a power of this number, at least twice the amplitude of the point. All points with
     one such power have one way. With 8 the mode of the foot is equal to 1e-8."""
-    sliding_starts: int = 4
-    """Attempts to find a mode of a sliding joint, each at an amplitude higher by `top_base`. The slider needs one."""
     largest_change: float = 0.3
     """Largest change of the frequency (relative) and of the damping ratio in one iteration. With 0.1 and with 1
     the modes of dovetail and foot are equal."""
