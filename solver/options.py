@@ -24,12 +24,15 @@ class CommonOptions:
     Derivatives by the frequency agree to 1e-5 with central differences a hundred times as long. With ten and a hundred
     times the value nonlinear modes are equal to 1e-9 and take up to 15 % longer."""
 
-    # error-controlled steps on the slow time scale and over missions
+    # controlled steps of sweeps, on the slow time scale and over missions
     step_error_fraction: float = 0.5
     """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of
     rtol."""
     step_safety: float = 0.85
     """Length of a step over the length with the allowed error, and the largest factor on a step that was refused."""
+    largest_step_ratio: float = 2.0
+    """Largest ratio of two successive steps of a sweep, of an amplitude and on the slow time scale; BDF2 is zero-stable
+    below 1 + sqrt(2). With 1.4 the damping of a nonlinear mode of the dovetail changes by 5e-6."""
     smallest_step_ratio: float = 0.25
     """Factor on a step whose end was not found, and smallest factor on a step that was refused."""
 

@@ -138,7 +138,7 @@ def response_curve(
     begin = PathPoint(float(first), at, balance.history)
     # a branch may turn back behind its start before it comes to the last value
     back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
-    span = abs(last - first) / (CONTINUATION.longest_arc * _FEWEST_STEPS)
+    span = abs(last - first) / (CONTINUATION.smooth_change * _FEWEST_STEPS)
     arc = Arc(balance_at, begin, span, JacobianSolver(), settings.tolerance, Budget())
     branch = follow_branch_whole(arc, last, back, most)
     return _reported(case, branch, balance_at, over_frequency, errors, _end(branch, most, over_frequency))

@@ -79,7 +79,7 @@ class Certificate:
     def failures(self, tolerance: float) -> dict[str, tuple[float, float]]:
         """Value and limit of each violation above its limit; NaN counts as such. tolerance: of the scaled residual."""
         # twice the tolerance: a state evaluated again from its harmonics has lost some digits to round-off
-        limits = {"residual": 2.0 * max(tolerance, ACCURACY.residual_round_off)} | ACCURACY.violation_limits
+        limits = {"residual": 2.0 * max(tolerance, COMMON.round_off)} | ACCURACY.violation_limits
         return {
             name: (getattr(self, name), limit) for name, limit in limits.items() if not getattr(self, name) <= limit
         }

@@ -21,8 +21,6 @@ class AccuracyOptions:
     """Violations of what the contact law fulfils but for round-off: tension over the largest normal force, friction
     above its limit and change of the tangential force over a period, both over the largest friction limit. Good states:
     below 1e-12, periodicity up to 8e-7; 10 % more friction, and slip that does not repeat by 2 %, are found."""
-    residual_round_off: float = 1e-10
-    """Lowest tolerance of the scaled residual: 1e-5 of its stiffness holds the mean position of a sliding mass."""
 
     # numbers of harmonics
     harmonic_levels: tuple[int, ...] = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
@@ -35,21 +33,12 @@ class AccuracyOptions:
     """Number of relative displacements of the dovetail with 48 pairs, to which the limits of unknowns belong. For a
     larger joint some limits grow in proportion, so that they limit the harmonics and not the pairs."""
     coarse_unknowns: int = 1600
-    """Most unknowns of a node of a sweep: about those of the dovetail of 48 pairs with five harmonics (1584)."""
-    periods_in_contact: float = 0.5
-    """Shortest contact that the harmonics resolve, in periods of the highest harmonic."""
+    """Most unknowns of a node of a sweep: about those of the dovetail of 48 pairs with five harmonics (1584). Most
+    unknowns of a small joint, too: impacts couple all harmonics, and no preconditioner helps."""
     stiffness_mismatch: float = 0.25
     """Largest |1 - E G|: above, structure and penalty answer differently, and more harmonics are needed."""
-    octaves_beyond: float = 8.0
-    """Octaves above the first harmonic left out over which |1 - E G| is judged."""
 
     # states at other resolutions
-    event_samples: int = 2048
-    """Samples of a period in the search for a missed event: a sine can exceed a limit between them by 1e-6 only."""
-    level_iterations: int = 40
-    """Newton iterations of a solve that starts from the state at another resolution."""
-    dear_unknowns: int = 1000
-    """Unknowns of an expensive solve: above, no odd harmonics above 79, no homotopy, no 3 N + 2 samples to compare."""
     far_unknowns: int = 400
     """Most unknowns of a balance that only resolves a short contact, or the structure at higher harmonics."""
     two_levels_safety: float = 1.5
@@ -70,9 +59,8 @@ class AccuracyOptions:
     small_peak: float = 0.01
     """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
     kept_fraction: float = 0.5
-    """Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once."""
-    spare_fraction: float = 0.3
-    """Fraction of the kept error: a state with a smaller error is tried with fewer harmonics and samples."""
+    """Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once. A
+    state with less than this fraction of the kept error is tried with fewer harmonics and samples."""
 
     # refinement
     most_samples: int = 8192
@@ -86,10 +74,6 @@ class AccuracyOptions:
     joint of 48 pairs with nine harmonics may take 200."""
     most_unknowns: int = 8000
     """Most unknowns of a balance in a history with "auto". States to compare with may have `compared_unknowns`."""
-    few_pairs_unknowns: int = 2000
-    """`most_unknowns` of a small joint: impacts couple all harmonics, and no preconditioner helps."""
-    error_ratio: float = 3.0
-    """Ratio of the errors by harmonics and by samples: the smaller one is not refined where their ratio is larger."""
     vibration_recheck: float = 0.3
     """Relative change of the vibration after which errors are estimated and harmonics chosen again. Error of the motion
     of the dovetail on the far side of the resonance: 5 % with 1.0, 0.5 % with 0.3."""

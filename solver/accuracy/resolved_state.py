@@ -23,9 +23,10 @@ from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.model import ComplexArray, FloatArray
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.options import COMMON
-from solver.settings import Resolution, all_orders
+from solver.settings import RESOLUTION, Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
@@ -97,8 +98,7 @@ class ResolvedState:
     def _solved(
         self, case: Case, joint: Joint, balance: Balance, start: FloatArray, budget: Budget
     ) -> ResolvedState | None:
-        most = ACCURACY.level_iterations
-        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, budget, most)
+        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, budget)
         if not result.converged:
             return None
         point = PathPoint(self.point.parameter, result.evaluation, final_history(balance, result.evaluation))
@@ -142,7 +142,7 @@ class ResolvedState:
         none. Without an event the harmonics are exact, so that one solve with the finest samples is enough.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        finest = self.solve_at(Resolution(orders, max(ACCURACY.event_samples, 2 * samples)), budget)
+        finest = self.solve_at(Resolution(orders, max(RESOLUTION.fine_samples, 2 * samples)), budget)
         if finest is None or nothing_happens(finest.point.evaluation):
             return None
         while (samples := 2 * samples) < finest.case.resolution.samples:
@@ -163,7 +163,7 @@ class ResolvedState:
           as large.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        few = self.unknowns(self.case.resolution) <= ACCURACY.dear_unknowns
+        few = self.unknowns(self.case.resolution) <= NEWTON.dear_unknowns
         finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), budget)
         if finer is not None:
             safety = ACCURACY.triple_samples_safety if few else ACCURACY.two_levels_safety
@@ -239,7 +239,7 @@ class ResolvedState:
         estimate: errors of the present state.
         """
         here, enough = self, ACCURACY.kept_fraction * self.case.settings.rtol
-        while estimate.largest <= ACCURACY.spare_fraction * enough:
+        while estimate.largest <= ACCURACY.kept_fraction * enough:
             lower = fewer(here.case.resolution, here.case.settings)
             level = here.solve_at(lower, budget) if lower != here.case.resolution else None
             if level is None:

@@ -147,7 +147,7 @@ class Arc:
 
         toward: sign of the first change of the parameter. correctors: most correctors of all steps.
         """
-        point, length, left = self.start, CONTINUATION.longest_arc / 10.0, correctors
+        point, length, left = self.start, CONTINUATION.smooth_change / 10.0, correctors
         along = np.zeros(point.evaluation.predicted_h.size + 1)
         along[-1] = toward
         tangent = self.tangent(point.parameter, point.evaluation, along)
@@ -200,7 +200,7 @@ class Arc:
         while reached is None and length > CONTINUATION.shortest_arc and left > 0:
             reached = self.step(point, tangent, length)
             left -= 1
-            length = min(2.0 * length, CONTINUATION.longest_arc) if reached is not None else 0.5 * length
+            length = min(2.0 * length, CONTINUATION.smooth_change) if reached is not None else 0.5 * length
         if reached is None:
             reached = self._step_over_corner(point, tangent)
         return reached, length, left

@@ -41,7 +41,7 @@ def solve_at_peak(
     """
     below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
     before: tuple[float, float] | None = None
-    for _ in range(CONTINUATION.peak_solves):
+    for _ in range(CONTINUATION.attempts):
         found = solve_at_lag(case, balance, start, lag, solver, case.settings.tolerance, budget, most)
         if found is None:
             return None

@@ -15,21 +15,20 @@ class ContinuationOptions:
     """
 
     # shared
+    attempts: int = 25
+    """Most attempts of a search that comes closer with each of them: natural steps that fail (a branch with more
+    corners is left to arc length; with half the number no static state of the dovetail is found at a friction
+    coefficient of 1000), solves for the phase lag of the largest amplitude (a step takes one or two), shakedown of
+    sliding masses, pairs that are opened."""
     near_iterations: int = 10
     """Newton iterations from a near state, where a shorter step is the alternative. Of 1400 such converged solves
     (impacts, sliders, random scenes, dovetail) eight needed all ten."""
     smooth_change: float = 0.2
     """Largest change over a smooth step of a branch. A step with a larger change is divided. A fold with a larger
     change is a jump, with a smaller change a corner. Half the value takes up to 50 % more iterations; twice the
-    value leads to equal states. A relaxation in time seeks a periodic state below a tenth of this change."""
-    shortest_fraction: float = 1.0 / 64.0
-    """Shortest natural step over the range to the target; shortest relaxation step in periods; least friction of a
-    homotopy over the moderate one. Where a shorter natural step is needed, the branch is assumed to fold."""
-
-    # natural steps
-    natural_failures: int = 25
-    """Steps that may fail to converge; a branch with more corners is left to arc length. With half the number no static
-    state of the dovetail is found at a friction coefficient of 1000."""
+    value leads to equal states. A relaxation in time seeks a periodic state below a tenth of this change. Largest
+    length of an arc-length step; the first one has a tenth (with the whole length seven branches with folds take 1.5 %
+    more iterations)."""
 
     # arc length, in unknowns divided by the norm of the first predicted force
     arc_span: float = 0.05
@@ -37,9 +36,6 @@ class ContinuationOptions:
     next attempt to begin it again, over the frequency."""
     arc_correctors: int = 300
     """Correctors of one continuation, converged or not."""
-    longest_arc: float = 0.2
-    """Largest length of a step. The first step has a tenth; with the whole length seven branches with folds take 1.5 %
-    more iterations."""
     corner_arc: float = 1e-3
     """Length of the step behind a corner, and least length after a step. Where no step of a tenth of this length
     converges, the branch has a corner. Without such a least length the same branches
@@ -83,8 +79,6 @@ class ContinuationOptions:
     as the largest one: its frequency is then within 2 rtol of half the width of the resonance, and the amplitude within
     2 rtol^2. The states of single samples change with the frequency, so that the rise is rough: by 0.005 for the
     dovetail with rtol 0.01, which would take five solves a step with 1e-4."""
-    peak_solves: int = 20
-    """Most solves for the phase lag of the largest amplitude; a step takes one or two."""
     largest_lag_step: float = 0.2
     """Largest change of the phase lag between two solves, rad."""
 

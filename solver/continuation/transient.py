@@ -199,7 +199,7 @@ def relax_to_periodic(
     left = CONTINUATION.search_iterations
     # whether an unstable state has been found, which the motion leaves
     grows = False
-    while left > 0 and length >= CONTINUATION.shortest_fraction and not budget.exhausted:
+    while left > 0 and length >= NEWTON.shortest_step and not budget.exhausted:
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
         result = solve_balance(balance, predicted, solver, tolerance, budget, most)

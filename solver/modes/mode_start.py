@@ -11,6 +11,7 @@ from solver.continuation.first_state import relieved_history, solve_static_state
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.options import LOADING
 from solver.model import FloatArray, ReducedModel
 from solver.modes.amplitude_sweep import Nodes
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
@@ -94,7 +95,7 @@ def first_amplitude(rest: Rest) -> float:
     limit = np.linalg.norm(friction_limit(problem.case.friction_coefficient, at.force_h[:, 0, 0]))
     unit = problem.case.joint(problem.mode.omega, 1.0).structure.force_h()[:, 1:]
     force = np.linalg.norm(unit)
-    return float(MODES.first_load * limit / force) if limit > 0.0 and force > 0.0 else MODES.first_amplitude
+    return float(LOADING.free_step * limit / force) if limit > 0.0 and force > 0.0 else MODES.first_amplitude
 
 
 def first_node(rest: Rest, amplitude: float, budget: Budget) -> Nodes | None:

@@ -9,13 +9,8 @@ from dataclasses import dataclass
 class ModeOptions:
     """Lengths and limits: for each its meaning, its unit (none: a ratio) and the evidence for its value."""
 
-    first_load: float = 1e-3
-    """Vibrating contact forces at the first amplitude, over the friction limits under the static load. With ten times
-    the value and with a tenth the nodes lie elsewhere: the damping of the dovetail changes by 7e-5 and 1e-3."""
     first_amplitude: float = 1e-6
     """First amplitude of a joint without static normal forces, m sqrt(kg)."""
-    longest_ratio: float = 2.0
-    """Largest ratio of the amplitudes of two nodes. With 1.4 the damping of the dovetail changes by 5e-6."""
     top_base: float = 4.0
     """Amplitudes are lowered from a power of this number, at least twice the amplitude of the point. All points with
     one such power have one way. With 8 the mode of the foot is equal to 1e-8."""

@@ -25,10 +25,6 @@ class StabilityOptions:
     `opening_harmonics` (on the branches of a mass at a wall more than 9 harmonics change means and first harmonics by
     up to 3 %), or a state behind the end of a branch. Corners at which a branch folds back a little are no jumps, and
     there may be many of them."""
-    settled_multiplier: float = 0.01
-    """Change of the first multiplier with twice as many samples at which no more samples are taken."""
-    hill_unknowns: int = 800
-    """Largest eigenvalue problem of Hill's method: 255 unknowns take 0.15 s, 800 take 3 s."""
     most_rows: int = 600
     """Largest number of displacements of switching pairs: 200 such pairs take 0.4 GB and 10 s."""
     smallest_growth: float = 1e-3

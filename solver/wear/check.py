@@ -134,7 +134,7 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
         return now > COMMON.negligible
     if now > WEAR.left_out_grown * choice.left_out:
         return error * now > settings.rtol * choice.left_out
-    return now < WEAR.left_out_fallen * choice.left_out
+    return now < ACCURACY.kept_fraction**2 * choice.left_out
 
 
 def _vibrates_otherwise(state: WearState) -> bool:

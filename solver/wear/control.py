@@ -57,7 +57,7 @@ class GivenSteps:
         planned = self.length
         if self.end == np.inf:
             slower = float(state.rates.largest[-1] / state.rates.value[-1])
-            planned = min(WEAR.largest_step_ratio * state.length, self.length * slower)
+            planned = min(COMMON.largest_step_ratio * state.length, self.length * slower)
         if self.largest_depth is not None and self.scheme == "explicit":
             planned = self.largest_depth / float(work.rate(state.point.evaluation).max())
         # no extra step for a remainder below the round-off of the count
@@ -109,7 +109,7 @@ class AdaptiveSteps:
                 # at the shortest step: a corner of the wear rate, or the end of the branch if the vibration changes
                 calm = vibration_change(state.point.evaluation, tried.end.point.evaluation) < CONTINUATION.smooth_change
                 if ratio <= 1.0 or (length <= shortest and calm):
-                    ahead = length * float(np.clip(wanted, COMMON.step_safety, WEAR.largest_step_ratio))
+                    ahead = length * float(np.clip(wanted, COMMON.step_safety, COMMON.largest_step_ratio))
                     return Step(work.accepted(state, tried.end, length).planned(ahead), size, length)
                 shorter = float(np.clip(wanted, COMMON.smallest_step_ratio, COMMON.step_safety))
             if length <= shortest:

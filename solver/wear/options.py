@@ -10,8 +10,6 @@ class WearOptions:
     """Lengths and limits: for each its meaning, its unit (none: a ratio) and the evidence for its value."""
 
     # adaptive steps
-    largest_step_ratio: float = 2.0
-    """Largest ratio of two successive steps; BDF2 is zero-stable below 1 + sqrt(2)."""
     first_step: float = 0.05
     """Length of the first step, whose error is not known, as a fraction of the explicit step limit."""
     first_depth: float = 0.01
@@ -35,12 +33,8 @@ class WearOptions:
     left_out_grown: float = 1.5
     """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
     which a new choice is possible. Dovetail, 211.5, 211.75, 212.5 Hz: 0.8 to 1.4 over 1e5 cycles."""
-    left_out_fallen: float = 0.2
-    """Ratio of this part to the one at the last choice of harmonics, below which fewer harmonics are tried."""
     alternations: int = 4
     """Number of increments of a wear rate with alternating sign and without decay that make an oscillation."""
-    calming: float = 0.98
-    """Ratio of two successive increments below which an oscillation decays."""
 
     # steady state
     acted_back: float = 100.0
@@ -53,8 +47,6 @@ class WearOptions:
     """Most cycles of a history without a steady state."""
 
     # final state without slow time
-    off_attempts: int = 4
-    """Most attempts to open pairs, each by ten times the distance of the last one."""
     loss_of_rate: float = 0.5
     """Largest reduction of the wear rate of a pair by the wear of the others, over the change by its own wear. Above,
     the pair may stick again. Cylinder in partial slip: the others add 0.4 to 0.9. Sphere: they reduce the rate by 0.2

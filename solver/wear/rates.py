@@ -45,7 +45,7 @@ class WearRates:
         """The rates after another step. rates (n,): of the new state."""
         increment = rates - self.value
         size = np.abs(increment)
-        alternates = (self.increment * increment < 0.0) & (size >= WEAR.calming * np.abs(self.increment))
+        alternates = (self.increment * increment < 0.0) & (size >= np.abs(self.increment))
         n_alternating = np.where(alternates, self.n_alternating + 1, 0)
         last = np.vstack([self.last[1:], size])
         weakest = np.where(n_alternating >= WEAR.alternations - 1, last.min(axis=0), 0.0)

@@ -16,6 +16,7 @@ from solver.settings import Scheme, SolverSettings
 from solver.wear import control
 from solver.wear.check import chosen_for_another
 from solver.wear.control import AdaptiveSteps, Control, GivenSteps
+from solver.wear.options import WEAR as OPTIONS
 from solver.wear.state import Choice, WearState
 from solver.wear.step import Step
 from tests.solver.worn_slider import AREA, END, WEAR, begun
@@ -111,7 +112,7 @@ def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monk
     assert shorter.length == tried[-1]
     monkeypatch.setattr(control, "bdf2_attempt", lambda *_: None)
     states, (euler, *_) = steps_of(AdaptiveSteps(1e-2), 1)
-    assert euler.length == pytest.approx(COMMON.shortest_slow_step * first, rel=2e-3)
+    assert euler.length == pytest.approx(OPTIONS.shortest_slow_step * first, rel=2e-3)
     assert depths(states)[1] == pytest.approx(euler.length * rates(states)[1], rel=1e-6)
 
 
