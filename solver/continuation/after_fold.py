@@ -56,14 +56,14 @@ def states_after_fold(
     def balance_at(omega: float, history: FloatArray) -> Balance:
         return Balance.frozen(case.joint(omega, joint.excitation_amplitude), history, before)
 
-    def stays(point: PathPoint) -> bool:
+    def accepted(point: PathPoint) -> bool:
         return is_stable(balance_at(point.parameter, point.history).linearise(point.evaluation), solver)
 
     # the target is the frequency of the last state
     start = PathPoint(joint.omega, last.evaluation, last.evaluation.history)
     arc = Arc(balance_at, start, CONTINUATION.arc_span * joint.omega, solver, case.settings.tolerance, budget)
     for toward in (-1.0, 1.0):
-        found = follow_arc(arc, joint.omega, stays, toward)
+        found = follow_arc(arc, joint.omega, accepted, toward)
         if found.point is not None and found.folds:
             yield found.point
     outcome, other = solve_first_state(case, joint.omega, joint.excitation_amplitude, worn, solver, budget)

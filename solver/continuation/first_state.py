@@ -15,7 +15,7 @@ from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
-from solver.stability.hill import stays
+from solver.stability.hill import is_stable_at
 from solver.structure.fourier import change_orders, from_complex
 from solver.structure.joint import Case, Joint, static_joint
 
@@ -122,7 +122,7 @@ def solve_first_state(
     def accepted(point: PathPoint) -> bool:
         nonlocal unstable
         at = point.evaluation
-        stable = stays(balance_at(1.0, at.history), at, solver, budget)
+        stable = is_stable_at(balance_at(1.0, at.history), at, solver, budget)
         unstable = unstable or not stable
         return stable
 

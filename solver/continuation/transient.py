@@ -37,7 +37,7 @@ from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.options import COMMON
 from solver.outcome import Outcome
-from solver.stability.hill import stays
+from solver.stability.hill import is_stable_at
 from solver.structure.condensation import CondensedStructure, condense, relative_indices
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -208,7 +208,7 @@ def relax_to_periodic(
         change = _change(motion, ahead)
         too_far = change > 2.0 * CONTINUATION.smooth_change and length > 1.0
         # a step over more than the time in which a motion grows would damp this motion
-        damped = grows and result.converged and not stays(balance, result.evaluation, solver, budget)
+        damped = grows and result.converged and not is_stable_at(balance, result.evaluation, solver, budget)
         if damped and result.iterations == 0:
             return Outcome.UNSTABLE, None
         if not result.converged or too_far or damped:
@@ -256,7 +256,7 @@ def _periodic(
     if not result.converged:
         return None, False
     found = PathPoint(float("nan"), result.evaluation, final_history(balance, result.evaluation))
-    return found, stays(balance, result.evaluation, solver, budget)
+    return found, is_stable_at(balance, result.evaluation, solver, budget)
 
 
 def _change(before: Motion, after: Motion) -> float:

@@ -25,7 +25,7 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.stability.hill import stays
+from solver.stability.hill import is_stable_at
 from solver.structure.joint import Case, Joint
 
 
@@ -101,7 +101,7 @@ class LoadingPath:
             begin = begin + ratio * (begin - nodes[0].evaluation.predicted_h)
         limit = self.case.settings.tolerance if tolerance is None else tolerance
         result = solve_balance(balance, begin, solver, limit, budget, CONTINUATION.near_iterations)
-        if not result.converged or not stays(balance, result.evaluation, solver, budget):
+        if not result.converged or not is_stable_at(balance, result.evaluation, solver, budget):
             return None
         return PathPoint(target, result.evaluation, final_history(balance, result.evaluation))
 
@@ -126,7 +126,7 @@ class LoadingPath:
 
         def accepted(point: PathPoint) -> bool:
             balance = self.balance_at(point.parameter, point.evaluation.history)
-            return stays(balance, point.evaluation, solver, budget)
+            return is_stable_at(balance, point.evaluation, solver, budget)
 
         while not budget.exhausted:
             point, arrived = follow_naturally(

@@ -224,7 +224,8 @@ class NodeSweep:
                     ratio = min(LOADING.aimed_change / max(change, 1e-12), COMMON.largest_step_ratio)
                     self.state = replace(self.state, length=length * ratio)
                     return Step(point)
-                shorter = max(LOADING.aimed_change / change, COMMON.smallest_step_ratio)
+                # the change need not be proportional to the length
+                shorter = max(LOADING.aimed_change / change, 0.1)
             elif length > free:
                 shorter = max(COMMON.smallest_step_ratio, free / length)
             else:
