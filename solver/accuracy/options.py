@@ -33,7 +33,7 @@ class AccuracyOptions:
     displacements_of_limits: int = 144
     """Number of relative displacements of the dovetail with 48 pairs, to which the limits of unknowns belong. For a
     larger joint some limits grow in proportion, so that they limit the harmonics and not the pairs."""
-    coarse_unknowns: int = 1600
+    node_unknowns: int = 1600
     """Most unknowns of a node of a sweep: about those of the dovetail of 48 pairs with five harmonics (1584). Most
     unknowns of a small joint, too: impacts couple all harmonics, and no preconditioner helps."""
     stiffness_mismatch: float = 0.25

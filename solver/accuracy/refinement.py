@@ -205,7 +205,7 @@ class _Search:
         if here.unknowns(resolution) * resolution.samples > room:
             return False
         small = n_rel <= NEWTON.small_joint_displacements
-        most = room_for(min(self.most, ACCURACY.coarse_unknowns) if small else self.most, n_rel)
+        most = room_for(min(self.most, ACCURACY.node_unknowns) if small else self.most, n_rel)
         if resolution.highest > ACCURACY.most_mixed_harmonics:
             # more harmonics for friction without impacts only, whose harmonics are odd
             if not all(order % 2 for order in resolution.orders):

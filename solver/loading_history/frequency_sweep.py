@@ -46,7 +46,7 @@ class Found:
         self.outcome = outcome
         self.branch, self.fold = branch, fold
         self.state: PeriodicState | None = None
-        self.coarse: PeriodicState | None = None
+        self.reference: PeriodicState | None = None
         self.resolution: Resolution | None = None
         self.estimate = UNKNOWN
         self.message = ""
@@ -194,7 +194,7 @@ class FrequencySweep:
         nodes, target = self._begun_sweep(origin, self._sweep_to(origin, omega)), 1.0 if ramp else omega
         self.advance_nodes(nodes, target)
         try:
-            reached, coarse = nodes.state_at(target, self.budget)
+            reached, reference = nodes.state_at(target, self.budget)
             case = nodes.case
             if reached is None:
                 self.budget.limit = self.budget.iterations + LOADING.first_iterations
@@ -214,7 +214,7 @@ class FrequencySweep:
         # folds of a ramp are load factors
         fold = float("nan") if ramp else (nodes.state.fold, *reached.folds)[-1]
         found = Found(Outcome.CONVERGED, nodes.state.branch + len(reached.folds), fold)
-        return self._judge(refined, omega, found, nodes.reference_path.case, coarse)
+        return self._judge(refined, omega, found, nodes.reference_path.case, reference)
 
     def sweep_in_cell(self, frequency: float) -> NodeSweep:
         """The sweep that passes all frequencies in the quarter octave of a frequency, Hz, at its present node."""
@@ -231,21 +231,21 @@ class FrequencySweep:
         return nodes
 
     def _judge(
-        self, refined: Refined, omega: float, found: Found, coarse_case: Case, coarse: PathPoint | None
+        self, refined: Refined, omega: float, found: Found, reference_case: Case, reference: PathPoint | None
     ) -> Found:
         """The outcome of a refined state, with its error and the state of the reference sweep."""
         joint = refined.case.joint(omega, self.excitation_amplitude)
         found.state, found.resolution = periodic_state(joint, refined.point), refined.case.resolution
         found.estimate = refined.estimate
-        if coarse is not None:
-            moved = move_point(coarse_case, refined.case, joint, coarse, self.budget)
+        if reference is not None:
+            moved = move_point(reference_case, refined.case, joint, reference, self.budget)
             if moved is not None:
-                found.coarse = periodic_state(joint, moved)
+                found.reference = periodic_state(joint, moved)
                 found.estimate = found.estimate + state_difference(refined.case, joint, refined.point, moved)
         if not certify(joint, refined.point.evaluation).holds(self.settings.tolerance):
-            found.outcome, found.state, found.coarse = Outcome.CERTIFICATE_FAILED, None, None
+            found.outcome, found.state, found.reference = Outcome.CERTIFICATE_FAILED, None, None
         elif unstable := find_instability(refined.case, joint, refined.point.evaluation, self.budget):
-            found.outcome, found.state, found.coarse = unstable.outcome, None, None
+            found.outcome, found.state, found.reference = unstable.outcome, None, None
             found.message = unstable.sentence
         elif not refined.accurate:
             found.outcome = Outcome.INACCURATE

@@ -58,8 +58,8 @@ def _moved(
 
 def choose_resolution(case: Case, joint: Joint, point: PathPoint, budget: Budget) -> Refined:
     """A node with the harmonics and samples that it needs, at least the first ones of automatic settings."""
-    # `coarse_unknowns` limits the harmonics: their error shows in the difference to the reference sweep
-    refined = refine(case, joint.omega, joint.excitation_amplitude, point, budget, ACCURACY.coarse_unknowns)
+    # `node_unknowns` limits the harmonics: their error shows in the difference to the reference sweep
+    refined = refine(case, joint.omega, joint.excitation_amplitude, point, budget, ACCURACY.node_unknowns)
     fewest = first_resolution(case.settings)
     if refined.case.resolution.highest >= fewest.highest:
         return refined

@@ -276,12 +276,12 @@ def begin_reference(work: WearingJoint, start: StartState, step_limit: float) ->
     (dovetail, 212.5 Hz: the worn volume is 0.082 or 0.106 mm3; both sweeps lead to 0.082, twice their difference to
     0.097). Where this state is not found, the state of the reference sweep is taken.
     """
-    fine, coarse = start.state, start.coarse
+    fine, reference = start.state, start.reference
     assert fine is not None
-    begun = work.begin(coarse or fine, start.resolution, NOTHING, accurate=True, step_limit=step_limit)
-    if coarse is None:
+    begun = work.begin(reference or fine, start.resolution, NOTHING, accurate=True, step_limit=step_limit)
+    if reference is None:
         return begun
-    history = fine.start_history + 2.0 * (coarse.start_history - fine.start_history)
+    history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
     balance = Balance.frozen(work.at(begun), history, begun.depth)
     first = begun.point.evaluation.predicted_h
     found = solve_balance(
