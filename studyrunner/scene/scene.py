@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from solver.contact.wear_law import surface_factors
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
-from studyrunner.scene.computed import Computed, InMemory, model_once
+from studyrunner.scene.computed import Computed, InMemory, model_once, scene_parameters_of
 from studyrunner.scene.edge_pairs import edge_pairs
 from studyrunner.scene.static_response import StaticResponse
 from studyrunner.scene.variables import build_mesh, check_outputs
@@ -148,6 +149,9 @@ def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] 
     if study.variants:
         names = ", ".join(f"axes.{axis.dotted}" for axis in study.scene_axes)
         raise UserError(study.source, names, None, "give one value: a scene file holds one scene")
+    if len({json.dumps(scene_parameters_of(block), sort_keys=True) for block in study.block_studies}) > 1:
+        raise UserError(study.source, "mission", None, "give all blocks one scene: a scene file holds one")
+    study = study.block_studies[0] if study.has_missions else study
     model = build_study_scene(study, progress)
     with scene_errors(study.source, study.scene.path):
         mesh, origin = build_mesh(study), describe_origin(study)

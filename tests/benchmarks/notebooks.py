@@ -3,9 +3,9 @@
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.notebooks dovetail.nc
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.notebooks dovetail.nc trends wear_maps
 
-`dovetail.nc` is the result of the bundled study, `run-study dovetail`, read by some notebooks; two read `scatter.nc`
-and `modes.nc` beside it, the results of `run-study scatter` and `run-study modes`; the others run a small study of
-their own. Without names all are run, in a folder of their own. Two runs on one machine store the same, but for the
+`dovetail.nc` is the result of the bundled study, `run-study dovetail`, read by some notebooks; three read `scatter.nc`,
+`modes.nc` and `mission.nc` beside it, the results of the bundled studies of these names; the others run a small study
+of their own. Without names all are run, in a folder of their own. Two runs on one machine store the same, but for the
 CPU times of `error_against_run_time`: nothing is kept of when, where and by which version of Python they ran.
 """
 
@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             here = Path(folder, "here")
             here.mkdir()
             (here / "dovetail.nc").symlink_to(result)
-            for other in ("scatter.nc", "modes.nc"):
+            for other in ("scatter.nc", "modes.nc", "mission.nc"):
                 if result.with_name(other).is_file():
                     (here / other).symlink_to(result.with_name(other))
             nbformat.write(settle(execute(path, here, {})), path)
