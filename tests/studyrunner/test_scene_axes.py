@@ -224,7 +224,10 @@ def refused(study: str, overrides: Sequence[str], capsys: pytest.CaptureFixture[
         (["axes.friction_coefficient={}"], "axes.friction_coefficient = {}: give a number, a list"),
         (["axes.friction_coefficient={support=[0.3]}"], "scene.friction_coefficient = 0.5: give it once"),
         (["axes.friction_coefficient=[0.3, nan]"], "axes.friction_coefficient = nan: give a number"),
-        (["axes.friction_coefficient=[0.3, -0.1]"], "axes.friction_coefficient = -0.1: give greater"),
+        (
+            ["axes.friction_coefficient=[0.3, -0.1]"],
+            "axes.friction_coefficient = -0.1: give a number that is 0 or more",
+        ),
         (["axes.friction_coefficient=[0.3, 0.3]"], "axes.friction_coefficient = 0.3: give every value once"),
         (["axes.friction_coefficient=[0.3, true]"], "give values of one kind"),
         (["axes.frictioncoefficient=[0.3]"], "unknown key, give friction_coefficient"),

@@ -101,7 +101,6 @@ def draw_depths(result: Result) -> Drawing:
         + (f" at {result.describe(shown, [course])}" if course else ""),
         f"Deepest: {', '.join(deepest)}",
         choice.sentence,
-        "Fig. 5 of the paper",
     )
     return Drawing("wear_depth", "Wear depth of the pairs", text, figure)
 
@@ -143,7 +142,6 @@ def draw_pressure(result: Result) -> Drawing:
         f"Largest: {', '.join(largest)}",
         _how_drawn(flanks),
         left_out,
-        "Figs. 10 and 11 of the paper",
     )
     return Drawing("mean_pressure", "Mean pressure on the flanks", text, figure)
 
@@ -169,7 +167,7 @@ def draw_pressure_history(result: Result) -> Drawing:
         f"Contact pressure, mean over a period, at {result.describe(shown)}",
         f"Largest: {scale.show(float(np.nanmax(values[0])))} ({result.cycle_label(0)}),"
         f" {scale.show(float(np.nanmax(values[last])))} ({result.cycle_label(last)})",
-        "The file has no positions of the pairs, hence no map. In place of Figs. 10 and 11 of the paper",
+        "The file has no positions of the pairs, hence no map",
     )
     return Drawing("mean_pressure", "Mean contact pressure", text, figure)
 
@@ -197,7 +195,6 @@ def draw_profile(result: Result) -> Drawing:
         "Below, the depth along the flank, one line for each row of pairs" if on_grid else "",
         _how_drawn(flanks),
         left_out,
-        "Fig. 12 of the paper",
     )
     return Drawing("worn_profile", "Worn profile", text, figure)
 

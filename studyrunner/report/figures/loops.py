@@ -181,7 +181,6 @@ def _draw_fretting(loops: Sequence[_Loop], directions: _Directions, ends: Sequen
         "Tangential force over relative displacement through a period: the area inside is the energy of friction",
         directions.told,
         tail,
-        "Fig. 13 of the paper",
     )
     return Drawing("fretting_loops", _TITLE, text, figure)
 
@@ -207,7 +206,6 @@ def _draw_normal(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Draw
     text = as_sentences(
         f"Normal force through a period; where it is zero the pair is open: {', '.join(open_part)}",
         tail,
-        "Fig. 14 of the paper",
     )
     return Drawing("normal_load", "Normal load through a period", text, figure)
 
@@ -237,7 +235,6 @@ def _draw_motion(loops: Sequence[_Loop], directions: _Directions, ends: Sequence
         directions.told,
         f"Largest extent: {', '.join(_tell_extent(loop) for loop in loops)}",
         tail,
-        "Fig. 15 of the paper",
     )
     return Drawing("pair_motion", "Motion of the pairs in the contact plane", text, figure)
 

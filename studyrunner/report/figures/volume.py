@@ -140,7 +140,7 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
     text = as_sentences(
         f"Worn volume over cycles{f' at {where}' if where else ''}", amount, bands, *early, schemes, choice.sentence
     )
-    return Drawing("worn_volume", "Worn volume over cycles", f"{text} Fig. 4 of the paper.", figure)
+    return Drawing("worn_volume", "Worn volume over cycles", text, figure)
 
 
 def _tell_final(result: Result, scale: Scale) -> str:
@@ -196,7 +196,6 @@ def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing
         if result.has("cycle_count")
         else "",
         choice.sentence,
-        f"Fig. {6 if name == 'worn_volume' else 7} of the paper",
     )
     return Drawing(f"{name}_map", f"{text.capitalize()} over {course.name} and cycles", caption, figure)
 
@@ -288,7 +287,6 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
         "Bars: estimated error" if bars > 0.0 else "",
         *care,
         choice.sentence,
-        "Fig. 8 of the paper",
     )
     return Drawing("final_worn_volume", f"Final worn volume over {course.name}", caption, figure)
 

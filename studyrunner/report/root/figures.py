@@ -192,7 +192,6 @@ def draw_numbers(result: Result, surface: RootSurface, views: Sequence[View]) ->
         "Each surface is seen from outside its body" if surface.is_mesh else "",
         "Only some of the numbers are written" if some else "",
         edge,
-        "Fig. 3b of the paper",
     )
     return Drawing("pair_numbers", "Numbers of the contact pairs", text, figure)
 

@@ -160,5 +160,5 @@ def test_too_many_inputs_or_values_are_refused(monkeypatch: pytest.MonkeyPatch) 
 
 def test_a_result_without_samples_has_no_drawn_values() -> None:
     dataset: xr.Dataset = sample_file().isel(sample=0, drop=True)
-    with pytest.raises(UserError, match="sample_gap = dimensions contact"):
+    with pytest.raises(UserError, match="sample_gap: dimensions contact"):
         check_dataset(dataset, "samples.nc")

@@ -4,6 +4,19 @@
 const MOST_FRAMES = 50;
 const FRAME = 150; // ms
 
+// Relative errors that the page holds of what stands in the list: over the cycles, or the largest over them.
+const ERRORS_OF = {
+  worn_volume: "worn_volume_error", wear_rate: "wear_rate_error", wear_depth_max: "worn_volume_error", largest_wear_depth: "error_estimate",
+  response_amplitude: "response_error", response_peak: "response_error", response_phase: "response_error", step_limit: "error_estimate",
+};
+
+// Absolute error of a value; NaN where the page does not hold it. That of a phase, in rad, is the relative one of its amplitude.
+function errorOf(name, value, point, cycle) {
+  const other = ERRORS_OF[name];
+  const relative = courses[other] ? course(other, point, cycle) : data.points[other] ? data.points[other].values[point] : NaN;
+  return name === "response_phase" ? relative : relative * Math.abs(value);
+}
+
 function readout() {
   const { point, cycle, response } = state;
   const found = places(point);
@@ -17,11 +30,12 @@ function readout() {
   const of = data.responses.length > 1 ? `, ${data.responses[response]}` : "";
   for (const [name, entry] of Object.entries(courses)) {
     const label = name.includes("response") ? entry.label + of : entry.label;
-    rows.push([name, label, show(entry, course(name, point, cycle, name.includes("response") ? response : 0))]);
+    const value = course(name, point, cycle, name.includes("response") ? response : 0);
+    rows.push([name, label, show(entry, value, errorOf(name, value, point, cycle))]);
   }
   for (const [name, entry] of Object.entries(data.points)) {
     // What never happened to the point has no number.
-    if (Number.isFinite(entry.values[point])) rows.push([name, entry.label, show(entry, entry.values[point])]);
+    if (Number.isFinite(entry.values[point])) rows.push([name, entry.label, show(entry, entry.values[point], errorOf(name, entry.values[point], point, cycle))]);
   }
   byId("readout").replaceChildren(...rows.map(([name, label, text]) => {
     const row = document.createElement("div");
@@ -32,6 +46,9 @@ function readout() {
   }));
   byId("selected").textContent = `${pointText(point)}: ${sentence(point)}`;
 }
+
+// colours are those of the page when it was opened
+DARK.addEventListener("change", () => location.reload());
 
 // ---- choices
 

@@ -1,18 +1,23 @@
 // The plots of what is picked: response, course of the wear, maps and loops.
 "use strict";
 
+const DARK = window.matchMedia("(prefers-color-scheme: dark)");
+const [INK, PAPER, GRID, LINE, GREY] = DARK.matches
+  ? ["#e8e8e8", "#17191c", "#3a3d42", "#9a9a9a", "#8c8c8c"]
+  : ["#1a1a1a", "#fff", "#e0e0e0", "#777", "#8c8c8c"];
 const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
 const SYMBOLS = ["circle", "square", "triangle-up", "diamond", "triangle-down", "cross"];
-const FONT = { family: "system-ui, Segoe UI, Roboto, Helvetica Neue, Arial, sans-serif", size: 12, color: "#1a1a1a" };
+const FONT = { family: "system-ui, Segoe UI, Roboto, Helvetica Neue, Arial, sans-serif", size: 12, color: INK };
 const CONFIG = { responsive: true, displayModeBar: false };
+const PALE = DARK.matches ? "#5f5f5f" : "#bdbdbd"; // error bars behind their marks
 const TOUCH = window.matchMedia("(pointer: coarse)").matches;
 
 function layout(more) {
   return {
     font: FONT,
     margin: { l: 64, r: 14, t: 12, b: 46 },
-    paper_bgcolor: "#fff",
-    plot_bgcolor: "#fff",
+    paper_bgcolor: PAPER,
+    plot_bgcolor: PAPER,
     hovermode: "closest",
     separators: ".\u00a0",
     dragmode: TOUCH ? false : "zoom",
@@ -23,14 +28,14 @@ function layout(more) {
 function axisLayout(title, more) {
   return {
     title: { text: plain(title), standoff: 8 },
-    gridcolor: "#e0e0e0",
+    gridcolor: GRID,
     zeroline: false,
-    linecolor: "#777",
+    linecolor: LINE,
     ticks: "outside",
-    tickcolor: "#777",
+    tickcolor: LINE,
     exponentformat: "power",
     minexponent: 6,
-    separatethousands: true,
+    separatethousands: title === "cycles",
     automargin: true,
     ...more,
   };
@@ -82,8 +87,8 @@ function drawResponse() {
       traces.push({
         x: line.points.map(at), y: line.points.map((point) => value(point, 0)),
         mode: line.points.length > 1 ? "lines" : "markers", hoverinfo: "skip", name: plain(cycleText(0)),
-        line: { color: "#8c8c8c", width: 1.5, dash: DASHES[number % DASHES.length] },
-        marker: { color: "#8c8c8c", size: 6 }, showlegend: !ghosts, legendrank: 2000, meta: "first",
+        line: { color: GREY, width: 1.5, dash: DASHES[number % DASHES.length] },
+        marker: { color: GREY, size: 6 }, showlegend: !ghosts, legendrank: 2000, meta: "first",
       });
       ghosts = true;
     }
@@ -100,7 +105,7 @@ function drawResponse() {
         x: bad.map(at), y: bad.map(() => 0), customdata: bad, mode: "markers", name: "no result",
         text: bad.map((point) => plain(`${pointText(point)}: ${sentence(point)}`).replace(/(.{50,}?) /g, "$1<br>")),
         hovertemplate: "%{text}<extra></extra>", showlegend: !failures, legendrank: 3000, cliponaxis: false,
-        marker: { color: "#000", size: 9, symbol: "x-thin", line: { color: "#000", width: 2 } }, meta: "failed",
+        marker: { color: INK, size: 9, symbol: "x-thin", line: { color: INK, width: 2 } }, meta: "failed",
       });
       failures = true;
     }
@@ -108,7 +113,7 @@ function drawResponse() {
   traces.push({
     x: [at(state.point)], y: [known(state.point, state.cycle) ? value(state.point, state.cycle) : 0], mode: "markers",
     hoverinfo: "skip", name: "picked", legendrank: 1500, cliponaxis: false, meta: "picked",
-    marker: { symbol: "circle-open", size: 17, color: "#000", line: { width: 2.5 } },
+    marker: { symbol: "circle-open", size: 17, color: INK, line: { width: 2.5 } },
   });
   const words = axis.words ? { type: "category", categoryorder: "array", categoryarray: axis.values.map(written) } : {};
   byId("response-hint").textContent = varying.length
@@ -163,11 +168,11 @@ function drawCourse() {
     });
     if (name === "worn_volume" && courses.exact_worn_volume) {
       traces.push({ ...place, x: across, y: scaled("exact_worn_volume"), mode: "lines", name: "exact", meta: "exact",
-        line: { color: "#000", width: 1.5, dash: "dot" }, hoverinfo: "skip" });
+        line: { color: INK, width: 1.5, dash: "dot" }, hoverinfo: "skip" });
     }
     traces.push({
       ...place, x: [across[state.cycle]], y: [values[state.cycle]], mode: "markers", hoverinfo: "skip", showlegend: false,
-      marker: { symbol: "circle-open", size: 13, color: "#000", line: { width: 2.5 } }, cliponaxis: false, meta: "picked",
+      marker: { symbol: "circle-open", size: 13, color: INK, line: { width: 2.5 } }, cliponaxis: false, meta: "picked",
     });
     const alone = beside || i === panels.length - 1;
     shape[`xaxis${suffix}`] = axisLayout(alone && !leaps ? "cycles" : "", {
@@ -277,7 +282,7 @@ function drawLoop() {
   const traces = [found.column ? 0 : null, found.column].filter((column) => column !== null).map((column) => {
     const now = column === found.column;
     return { x: closed(displacement, column), y: closed(force, column), mode: "lines", name: cycleText(loops.cycles[column]),
-      line: { color: now ? data.colours[0] : "#8c8c8c", width: now ? 2 : 1.5, dash: now ? "solid" : "dash" }, meta: now ? "loop" : "first",
+      line: { color: now ? data.colours[0] : GREY, width: now ? 2 : 1.5, dash: now ? "solid" : "dash" }, meta: now ? "loop" : "first",
       hovertemplate: `%{x:.4~g} ${plain(displacement.unit)}, %{y:.4~g} ${plain(force.unit)}<extra></extra>` };
   });
   const name = (quantity) => loops.labels[state.component].replace("{}", quantity);
