@@ -21,9 +21,11 @@ from studyrunner.report.drawing import (
     new_panels,
     set_from_zero,
 )
+from studyrunner.report.figures.scar import draw_scar
 from studyrunner.report.isolines import add_colour_bar, add_isolines
 from studyrunner.report.reading.flanks import Flank, find_flanks
 from studyrunner.report.reading.result import Result, as_sentences
+from studyrunner.report.reading.scars import find_scar
 from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count
@@ -51,6 +53,10 @@ def draw_flanks(result: Result) -> Iterator[Drawing | Missing]:
         worn = float(last_depth(result, shown).max()) > _NO_DEPTH
     if worn and result.dataset.sizes["contact"] > 1:
         yield draw_depths(result)
+    scar = find_scar(result)
+    if scar is not None:
+        yield from draw_scar(result, scar)
+        return
     placed = all(flank.seen is not None for flank in find_flanks(result))
     if result.has("mean_pressure"):
         if placed or result.dataset.sizes["contact"] > _FEW_PAIRS:

@@ -5,6 +5,9 @@ const DARK = window.matchMedia("(prefers-color-scheme: dark)");
 const [INK, PAPER, GRID, LINE, GREY] = DARK.matches
   ? ["#e8e8e8", "#17191c", "#3a3d42", "#9a9a9a", "#8c8c8c"]
   : ["#1a1a1a", "#fff", "#e0e0e0", "#777", "#8c8c8c"];
+// a third of white, against a dark page
+const lighter = (colour) => `#${[1, 3, 5].map((at) => Math.round(parseInt(colour.slice(at, at + 2), 16) * 0.67 + 84).toString(16).padStart(2, "0")).join("")}`;
+if (DARK.matches) data.colours = data.colours.map(lighter);
 const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
 const SYMBOLS = ["circle", "square", "triangle-up", "diamond", "triangle-down", "cross"];
 const FONT = { family: "system-ui, Segoe UI, Roboto, Helvetica Neue, Arial, sans-serif", size: 12, color: INK };
@@ -115,13 +118,14 @@ function drawResponse() {
     hoverinfo: "skip", name: "picked", legendrank: 1500, cliponaxis: false, meta: "picked",
     marker: { symbol: "circle-open", size: 17, color: INK, line: { width: 2.5 } },
   });
+  const numbers = axis.label === "frequency" ? { tickformat: ".9~g" } : {};
   const words = axis.words ? { type: "category", categoryorder: "array", categoryarray: axis.values.map(written) } : {};
   byId("response-hint").textContent = varying.length
     ? (TOUCH ? "Touch a point to pick it." : "Click a point to pick it; drag to zoom in, double-click to zoom out.") + (failures ? " Crosses on the zero line: points without a value there." : "")
     : "The study has a single point.";
   Plotly.react("response-plot", traces, layout({
     height: 380, uirevision: `${state.response}`, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
-    xaxis: axisLayout(titled(axis.label, axis.unit), words),
+    xaxis: axisLayout(titled(axis.label, axis.unit), axis.words ? words : numbers),
     yaxis: axisLayout("", { ...(entry ? upright("amplitude", entry.unit) : {}), rangemode: "tozero" }),
   }), CONFIG);
 }
