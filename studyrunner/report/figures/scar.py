@@ -59,20 +59,20 @@ def _draw_pressure(result: Result, scar: Scar) -> Drawing:
 
 
 def _draw_depth(result: Result, scar: Scar) -> Drawing:
-    """Depth over x before and after wear, downwards as the surface sinks; of a sphere a map above."""
+    """Depth over x before and after wear, downwards as the surface sinks; of a sphere a map beside it."""
     shown = result.shown_point()
     last, after = result.last_kept(shown), last_depth(result, shown)
     measured = result.measured
     scale = scale_for("m", after, *([measured.depth] if measured else []))
     along = scale_for("m", scar.x)
-    figure = new_figure(6.4 if scar.width else 3.4)
+    figure = new_figure(3.4)
     if scar.width:
-        above, panel = figure.subplots(2, 1, height_ratios=(3.2, 2.4))
+        beside, panel = figure.subplots(1, 2, width_ratios=(1.0, 1.2))
         norm = Normalize(0.0, scale(float(np.nanmax(after))).item())
-        _draw_map(above, scar, scale(after), norm, along.factor)
-        above.set_xlabel(along.label("x"))
-        above.set_ylabel(along.label("y"))
-        add_colour_bar(figure, np.array([above]), norm, scale.label("wear depth"), fraction=0.05)
+        _draw_map(beside, scar, scale(after), norm, along.factor)
+        beside.set_xlabel(along.label("x"))
+        beside.set_ylabel(along.label("y"))
+        add_colour_bar(figure, np.array([beside]), norm, scale.label("wear depth"), fraction=0.05)
     else:
         panel = figure.subplots()
     at = along(scar.x[scar.line])

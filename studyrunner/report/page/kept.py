@@ -74,10 +74,9 @@ def tell_kept(what: str, kept: Kept, cycles: NDArray[np.int64], result: Result, 
         )
 
 
-def encode_kept(result: Result, name: str, kept: Kept, contacts: NDArray[np.int64] | None = None) -> Encoded:
+def encode_kept(result: Result, name: str, kept: Kept) -> Encoded:
     """A variable at the points and cycles that are kept, (point, cycle, others)."""
-    values = read_kept(result.dataset[name], kept)
-    return encode_values(result.dataset[name], values if contacts is None else values[:, :, contacts])
+    return encode_values(result.dataset[name], read_kept(result.dataset[name], kept))
 
 
 def read_kept(variable: xr.DataArray, kept: Kept) -> NDArray[np.float64]:

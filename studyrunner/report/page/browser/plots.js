@@ -281,11 +281,15 @@ function drawLoop() {
   const closed = (entry, column) => {
     const start = ((found.row * loops.cycles.length + column) * loops.contacts.length + state.loop) * loops.phases;
     const values = Array.from({ length: loops.phases }, (_, phase) => entry.values[(start + phase) * parts + state.component] * entry.factor);
-    return values.concat(values.slice(0, 1));
+    // a joint creeps: loops are shown about their means, which the legend tells
+    const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
+    return { mean, at: values.concat(values.slice(0, 1)).map((value) => value - mean) };
   };
   const traces = [found.column ? 0 : null, found.column].filter((column) => column !== null).map((column) => {
     const now = column === found.column;
-    return { x: closed(displacement, column), y: closed(force, column), mode: "lines", name: cycleText(loops.cycles[column]),
+    const [x, y] = [closed(displacement, column), closed(force, column)];
+    const mean = `mean ${digits(x.mean, 3)} ${plain(displacement.unit)}, ${digits(y.mean, 3)} ${plain(force.unit)}`;
+    return { x: x.at, y: y.at, mode: "lines", name: `${cycleText(loops.cycles[column])}: ${mean}`,
       line: { color: now ? data.colours[0] : GREY, width: now ? 2 : 1.5, dash: now ? "solid" : "dash" }, meta: now ? "loop" : "first",
       hovertemplate: `%{x:.4~g} ${plain(displacement.unit)}, %{y:.4~g} ${plain(force.unit)}<extra></extra>` };
   });
