@@ -43,6 +43,7 @@ function digitsOf(value, error) {
 }
 // error: of the value, in its unit.
 const show = (entry, value, error) => withUnit(digits(value * entry.factor, entry.unit === "%" ? 2 : digitsOf(value * entry.factor, error)), entry.unit);
+const full = (entry, value) => withUnit(digits(value * entry.factor, 7), entry.unit);
 const titled = (text, unit) => (unit ? `${text} (${unit})` : text);
 // Texts of the file in a plot: plotly reads some HTML, of which nothing is wanted.
 const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");

@@ -34,17 +34,19 @@ function readout() {
   for (const [name, entry] of Object.entries(courses)) {
     const label = name.includes("response") ? entry.label + of : entry.label;
     const value = course(name, point, cycle, name.includes("response") ? response : 0);
-    rows.push([name, label, show(entry, value, entry.factor * errorOf(name, value, point, cycle))]);
+    rows.push([name, label, show(entry, value, entry.factor * errorOf(name, value, point, cycle)), full(entry, value)]);
   }
   for (const [name, entry] of Object.entries(data.points)) {
     // What never happened to the point has no number.
-    if (Number.isFinite(entry.values[point])) rows.push([name, entry.label, show(entry, entry.values[point], entry.factor * errorOf(name, entry.values[point], point, cycle))]);
+    if (Number.isFinite(entry.values[point])) rows.push([name, entry.label, show(entry, entry.values[point], entry.factor * errorOf(name, entry.values[point], point, cycle)), full(entry, entry.values[point])]);
   }
-  byId("readout").replaceChildren(...rows.map(([name, label, text]) => {
+  byId("readout").replaceChildren(...rows.map(([name, label, text, all]) => {
     const row = document.createElement("div");
     row.dataset.name = name;
     row.appendChild(document.createElement("dt")).textContent = label;
-    row.appendChild(document.createElement("dd")).textContent = text;
+    const told = row.appendChild(document.createElement("dd"));
+    told.textContent = text;
+    told.title = all || text; // all digits, where the mouse rests
     return row;
   }));
   byId("selected").textContent = `${pointText(point)}: ${sentence(point)}`;
