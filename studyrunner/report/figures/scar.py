@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
@@ -13,24 +11,15 @@ from studyrunner.report.drawing import COLOURS, Drawing, add_legend, line_style,
 from studyrunner.report.isolines import add_colour_bar
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.scars import Scar
-from studyrunner.report.reading.scene_pairs import depths, last_depth, tells_depth
+from studyrunner.report.reading.scene_pairs import depths, last_depth
 from studyrunner.report.reading.units import scale_for
 
 _NO_DEPTH = 1e-15
 """m. A depth below this is round-off: it is far less than an atom."""
 
 
-def draw_scar(result: Result, scar: Scar) -> Iterator[Drawing]:
-    """Mean pressure before and after wear over x; then the scar, with a measured one beside it where there is one."""
-    if result.has("mean_pressure"):
-        yield _draw_pressure(result, scar)
-    if tells_depth(result) and len(result.cycles) > 1:
-        deepest = float(np.nanmax(last_depth(result, result.shown_point()), initial=0.0))
-        if deepest > _NO_DEPTH:
-            yield _draw_depth(result, scar)
-
-
-def _draw_pressure(result: Result, scar: Scar) -> Drawing:
+def draw_scar_pressure(result: Result, scar: Scar) -> Drawing:
+    """Mean pressure over x at the first and the last cycle count."""
     shown = result.shown_point()
     kept = sorted({0, result.last_kept(shown)})
     values = [np.asarray(result.at("mean_pressure", shown, cycle).values, dtype=float) for cycle in kept]
@@ -58,8 +47,10 @@ def _draw_pressure(result: Result, scar: Scar) -> Drawing:
     return Drawing("mean_pressure", "Mean pressure", text, figure)
 
 
-def _draw_depth(result: Result, scar: Scar) -> Drawing:
-    """Depth over x before and after wear, downwards as the surface sinks; of a sphere a map beside it."""
+def draw_scar_depth(result: Result, scar: Scar) -> Drawing:
+    """Depth over x before and after wear, downwards as the surface sinks, with a measured one where there is one; of a
+    sphere a map on the left.
+    """
     shown = result.shown_point()
     last, after = result.last_kept(shown), last_depth(result, shown)
     measured = result.measured

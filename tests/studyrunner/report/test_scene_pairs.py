@@ -120,7 +120,7 @@ def test_the_root_of_one_scene_is_written(
     assert series.n_files == n_files
     mesh = meshio.read(tmp_path / "vtu" / f"root_{n_files - 1:04d}.vtu")
     expected = last_depth(result, result.shown_point())
-    assert np.nanmax(mesh.point_data["wear_depth"]) == np.nanmax(expected)
+    assert np.nanmax(mesh.point_data["wear_depth (m)"]) == np.nanmax(expected)
 
 
 def test_drawn_values_are_taken() -> None:
