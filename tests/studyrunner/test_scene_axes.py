@@ -150,7 +150,7 @@ def test_friction_of_a_surface_of_a_deck_is_an_axis(capsys: pytest.CaptureFixtur
     shutil.copy(SECTOR, "sector.inp")
     Path("wear.toml").write_text(SECTOR_STUDY.replace("friction_coefficient = 0.1\n", ""), encoding="utf-8")
     said = refused("wear.toml", ["axes.friction_coefficient={A=[0.1, 0.2]}"], capsys)
-    assert "friction_coefficient.A = no contact has this name" in said
+    assert "friction_coefficient.A: no contact has this name" in said
     own = compute("wear.toml", "own.nc", "scene.friction_coefficient={BLADES=0.2}", "slow_time.cycles=0")
     both = compute("wear.toml", "both.nc", "axes.friction_coefficient={BLADES=[0.1, 0.2]}", "slow_time.cycles=0")
     same_values(both.sel(friction_coefficient_BLADES=0.2), own)

@@ -29,8 +29,8 @@ ALL_DRAWINGS = [
     "worn_root",
     "pair_numbers",
     "wear_depth",
-    "mean_pressure",
     "worn_profile",
+    "mean_pressure",
     "fretting_loops",
     "normal_load",
     "pair_motion",
@@ -122,7 +122,7 @@ def _check_panels(drawing: Drawing) -> None:
 
 
 @pytest.mark.slow
-def test_a_complete_file_gives_every_figure_of_the_paper_in_its_order() -> None:
+def test_a_complete_file_gives_every_figure_in_its_order() -> None:
     items = list(draw_report(_complete()))
     assert _names(items, Drawing) == ALL_DRAWINGS
     assert _names(items, Missing) == []
