@@ -24,7 +24,7 @@ _NAMES: tuple[tuple[Any, tuple[str, ...]], ...] = (
     (COMMON, ("step_error_fraction",)),
     (NEWTON, ("iterations", "forcing", "most_directions")),
     (CONTINUATION, ("near_iterations", "search_iterations", "arc_correctors", "load_steps")),
-    (ACCURACY, ("penetration_limit", "energy_limit", "refinement_work", "most_samples", "most_unknowns")),
+    (ACCURACY, ("penetration_limit", "violation_limit", "refinement_work", "most_samples", "most_unknowns")),
     (LOADING, ("change_limits", "shortest_sweep_step", "sweep_iterations")),
     (WEAR, ("history_iterations", "fold_resolution", "largest_moved_load", "steps_to_the_end")),
 )

@@ -29,6 +29,7 @@ from studyrunner.system.machine_faults import (
     is_fault_of_machine,
     tells_of_machine,
 )
+from studyrunner.system.progress import count
 
 _ROUND_OFF = 1e-10
 
@@ -220,12 +221,15 @@ def fly(models: Mapping[int, ReducedModel], task: MarchTask, keep: Keep) -> Marc
         )
         for block in task.blocks
     )
-    reached = task.resume
+    reached, n_flown = task.resume, 0
 
-    def note(progress: Packed) -> None:
-        nonlocal reached
-        reached = progress
+    def note(progress: Packed | str) -> None:
+        nonlocal reached, n_flown
         keep(progress)
+        if not isinstance(progress, str):
+            reached, n_flown = progress, n_flown + 1
+            if len(blocks) > 1:
+                keep(f"{count(n_flown, 'block')} flown")
 
     mission = Mission(
         blocks,

@@ -183,7 +183,8 @@ class TaskProgress:
             what = f"{how} to {task.frequencies[place]:.6g} Hz"
             return f"{what} ({self._words[task.key]})" if task.key in self._words else what
         if task.blocks:
-            return f"mission history {task.number + 1}"
+            what = f"mission history {task.number + 1}"
+            return f"{what} ({self._words[task.key]})" if task.key in self._words else what
         return f"{self._completion.plan.frequency_of(task):.6g} Hz {task.scheme}"
 
 

@@ -109,6 +109,14 @@ def step_line(
 
 
 @njit(cache=True)
+def _add_speed(tangent: FloatArray, first: float, second: float, speed: float, inner: FloatArray) -> None:
+    """Add half the derivative of a speed to that of the mean speed; inner (2, 5): derivative of its velocity."""
+    if speed > 0.0:
+        for k in range(5):
+            tangent[4, k] += 0.5 * (first * inner[0, k] + second * inner[1, k]) / speed / PARTS
+
+
+@njit(cache=True)
 def step_plane(
     force: FloatArray,
     velocity: FloatArray,
@@ -138,36 +146,23 @@ def step_plane(
     for _ in range(PARTS):
         drive_1 = force[0] + loss * first
         drive_2 = force[1] + loss * second
-        for k in range(5):
-            drive[0, k] = loss * inner[0, k]
-            drive[1, k] = loss * inner[1, k]
+        drive[:, :] = loss * inner
         drive[0, 0] += 1.0
         drive[1, 1] += 1.0
-        force_1, force_2, sticks = friction_force(drive_1, drive_2, limit)
         before = np.hypot(first, second)
-        if before > 0.0:
-            for k in range(5):
-                tangent[4, k] += 0.5 * (first * inner[0, k] + second * inner[1, k]) / before / PARTS
+        _add_speed(tangent, first, second, before, inner)
+        force_1, force_2, sticks = friction_force(drive_1, drive_2, limit)
         if sticks:
-            out[0] += drive_1 / PARTS
-            out[1] += drive_2 / PARTS
+            # the whole force is friction: the mass is at rest after the part
+            friction[:, :] = drive
+        else:
+            unit_1, unit_2, ratio = slip_direction(drive_1, drive_2, limit)
+            across_11, across_12, across_22 = across_slip(unit_1, unit_2, ratio)
             for k in range(5):
-                tangent[0, k] += drive[0, k] / PARTS
-                tangent[1, k] += drive[1, k] / PARTS
-            inner[:, :] = 0.0
-            out[4] += 0.5 * first / PARTS
-            out[5] += 0.5 * second / PARTS
-            out[6] += 0.5 * before / PARTS
-            first = 0.0
-            second = 0.0
-            continue
-        unit_1, unit_2, ratio = slip_direction(drive_1, drive_2, limit)
-        across_11, across_12, across_22 = across_slip(unit_1, unit_2, ratio)
-        for k in range(5):
-            friction[0, k] = across_11 * drive[0, k] + across_12 * drive[1, k]
-            friction[1, k] = across_12 * drive[0, k] + across_22 * drive[1, k]
-        friction[0, 4] += unit_1
-        friction[1, 4] += unit_2
+                friction[0, k] = across_11 * drive[0, k] + across_12 * drive[1, k]
+                friction[1, k] = across_12 * drive[0, k] + across_22 * drive[1, k]
+            friction[0, 4] += unit_1
+            friction[1, 4] += unit_2
         next_1 = (drive_1 - force_1) / gain
         next_2 = (drive_2 - force_2) / gain
         after = np.hypot(next_1, next_2)
@@ -176,8 +171,7 @@ def step_plane(
             inner[1, k] = (drive[1, k] - friction[1, k]) / gain
             tangent[0, k] += friction[0, k] / PARTS
             tangent[1, k] += friction[1, k] / PARTS
-            if after > 0.0:
-                tangent[4, k] += 0.5 * (next_1 * inner[0, k] + next_2 * inner[1, k]) / after / PARTS
+        _add_speed(tangent, next_1, next_2, after, inner)
         out[0] += force_1 / PARTS
         out[1] += force_2 / PARTS
         out[4] += 0.5 * (first + next_1) / PARTS
@@ -187,8 +181,7 @@ def step_plane(
         second = next_2
     out[2] = first
     out[3] = second
-    for k in range(5):
-        tangent[2, k], tangent[3, k] = inner[0, k], inner[1, k]
+    tangent[2:4] = inner
 
 
 @njit(cache=True)

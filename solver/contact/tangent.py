@@ -63,7 +63,7 @@ def march_tangent(
     for pair in range(n_contact):
         columns, width = pair_columns(m, line[pair], has_normal[pair])
         dforce_t = np.empty((n_samples, 2, width + 2))
-        before_dstate = np.empty((2, width + 2))
+        before = np.empty((2, width + 2))
         dstart = np.empty((2, width))
         work = np.zeros(width + 2)
         dstate = np.zeros((2, width + 2))
@@ -76,61 +76,15 @@ def march_tangent(
             )
             trial_1 = predicted_t[pair, 1, n] - first
             trial_2 = predicted_t[pair, 2, n] - second
-            for column in range(width + 2):
-                before_dstate[0, column], before_dstate[1, column] = dstate[0, column], dstate[1, column]
-            advance_tangent(
-                dstate,
-                basis_t[n],
-                status,
-                normal,
-                trial_1,
-                trial_2,
-                friction[pair],
-                columns,
-                dforce_t[n],
-            )
-            step_1 = state_t[pair, 0, n + 1] - first
-            step_2 = state_t[pair, 1, n + 1] - second
-            slip = np.hypot(step_1, step_2)
-            if slip == 0.0:
-                continue
-            before = n - 1 if n > 0 else n_samples - 1
-            normal_before = max(predicted_t[pair, 0, before], 0.0)
-            by_normal, by_slip = increment_slopes(normal_before, normal, slip)
-            for column in range(width + 2):
-                work[column] += by_slip * (
-                    step_1 / slip * (dstate[0, column] - before_dstate[0, column])
-                    + step_2 / slip * (dstate[1, column] - before_dstate[1, column])
-                )
-            if has_normal[pair]:
-                for k in range(m):
-                    if normal_before > 0.0:
-                        work[k] += by_normal * basis_t[before, k]
-                    if normal > 0.0:
-                        work[k] += by_normal * basis_t[n, k]
-        start_tangent(
-            dstart,
-            dstate,
-            predicted_t[pair],
-            friction[pair],
-            start[pair],
-            min(periods[pair] - 1, PLAIN_PERIODS),
-            basis_t,
-            columns,
-        )
+            before[:, :] = dstate
+            advance_tangent(dstate, basis_t[n], status, normal, trial_1, trial_2, friction[pair], columns, dforce_t[n])
+            _add_slip_work(work, n, predicted_t[pair, 0], state_t[pair], before, dstate, basis_t, has_normal[pair])
+        plain = min(periods[pair] - 1, PLAIN_PERIODS)
+        start_tangent(dstart, dstate, predicted_t[pair], friction[pair], start[pair], plain, basis_t, columns)
         if line[pair] >= 0:
             _line_tangent(force_tangent[pair], dforce_t[:, line[pair]], dstart, analysis_t, line[pair], columns)
         else:
-            dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, width + 2)
-            for component in range(2):
-                for k in range(m):
-                    row = (1 + component) * m + k
-                    start_1 = dforce_h[k, component, width]
-                    start_2 = dforce_h[k, component, width + 1]
-                    for column in range(width):
-                        force_tangent[pair, row, column] = (
-                            dforce_h[k, component, column] + start_1 * dstart[0, column] + start_2 * dstart[1, column]
-                        )
+            _plane_tangent(force_tangent[pair], dforce_t, dstart, analysis_t)
         for component in range(3):
             for column in range(columns[component], columns[component] + m if columns[component] >= 0 else -1):
                 slip_work_tangent[pair, component * m + column - columns[component]] = (
@@ -152,6 +106,60 @@ def pair_columns(m: int, line: int, has_normal: bool) -> tuple[IntArray, int]:
     own = m if has_normal else 0
     columns[1 + line], columns[2 - line] = own, -1
     return columns, own + m
+
+
+@njit(cache=True)
+def _add_slip_work(
+    work: FloatArray,
+    n: int,
+    normal_t: FloatArray,
+    state_t: FloatArray,
+    before: FloatArray,
+    after: FloatArray,
+    basis_t: FloatArray,
+    has_normal: bool,
+) -> None:
+    """Add the derivative of the slip work of sample n to `work` (width + 2,).
+
+    normal_t (N,), state_t (2, N + 1): predicted normal force and state of the pair, N. before, after (2, width + 2):
+    derivatives of the state before and after the sample.
+    """
+    step_1 = state_t[0, n + 1] - state_t[0, n]
+    step_2 = state_t[1, n + 1] - state_t[1, n]
+    slip = np.hypot(step_1, step_2)
+    if slip == 0.0:
+        return
+    last = n - 1 if n > 0 else normal_t.size - 1
+    normal_before, normal = max(normal_t[last], 0.0), max(normal_t[n], 0.0)
+    by_normal, by_slip = increment_slopes(normal_before, normal, slip)
+    for column in range(work.size):
+        work[column] += by_slip * (
+            step_1 / slip * (after[0, column] - before[0, column])
+            + step_2 / slip * (after[1, column] - before[1, column])
+        )
+    if has_normal:
+        for k in range(basis_t.shape[1]):
+            if normal_before > 0.0:
+                work[k] += by_normal * basis_t[last, k]
+            if normal > 0.0:
+                work[k] += by_normal * basis_t[n, k]
+
+
+@njit(cache=True)
+def _plane_tangent(tangent: FloatArray, dforce_t: FloatArray, dstart: FloatArray, analysis_t: FloatArray) -> None:
+    """Tangent (3m, 3m) of a pair with two tangents, in place; `dforce_t` (N, 2, width + 2): derivative of its force."""
+    m, n_samples = analysis_t.shape
+    width = dstart.shape[1]
+    dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, 2, width + 2)
+    for component in range(2):
+        for k in range(m):
+            row = (1 + component) * m + k
+            start_1 = dforce_h[k, component, width]
+            start_2 = dforce_h[k, component, width + 1]
+            for column in range(width):
+                tangent[row, column] = (
+                    dforce_h[k, component, column] + start_1 * dstart[0, column] + start_2 * dstart[1, column]
+                )
 
 
 @njit(cache=True)
@@ -263,8 +271,7 @@ def mass_tangent(
     slip_work_tangent = np.zeros((n_contact, 3 * m))
     point_t = np.ascontiguousarray(synthesis.T)
     mean_t = np.ascontiguousarray(step_synthesis.T)
-    out = np.empty(7)
-    local = np.empty((5, 5))
+    out, local = np.empty(7), np.empty((5, 5))
     analysis_t = np.ascontiguousarray(step_analysis.T)
     for pair in range(n_contact):
         columns, width = pair_columns(m, line[pair], has_normal[pair])
@@ -279,55 +286,77 @@ def mass_tangent(
         velocity = start[pair].copy()
         # columns: the harmonics of the predicted force, then the velocity at the start
         entry = np.zeros((2, width + 2))
-        entry[0, width] = 1.0
-        entry[1, width + 1] = 1.0
+        entry[0, width] = entry[1, width + 1] = 1.0
         for n in range(n_samples):
             normal = max(predicted_t[pair, 0, n], 0.0)
             limit = friction_limit(friction[pair], normal)
             step_mass(predicted_t[pair, 1:, n], velocity, limit, gain, loss, line[pair], out, local)
-            # entry holds the derivatives of the velocities; both forces and the friction limit have their own columns
-            for row in range(5):
-                first, second = local[row, 2], local[row, 3]
-                for column in range(width + 2):
-                    leave[row, column] = first * entry[0, column] + second * entry[1, column]
-                for tangent in tangents:
-                    own = leave[row, columns[1 + tangent] : columns[1 + tangent] + m]
-                    for k in range(m):
-                        own[k] += local[row, tangent] * mean_t[n, k]
-                if normal > 0.0 and has_normal[pair]:
-                    # the limit grows with the normal force by the friction coefficient
-                    by_limit = friction[pair] * local[row, 4]
-                    for k in range(m):
-                        leave[row, k] += by_limit * point_t[n, k]
+            by_limit = friction[pair] if normal > 0.0 and has_normal[pair] else 0.0
+            _leave(leave, local, entry, tangents, columns, mean_t[n], by_limit * point_t[n])
             for place, tangent in enumerate(tangents):
-                for column in range(width + 2):
-                    dforce_t[n, place, column] = leave[tangent, column]
+                dforce_t[n, place, : width + 2] = leave[tangent]
             by_normal, by_speed = slip_work_slopes(normal, out[6])
-            for column in range(width + 2):
-                work[column] += by_speed * step * leave[4, column]
+            work += by_speed * step * leave[4]
             if normal > 0.0 and has_normal[pair]:
-                for k in range(m):
-                    work[k] += by_normal * step * point_t[n, k]
-            velocity[0] = out[2]
-            velocity[1] = out[3]
-            for column in range(width + 2):
-                entry[0, column], entry[1, column] = leave[2, column], leave[3, column]
-        # the start of the period is its end: v0 = v(x, v0)
-        own_1, other_1 = entry[0, width], entry[0, width + 1]
-        other_2, own_2 = entry[1, width], entry[1, width + 1]
-        determinant = (1.0 - own_1) * (1.0 - own_2) - other_1 * other_2
+                work[:m] += by_normal * step * point_t[n]
+            velocity[:] = out[2:4]
+            entry[:, :] = leave[2:4]
+        closed = _closed_start(entry)
         dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, tangents.size, padded)
         for component in range(3):
             for harmonic in range(m if columns[component] >= 0 else 0):
                 column, full = columns[component] + harmonic, component * m + harmonic
-                first = ((1.0 - own_2) * entry[0, column] + other_1 * entry[1, column]) / determinant
-                second = ((1.0 - own_1) * entry[1, column] + other_2 * entry[0, column]) / determinant
+                first, second = closed[0, column], closed[1, column]
                 for place, tangent in enumerate(tangents):
-                    for k in range(m):
-                        force_tangent[pair, (1 + tangent) * m + k, full] = (
-                            dforce_h[k, place, column]
-                            + dforce_h[k, place, width] * first
-                            + dforce_h[k, place, width + 1] * second
-                        )
+                    by_start = dforce_h[:, place, width] * first + dforce_h[:, place, width + 1] * second
+                    rows = slice((1 + tangent) * m, (2 + tangent) * m)
+                    force_tangent[pair, rows, full] = dforce_h[:, place, column] + by_start
                 slip_work_tangent[pair, full] = work[column] + work[width] * first + work[width + 1] * second
     return force_tangent, slip_work_tangent
+
+
+@njit(cache=True)
+def _leave(
+    leave: FloatArray,
+    local: FloatArray,
+    entry: FloatArray,
+    tangents: IntArray,
+    columns: IntArray,
+    mean: FloatArray,
+    limit: FloatArray,
+) -> None:
+    """Derivatives (5, width + 2) of the results of a step of a mass with respect to all columns, into `leave`.
+
+    - local (5, 5): derivatives of the step, as of `rigid_slider.step_plane`.
+    - entry (2, width + 2): derivatives of the velocities before the step.
+    - tangents, columns: tangents of the pair, and first columns of its components.
+    - mean, limit (m,): derivatives of a force, and of the friction limit by the normal force, by their harmonics.
+    """
+    for row in range(5):
+        first, second = local[row, 2], local[row, 3]
+        for column in range(entry.shape[1]):
+            leave[row, column] = first * entry[0, column] + second * entry[1, column]
+        for tangent in tangents:
+            own = leave[row, columns[1 + tangent] : columns[1 + tangent] + mean.size]
+            for k in range(mean.size):
+                own[k] += local[row, tangent] * mean[k]
+        if columns[0] >= 0:
+            for k in range(mean.size):
+                leave[row, k] += local[row, 4] * limit[k]
+
+
+@njit(cache=True)
+def _closed_start(entry: FloatArray) -> FloatArray:
+    """Derivatives (2, width) of the velocities at the start of the period, which are those at its end: v0 = v(x, v0).
+
+    entry (2, width + 2): derivatives of the velocities at the end; the last two columns by those at the start.
+    """
+    width = entry.shape[1] - 2
+    own_1, other_1 = entry[0, width], entry[0, width + 1]
+    other_2, own_2 = entry[1, width], entry[1, width + 1]
+    determinant = (1.0 - own_1) * (1.0 - own_2) - other_1 * other_2
+    closed = np.empty((2, width))
+    for column in range(width):
+        closed[0, column] = ((1.0 - own_2) * entry[0, column] + other_1 * entry[1, column]) / determinant
+        closed[1, column] = ((1.0 - own_1) * entry[1, column] + other_2 * entry[0, column]) / determinant
+    return closed

@@ -190,8 +190,7 @@ def relax_to_periodic(
     budget.tell(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
     transient = Transient(case, joint)
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
-    predicted = start.predicted_h
-    period = 2.0 * np.pi / joint.omega
+    predicted, period = start.predicted_h, 2.0 * np.pi / joint.omega
     # the longest step, in periods, is practically infinite: the step is the harmonic balance itself
     length, longest, tried = 1.0, 1.0 / COMMON.round_off, np.inf
     size = float(np.abs(start.displacement_h).max())

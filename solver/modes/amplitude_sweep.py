@@ -136,8 +136,9 @@ class AmplitudeSweep:
                     return found
             if shortest:
                 return None
-            wanted = 0.0 if found is None else LOADING.aimed_change / change
-            ratio = max(ratio ** max(wanted, COMMON.smallest_step_ratio), 1.0 + LOADING.free_step)
+            # the change need not be proportional to the step
+            shorter = COMMON.smallest_step_ratio if found is None else max(LOADING.aimed_change / change, 0.1)
+            ratio = max(ratio**shorter, 1.0 + LOADING.free_step)
 
     def _take(self, following: ModeState) -> None:
         """Make the next node the current one."""

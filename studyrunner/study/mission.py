@@ -124,6 +124,10 @@ def read_blocks(
         name = table.get("name")
         if name is None:
             raise UserError(source, f"mission.{number}.name", None, "missing: give each block a name")
+        try:
+            _read_name(name)
+        except WrongValueError as error:
+            raise UserError(source, f"mission.{number}.name", name, error.remedy) from None
         block = _read_block(table, scene, axes, source)
         if block.name in [before.name for before in blocks]:
             raise UserError(source, "mission.name", name, "give each block a name of its own")

@@ -8,8 +8,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from solver.loading_history import sweep
-from solver.loading_history.options import LOADING
 from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import Sweep
 from solver.model import FloatArray, ReducedModel
@@ -33,7 +31,6 @@ class KilledError(BaseException):
 def frequent_saves(monkeypatch: pytest.MonkeyPatch) -> None:
     """Save points after a few results."""
     monkeypatch.setattr(journal_module, "RESULTS_PER_SAVE", 5)
-    monkeypatch.setattr(sweep, "LOADING", replace(LOADING, results_per_save=12))
 
 
 def assert_same(found: StartState, expected: StartState) -> None:

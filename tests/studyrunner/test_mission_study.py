@@ -60,6 +60,7 @@ def without_time(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.drop_vars("run_time").drop_attrs(deep=False)
 
 
+@pytest.mark.slow
 def test_the_result_has_missions_and_blocks_and_the_values_of_the_solver(study_file: Path, blocks: FakedBlocks) -> None:
     result = run(study_file)
     axes = {"frequency": 2, "wear_coefficient": 2, "excitation_amplitude": 1, "sweep": 2}
@@ -145,6 +146,7 @@ def test_blocks_of_gross_slip_wear_by_their_slip_in_any_order(tmp_path: Path) ->
     assert found[0].worn_volume[-1].item() == pytest.approx(found[1].worn_volume[-1].item(), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_goes_on_to_the_last_bit(
     study_file: Path, blocks: FakedBlocks, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -167,6 +169,7 @@ def test_an_interrupted_study_goes_on_to_the_last_bit(
     xr.testing.assert_identical(without_time(found), without_time(whole))
 
 
+@pytest.mark.slow
 def test_a_block_that_fails_spoils_its_point_only(study_file: Path, blocks: FakedBlocks) -> None:
     blocks.fails["cruise"] = Outcome.START_FAILED
     result = run(study_file, overrides={"axes.frequency": 160, "axes.sweep": "up", "slow_time.until.worn_volume": 1e-9})
@@ -175,6 +178,7 @@ def test_a_block_that_fails_spoils_its_point_only(study_file: Path, blocks: Fake
     assert np.isnan(result.last_mission).all()
 
 
+@pytest.mark.slow
 def test_a_target_ends_the_missions(study_file: Path, blocks: FakedBlocks) -> None:
     one = {"axes.frequency": 160, "axes.sweep": "up"}
     whole = run(study_file, overrides=one).squeeze()
@@ -189,6 +193,7 @@ def test_a_target_ends_the_missions(study_file: Path, blocks: FakedBlocks) -> No
     assert "missions to worn_volume" in result.attrs["certificate_summary"]
 
 
+@pytest.mark.slow
 def test_the_effective_study_is_the_same_study(study_file: Path, blocks: FakedBlocks) -> None:
     study = read_study(study_file, ["mission.cruise.seconds=20", "mission.2.cycles=500"])
     assert [block.cycles_at(100.0) for block in study.mission] == [3200.0, 2000.0, 500.0]
@@ -289,6 +294,7 @@ def test_what_is_wrong_is_said_in_one_sentence(study_file: Path, changes: dict[s
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_samples_draw_what_all_blocks_have(study_file: Path, blocks: FakedBlocks) -> None:
     scatter = {"samples": 3, "friction_coefficient": {"normal": {"std": 0.03}}, "normal_load": {"normal": {"std": 0.5}}}
     one = {"axes.frequency": 160, "axes.sweep": "up", "axes.wear_coefficient": 1e-11}
@@ -305,6 +311,7 @@ def test_samples_draw_what_all_blocks_have(study_file: Path, blocks: FakedBlocks
     assert len(set(result.worn_volume.isel(mission=-1).values.ravel())) == 3
 
 
+@pytest.mark.slow
 def test_settings_of_a_mission_are_those_of_the_study(study_file: Path, blocks: FakedBlocks) -> None:
     run(study_file, overrides={"axes.frequency": 160, "axes.sweep": "up", "axes.rtol": [1e-2, 1e-3]})
     assert {case.mission.settings.rtol for case in blocks.flown} == {1e-2, 1e-3}

@@ -150,5 +150,5 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
             finer = NEWTON.forcing * tolerance
             exact = solve_balance(balance, found.evaluation.predicted_h, work.solver, finer, work.budget)
             return PathPoint(0.0, exact.evaluation, last.history) if exact.converged else point
-        margin *= 2.0
+        margin *= 10.0
     raise NoActiveSetError("without the pairs that slip under pressure the joint does not bear its load")
