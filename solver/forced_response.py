@@ -124,7 +124,16 @@ def check_case(
 
 
 def check_settings(model: ReducedModel, settings: SolverSettings) -> None:
-    """Raises ValueError where harmonics do not fit to the model, or samples not to the harmonics."""
+    """Raises ValueError where a setting is not allowed, or does not fit to the model or to another setting."""
+    if not isinstance(settings, SolverSettings):
+        raise ValueError("settings: give SolverSettings(...)")
+    for name in ("harmonics", "samples"):
+        given = getattr(settings, name)
+        if given != "auto" and (not isinstance(given, int | np.integer) or given < 1):
+            raise ValueError(f'settings.{name}: give a whole number from 1 on, or "auto", instead of {given!r}')
+    for name in ("tolerance", "rtol"):
+        if check_number(f"settings.{name}", getattr(settings, name), above=0.0) >= 1.0:
+            raise ValueError(f"settings.{name}: give a number between 0 and 1")
     highest = 1 if settings.harmonics == "auto" else settings.harmonics
     if not model.holds(highest):
         raise ValueError(f"the model does not hold the nodal diameters that harmonics up to {highest} see")
@@ -141,7 +150,7 @@ def worn_model(model: ReducedModel, wear_depth: ArrayLike | None) -> ReducedMode
         return model
     depth = check_numbers("wear_depth", wear_depth, least=0.0)
     if depth.size != model.contact.n_contact:
-        raise ValueError(f"wear_depth: give {model.contact.n_contact} depths, m, one for each pair, not {depth.size}")
+        raise ValueError(f"wear_depth: give a depth, m, for each of {model.contact.n_contact} pairs, not {depth.size}")
     return replace(model, contact=replace(model.contact, gap=model.contact.gap + depth))
 
 
@@ -171,7 +180,10 @@ def check_number(name: str, given: ArrayLike, *, above: float = -math.inf, least
 
 def check_numbers(name: str, given: ArrayLike, *, above: float = -math.inf, least: float = -math.inf) -> FloatArray:
     """The numbers as a vector. Raises ValueError where there is none, or where a number is not finite or too small."""
-    found = np.atleast_1d(np.array(given, np.float64))
+    try:
+        found = np.atleast_1d(np.array(given, np.float64))
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: give numbers instead of {given!r}") from None
     if found.ndim != 1 or not found.size or not np.isfinite(found).all():
         raise ValueError(f"{name}: give finite numbers")
     if (found <= above).any() or (found < least).any():

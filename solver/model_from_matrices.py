@@ -92,7 +92,7 @@ def build_model(
 
 def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     """A copy as an array of floating-point numbers; a single number is repeated to the shape."""
-    found = np.array(given, np.float64)
+    found = _array(name, given).astype(np.float64)
     if found.ndim == 0:
         found = np.full(shape, found)
     _check(name, found.shape == shape, f"give shape {shape} instead of {found.shape}")
@@ -101,18 +101,33 @@ def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
 
 
 def _matrix(name: str, given: ArrayLike, n: int | None = None) -> FloatArray:
-    found = np.array(given, np.float64)
-    size = (len(found) if found.ndim else 0) if n is None else n
-    _check(name, found.shape == (size, size) and size > 0, f"give a square matrix instead of shape {found.shape}")
-    found = _numbers(name, found, (size, size))
+    """A symmetric matrix; n: its size, that of the stiffness, None for the stiffness itself."""
+    found = _array(name, given)
+    if n is None:
+        n = len(found) if found.ndim else 0
+        _check(name, found.shape == (n, n) and n > 0, f"give a square matrix instead of shape {found.shape}")
+    wanted = f"give shape {(n, n)}, as the stiffness has, instead of {found.shape}"
+    _check(name, found.shape == (n, n), wanted)
+    found = _numbers(name, found, (n, n))
     asymmetry = float(np.abs(found - found.T).max())
     _check(name, asymmetry <= _SYMMETRIC * float(np.abs(found).max()), "give a symmetric matrix")
     return found
 
 
+def _array(name: str, given: ArrayLike, kinds: str = "biuf") -> np.ndarray:
+    """A copy as an array of real numbers, or of complex ones too where "c" is among the kinds."""
+    try:
+        found = np.array(given)
+    except ValueError:  # rows of unequal length
+        raise ValueError(f"{name}: give rows of equal length") from None
+    right = found.dtype.kind in kinds
+    _check(name, right, f"give {'numbers' if 'c' in kinds else 'real numbers'}, as a number or an array")
+    return found
+
+
 def _pairs(given: ArrayLike, n: int) -> IntArray:
-    found = np.array(given)
     name = "contact_dofs"
+    found = _array(name, given)
     _check(
         name, found.ndim == 2 and found.shape[1:] == (3,) and len(found) > 0, "give a row of 3 indices for each pair"
     )
@@ -125,17 +140,21 @@ def _pairs(given: ArrayLike, n: int) -> IntArray:
 
 
 def _load(given: ArrayLike, n: int) -> ComplexArray:
-    found = np.array(given, np.complex128)
+    found = _array("load_harmonic", given, "biufc").astype(np.complex128)
     _check("load_harmonic", found.shape == (n,), f"give shape ({n},) instead of {found.shape}")
     _check("load_harmonic", bool(np.isfinite(found).all()), "give finite numbers")
     return found
 
 
 def _response(given: ArrayLike, n: int) -> FloatArray:
-    found = np.array(given)
+    found = _array("response", given)
     if found.ndim == 2:
         return _numbers("response", found, (len(found), n))
-    _check("response", found.ndim == 1 and found.dtype.kind in "iu", f"give indices, or a matrix (n_response, {n})")
+    _check(
+        "response",
+        found.ndim == 1 and found.dtype.kind in "iu",
+        f"give a list of indices, or a matrix (n_response, {n})",
+    )
     _check("response", bool(((found >= 0) & (found < n)).all()), f"give indices from 0 to {n - 1}")
     rows: FloatArray = np.eye(n)[found]
     return rows

@@ -61,53 +61,52 @@ COMPLETE = frozenset(outcome for outcome in Outcome if outcome.complete)
 """Outcomes of points that were computed to the end."""
 
 _SENTENCES = {
-    Outcome.CONVERGED: "The point was computed to the end. How well it is known say error_estimate (worn volume) and"
-    " response_error (vibration).",
+    Outcome.CONVERGED: "The point was computed to the end. error_estimate is the error of its worn volume,"
+    " response_error that of its vibration.",
     Outcome.STATIC_FAILED: "The static contact state was not found: check static load, gaps and supports.",
-    Outcome.START_FAILED: "No periodic state was found at the start of the sweep, not even with the excitation raised"
+    Outcome.START_FAILED: "No periodic vibration was found at the start of the sweep, even with the excitation raised"
     " gradually.",
-    Outcome.BRANCH_LOST: "The branch could not be followed to this frequency.",
-    Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after it was divided.",
-    Outcome.INACCURATE: "The point was computed to the end, but the estimated error of response or wear rate is above"
-    " rtol for some of the cycles: response_error and wear_rate_error say by how much.",
-    Outcome.SENSITIVE: "The point was computed to the end, but the worn volume depends so much on the step or on the"
-    " start state that one number says little: two computations of nearly the same case differ by more than half.",
+    Outcome.BRANCH_LOST: "The sweep could not follow the vibration to this frequency.",
+    Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after the step was divided.",
+    Outcome.INACCURATE: "The point was computed to the end, but at some cycle counts the estimated error of response or"
+    " wear rate is above rtol: see response_error and wear_rate_error.",
+    Outcome.SENSITIVE: "The point was computed to the end, but its worn volume depends strongly on the step or on the"
+    " start state: two computations of nearly the same case differ by more than half.",
     Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits.",
-    Outcome.UNSTABLE: "Only an unstable periodic state was found, in which no machine stays.",
-    Outcome.PERIOD_DOUBLED: "The joint bounces, and its vibration repeats after two periods of the excitation or more,"
-    " which is not computed: the state that repeats after one is unstable.",
+    Outcome.UNSTABLE: "Only an unstable periodic vibration was found. A real joint does not stay in it.",
+    Outcome.PERIOD_DOUBLED: "The joint bounces, and its vibration repeats after two or more periods of the excitation."
+    " Such vibrations are not computed, and the vibration that repeats after one period is unstable.",
     Outcome.STEP_TOO_LONG: "A step on the slow time scale wears off so much at once that many times the normal forces"
-    " of the joint would move: its end is no result. The variable message says which step, and how long it may be.",
-    Outcome.NO_FINAL_STATE: "Wear goes on without end: the point has no final state, and message says at which rate it"
-    " wears.",
-    Outcome.CONTACT_CUT_OFF: "The contact goes on beyond the pairs that model it: a pair at their edge carries load or"
-    " wears, so that the scar is cut off, too narrow and too deep. Give the model pairs farther out: of a bundled scene"
+    " of the joint would move. The end of this step is no result; message names the step and how long it may be.",
+    Outcome.NO_FINAL_STATE: "Wear does not come to an end, so the point has no final state. message gives the steady"
+    " wear rate.",
+    Outcome.CONTACT_CUT_OFF: "The contact goes on beyond the modelled pairs: a pair at their edge carries load or"
+    " wears, so the computed scar is too narrow and too deep. Give the model pairs farther out: a bundled scene needs"
     " a larger half_width, or none so that it is chosen, and as many more strips or patches.",
-    Outcome.ADRIFT: "The whole joint slips in every period and its mean friction does not hold its parts: they drift"
-    " along each other and there is no periodic state. Less excitation, more friction or a stop would hold them.",
-    Outcome.UNSETTLED: "The vibration does not settle: left to itself for some hundred periods it comes to none that"
-    " repeats, as where the joint slips or opens all over. More static load, friction or damping, or less excitation,"
-    " would give it grip.",
-    Outcome.RESONANCE_LOST: "No resonance was found, or none any more, in the range in which the excitation follows the"
-    " resonance: message says where. The values before hold.",
-    Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was given up: --retry-failed goes on"
-    " with a larger one.",
-    Outcome.EXCEPTION: "The computation broke off with an error that it should not have; see the variable message.",
+    Outcome.ADRIFT: "The whole joint slips in every period, and the mean friction does not hold its parts: they drift"
+    " along each other, and there is no periodic vibration. Less excitation, more friction or a stop would hold them.",
+    Outcome.UNSETTLED: "The vibration does not settle: after some hundred periods it does not repeat, as happens where"
+    " the whole joint slips or opens. More static load, friction or damping, or less excitation, would help.",
+    Outcome.RESONANCE_LOST: "The excitation follows the resonance, but there was no resonance in the range, or the"
+    " resonance left the range: message says where. The values before are valid.",
+    Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was stopped. --retry-failed continues"
+    " with a larger limit.",
+    Outcome.EXCEPTION: "The computation ended with an unexpected error; see the variable message.",
     Outcome.CRASHED: "The process that computed this point crashed; see the variable message.",
-    Outcome.NOT_COMPUTED: "The run ended before this point was computed: the same command goes on from here.",
-    Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give it damping"
-    " or a support.",
+    Outcome.NOT_COMPUTED: "The run ended before this point was computed. The same command continues.",
+    Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give the"
+    " structure damping or a support.",
 }
 
 
 _OF_MODES = {
-    Outcome.CONVERGED: "The point was computed to the end. How well it is known say natural_frequency_error and"
+    Outcome.CONVERGED: "The point was computed to the end. Its errors are natural_frequency_error and"
     " damping_ratio_error.",
     Outcome.START_FAILED: "The mode was not found where its amplitudes begin; see the variable message.",
-    Outcome.BRANCH_LOST: "The mode could not be followed to this amplitude: it may turn back there, as folds of the"
-    " amplitude are not passed, meet another mode, or end where the whole joint slides.",
+    Outcome.BRANCH_LOST: "The mode could not be followed to this amplitude. The mode may turn back before it (a fold),"
+    " meet another mode, or end where the whole joint slides.",
     Outcome.INACCURATE: "The point was computed to the end, but the estimated error of natural frequency or damping"
-    " ratio is above rtol: natural_frequency_error and damping_ratio_error say by how much.",
+    " ratio is above rtol: see natural_frequency_error and damping_ratio_error.",
 }
 
 

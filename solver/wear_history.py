@@ -152,7 +152,9 @@ def _check_frequency(
             raise ValueError('between: leave it out, or give "resonance" or "peak" as the frequency')
         return check_number("frequency", frequency, above=0.0), None
     check_word("frequency", frequency, FOLLOWED)
-    ends = check_numbers("between", math.nan if between is None else between, above=0.0)
+    if between is None:
+        raise ValueError("between: give the lowest and the highest frequency in Hz, as (205, 215)")
+    ends = check_numbers("between", between, above=0.0)
     if ends.size != 2 or not ends[0] < ends[1]:
         raise ValueError("between: give the lowest and the highest frequency in Hz, as (205, 215)")
     if sweep == "ramp":

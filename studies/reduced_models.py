@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from solver.model import ReducedModel
 from studies import scene_file, scenes
 from studies.sandboxed_read import check_scene_readable
-from studies.scene_error import SceneError
+from studies.scene_error import SceneError, remedy_of
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE as OF_A_WAVE
 
 
@@ -45,7 +45,7 @@ def build_scene(name: str, /, *, n_harmonics: int = OF_A_WAVE, **parameters: obj
         if wrong["type"] == "extra_forbidden":
             known = ", ".join(each for each in kind.model_fields if each != "friction_coefficient")
             raise SceneError(key, "unknown parameter", f"give one of {known}") from None
-        raise SceneError(key or "parameters", str(wrong["input"]), _remedy(wrong["msg"])) from None
+        raise SceneError(key or "parameters", str(wrong["input"]), remedy_of(wrong)) from None
     # far from what can be, numbers overflow; what is wrong with them is found by the checks of the model
     with np.errstate(all="ignore"):
         try:
@@ -76,7 +76,3 @@ def read_scene(path: str | Path, *, n_harmonics: int = 1) -> ReducedModel:
     """
     check_scene_readable(Path(path))
     return scene_file.read_scene(path, n_harmonics)
-
-
-def _remedy(message: str) -> str:
-    return message.removeprefix("Value error, ").replace("Input should be", "give").strip()

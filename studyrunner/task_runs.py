@@ -71,7 +71,7 @@ def run_tasks(
     def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         new = tasks.take(task, result)
         if isinstance(task, BranchTask) and task.mode is None and tasks.n_starts_left == 0:
-            progress.say("marching through the remaining wear histories")
+            progress.say("computing the remaining wear histories")
         return new
 
     said: set[tuple[int, str]] = set()
@@ -106,11 +106,11 @@ def run_tasks(
         n_points = count(tasks.n_starts_left, "point")
         progress.say(f"following {count(len(tasks.branches), 'nonlinear mode')} through {n_points}")
     elif tasks.branches:
-        n_branches = count(len(tasks.branches), "branch", "branches")
+        n_branches = count(len(tasks.branches), "sweep")
         n_starts = count(tasks.n_starts_left, "start state")
-        progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
+        progress.say(f"computing {n_starts} along {n_branches}, and wear histories")
     if completion.plan.n_missions:
-        progress.say(f"flying {count(completion.plan.n_missions, 'mission history', 'mission histories')}")
+        progress.say(f"computing {count(completion.plan.n_missions, 'mission history', 'mission histories')}")
     progress.begin_tasks()
     handlers = Handlers(take, tick, tasks.keep, take_back, is_sick, scenes.with_model)
     serve_tasks(ranks, tasks.begin(), evaluate, handlers, tasks.costs)

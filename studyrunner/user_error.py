@@ -32,7 +32,10 @@ class UserError(Exception):
     def __str__(self) -> str:
         """The line that the user reads."""
         key = _cut(show_text(self.key), _LONGEST_KEY)
-        shown = key if self.value is None else f"{key} = {show_value(self.value)}"
+        # a sentence stands for itself, a value stands behind its key
+        told = isinstance(self.value, Verbatim) and (" " in self.value or self.value == "missing")
+        told = told and str(self.value)[0].isalpha()
+        shown = key if self.value is None else f"{key}{':' if told else ' ='} {show_value(self.value)}"
         remedy = _cut(show_text(self.remedy), _LONGEST_REMEDY)
         return " ".join(f"{show_text(self.place)}: {shown}: {remedy}".split())
 

@@ -232,8 +232,8 @@ def test_what_is_wrong_with_a_scene_is_said_in_one_line(tmp_path: Path) -> None:
         ("nothing", {}, 'model: no bundled scene is called "nothing"; give one of'),
         ("sdof_slider", {"friction_coefficient": 0.3}, "friction_coefficient: 0.3; give it to the solver"),
         ("sdof_slider", {"mas": 1.0}, "mas: unknown parameter; give one of mass, damping"),
-        ("sdof_slider", {"mass": -1.0}, "mass: -1.0; give greater than 0"),
-        ("sdof_slider", {"mass": "1"}, "mass: 1; give a valid number"),
+        ("sdof_slider", {"mass": -1.0}, "mass: -1.0; give a number above 0"),
+        ("sdof_slider", {"mass": "1"}, "mass: 1; give a number"),
     ):
         with pytest.raises(SceneError, match=f"^{re.escape(message)}"):
             build_scene(name, **parameters)
@@ -320,7 +320,7 @@ def test_a_point_that_fails_is_one_point() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"mass": [[1.0, 0.0]]}, "mass: give a square matrix instead of shape (1, 2)"),
+        ({"mass": [[1.0, 0.0]]}, "mass: give shape (2, 2), as the stiffness has, instead of (1, 2)"),
         ({"stiffness": [[2.0, -1.0], [0.0, 2.0]]}, "stiffness: give a symmetric matrix"),
         ({"damping": [[np.nan, 0.0], [0.0, 1.0]]}, "damping: give finite numbers"),
         ({"contact_dofs": [0, 1, -1]}, "contact_dofs: give a row of 3 indices for each pair"),

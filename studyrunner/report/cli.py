@@ -11,8 +11,8 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -38,6 +38,8 @@ examples:
   study-report dovetail.nc                    -> dovetail-report/index.html and the figures beside it
   study-report results/worn.nc -o figures     the same into the folder figures
   study-report dovetail.nc --vtu              also dovetail-report/root.pvd, the worn root for ParaView
+  study-report dovetail.nc --point frequency=211.75,scheme=implicit    figures of single points show this one
+  study-report scar.nc --measured profile.csv the wear scar beside a measured one
 
 exit status:
   0  the report was written
@@ -47,11 +49,17 @@ exit status:
 
 @dataclass(frozen=True)
 class Options:
-    """The command line. folder: where the report goes. vtu: whether files for ParaView are written, too."""
+    """The command line.
+
+    folder: where the report goes. vtu: whether files for ParaView are written, too. point: values of axes, as text, of
+    the point that figures of single points show. measured: CSV file of a worn profile.
+    """
 
     result: Path
     folder: Path
     vtu: bool = False
+    point: Mapping[str, str] = field(default_factory=dict)
+    measured: Path | None = None
 
 
 class _Parser(argparse.ArgumentParser):
@@ -83,9 +91,27 @@ def parse_options(arguments: Sequence[str]) -> Options:
     parser.add_argument(
         "--vtu", action="store_true", help="also the root as VTU files over the cycles, for ParaView (extra meshio)"
     )
+    parser.add_argument(
+        "--point",
+        metavar="AXIS=VALUE,...",
+        default="",
+        help="the point that root, maps, loops and --vtu show (default: the most worn one)",
+    )
+    parser.add_argument(
+        "--measured",
+        metavar="PROFILE.csv",
+        help="measured scar of a cylinder or sphere on a flat; first line x_mm,depth_um (also m, um)",
+    )
     found = parser.parse_args(list(arguments))
     result = Path(found.result)
-    return Options(result, Path(f"{result.stem}-report" if found.folder is None else found.folder), found.vtu)
+    folder = Path(f"{result.stem}-report" if found.folder is None else found.folder)
+    point = {}
+    for text in filter(None, (part.strip() for part in found.point.split(","))):
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise UserError("command line", "--point", text, "give AXIS=VALUE, as frequency=211.75")
+        point[name.strip()] = value.strip()
+    return Options(result, folder, found.vtu, point, None if found.measured is None else Path(found.measured))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -149,7 +175,7 @@ def _report(options: Options) -> int:
         from studyrunner.report.root.vtu import find_writer
         from studyrunner.system.progress import count, format_seconds
 
-        result = open_for_report(options.result)
+        result = open_for_report(options.result, options.point, options.measured)
         with result.dataset, reading_errors(str(options.result)):
             check_numbers(result.dataset, str(options.result))
             write_series = find_writer(result) if options.vtu else None

@@ -40,6 +40,7 @@ class SceneFacts:
     static_response: response to the harmonic load at rest; None where unknown or not requested.
     gap, friction_coefficient (n_contact,): m and 1, of each pair; friction None where the study gives one for all.
     edge (n_contact,): whether a pair is at the edge of the contact (`edge_pairs`); False where unknown.
+    can_slide: whether any pair has a tangential displacement.
     """
 
     n_displacements: int
@@ -53,6 +54,7 @@ class SceneFacts:
     edge: NDArray[np.bool_] | None = None
     gap: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     friction_coefficient: NDArray[np.float64] | None = None
+    can_slide: bool = True
 
 
 def _silent(_: str) -> None:
@@ -213,6 +215,7 @@ def describe_scene(model: ReducedModel) -> SceneFacts:
         edge=edge_pairs(contact),
         gap=contact.gap,
         friction_coefficient=contact.friction_coefficient,
+        can_slide=bool((np.asarray(contact.dofs)[:, 1:] >= 0).any()),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Final
@@ -13,6 +14,7 @@ from studies.fe_models.model_files import ModelFiles
 from studyrunner.coordinates import SCENE
 from studyrunner.mission_variables import OF_MISSIONS
 from studyrunner.mode_variables import OF_MODES
+from studyrunner.study.similar_names import nearest_name
 from studyrunner.study.values import (
     Axis,
     Cycles,
@@ -80,9 +82,15 @@ def _read_variables(value: object) -> tuple[str, ...]:
     known = (*names_of_all, *KEPT)
     for name in value:
         if name != DEFAULT and name not in known:
-            raise WrongValueError(name, f'give "{DEFAULT}" or names out of {", ".join(known)}')
+            raise WrongValueError(name, f'give "{DEFAULT}" or {_similar(str(name), known)}')
     names = once(value)
     return tuple(name for name in names_of_all if name in names)
+
+
+def _similar(name: str, known: Sequence[str]) -> str:
+    """Variables whose names hold this one, else the most similar one, else all."""
+    holding = [each for each in known if name and name in each]
+    return f"one of {', '.join(holding)}" if holding else nearest_name(name, known)
 
 
 def _read_loops(value: object) -> tuple[int, ...]:

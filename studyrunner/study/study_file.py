@@ -329,7 +329,10 @@ def _override_value(key: str, text: str) -> object:
     except UserError:
         if _BARE_WORD.fullmatch(text):
             return text
-        raise UserError("command line", f"--set {key}", text, "give a TOML value or a bare word") from None
+        remedy = "give a TOML value or a bare word"
+        if text[:1] in ("[", "{"):
+            remedy = f'give a list or table of TOML: words in it stand in quotes, as --set \'{key}=["up", "down"]\''
+        raise UserError("command line", f"--set {key}", text, remedy) from None
     if set(parsed) != {"value"}:
         raise UserError("command line", f"--set {key}", text, "give one TOML value")
     return parsed["value"]

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter, model_validator
 
 from solver.contact.wear_law import LAWS, WearLaw, WearTable
 from studyrunner.study.values import NotNegative, Number, Section, read, words
+from studyrunner.system.progress import count
 from studyrunner.user_error import WrongValueError
 
 _NUMBER = TypeAdapter(Number)
@@ -80,7 +81,8 @@ class WearSection(Section):
         if self.pressure is not None and self.depth is not None and self.factor is not None:
             n_rows, n_columns = len(self.pressure), len(self.depth)
             if len(self.factor) != n_rows or any(len(row) != n_columns for row in self.factor):
-                remedy = f"give {n_rows} rows, one for each pressure, of {n_columns} numbers, one for each depth"
+                columns = count(n_columns, "number")
+                remedy = f"give {count(n_rows, 'row')} for the pressures, each of {columns} for the depths"
                 raise WrongValueError(self.factor, remedy, "wear.factor")
         return self
 

@@ -14,6 +14,7 @@ from studyrunner.study.checked_table import check_table
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.study_of_result import check_result_file
 from studyrunner.study.values import NotNegative, Section, Text, read
+from studyrunner.system.progress import count as counted
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
 
 if TYPE_CHECKING:
@@ -72,8 +73,8 @@ class Worn(Section):
         """Depths (n_contact,), m, of the only state. Raises WrongValueError where there are others than pairs."""
         (depth,) = self.depth
         if len(depth) not in (1, n_contact):
-            remedy = f"give one depth, or one for each of the {n_contact} contact pairs of the scene"
-            raise WrongValueError(len(depth), remedy)
+            remedy = f"give one depth, or one for each pair: the scene has {counted(n_contact, 'contact pair')}"
+            raise WrongValueError(Verbatim(f"there are {counted(len(depth), 'depth')}"), remedy)
         return depth * n_contact if len(depth) == 1 else depth
 
 
@@ -103,6 +104,9 @@ def read_worn(table: object, source: str, folder: Path) -> dict[str, Any]:
     if not isinstance(name, str):
         raise UserError(source, "scene.worn.result", name, "give the path of a result file, in quotes")
     path = folder / name
+    if not path.exists():
+        remedy = "there is no such file: give a result file of run-study, relative to the study file"
+        raise UserError(source, "scene.worn.result", name, remedy)
     check_result_file(path, str(path))
     try:
         cycle = _read_counts(table["cycle"])

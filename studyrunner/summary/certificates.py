@@ -105,7 +105,7 @@ class CertificateTable:
         rows.extend(self._edge.rows())
         rows.extend(self._frequencies.rows())
         rows.extend(self._outcomes.rows())
-        rows.append(("worst certificate of", f"{count(self._n_complete, 'point')} computed to the end"))
+        rows.append(("largest errors of", f"{count(self._n_complete, 'point')} computed to the end"))
         rows.extend((f"  {label}", self._format_worst(name)) for name, label in CERTIFICATE.items())
         rows.append(("folds in the sweeps", self._format_folds()))
         rows.append(("jumps while wearing", self._format_jumps()))

@@ -73,7 +73,7 @@ class Doubts:
         self._n_complete = 0
         n_amplitudes = len(study.axes.excitation_amplitude)
         self._wears = np.zeros(n_amplitudes, np.bool_)
-        self._could_wear = any(value > 0.0 for value in study.axes.wear_coefficient)
+        self._could_wear = facts.can_slide and any(value > 0.0 for value in study.axes.wear_coefficient)
         # below its first resonance, and where nothing can resonate, a structure may move less than at rest
         low = min(study.axes.frequency)
         self._above_static = self._static is None or low <= self._static.frequency or not self._static.amplitude.any()

@@ -110,7 +110,7 @@ def test_an_interrupted_run_ends_at_once(
     n_ranks: int, number: signal.Signals, tmp_path: Path, default_signals: None
 ) -> None:
     def interrupt(running: Running) -> None:
-        running.wait_for("following 2 branches")
+        running.wait_for("along 2 sweeps")
         running.process.send_signal(number)
 
     ended = run_to_end(n_ranks, [FAKED, *GRID, "-o", "out.nc"], tmp_path, {"FAKE_SECONDS": "60"}, interrupt)

@@ -42,7 +42,7 @@ WRONG_KEYS = {
     ),
     "wrong type": ("axes.frequency=fast", "axes.frequency", '"fast"', "number"),
     "NaN": ("axes.wear_coefficient=nan", "axes.wear_coefficient", "nan", "finite"),
-    "negative area": ("scene.area=-1e-4", "scene.area", "-0.0001", "greater than 0"),
+    "negative area": ("scene.area=-1e-4", "scene.area", "-0.0001", "above 0"),
     "frequency 0": ("axes.frequency=0", "axes.frequency", "0", "above 0"),
     "empty axis": ("axes.frequency=[]", "axes.frequency", "[]", "at least one"),
     "duplicates": ("axes.frequency=[1, 2, 1.0]", "axes.frequency", "1.0", "once"),

@@ -115,7 +115,7 @@ def test_an_exception_is_one_bad_point(solver: Solver, capsys: pytest.CaptureFix
 
     solver.disturb = fail
     assert main(TWO_WAYS) == 3
-    assert "1 x exception: The computation broke off with an error" in capsys.readouterr().out
+    assert "1 x exception: The computation ended with an unexpected error" in capsys.readouterr().out
     found = load()
     bad = {"frequency": 100.0, "sweep": "down", "wear_coefficient": 1e-11}
     assert found.outcome.sel(bad).item() == 11
@@ -162,7 +162,7 @@ def test_a_second_run_of_the_same_study_is_refused(
     assert main(TWO_WAYS) == 0
     assert second == [2]
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study:")]
-    assert "out.nc.progress: in use = by process" in line
+    assert "out.nc.progress: in use: by process" in line
     assert "another run is writing there: wait for its end, or give another result file with -o" in line
 
 

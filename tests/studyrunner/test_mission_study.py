@@ -276,7 +276,7 @@ seconds = 10
         ({"mission.heavy.begin": "continue"}, "mission.heavy.begin", "has the normal_load of the block before, cruise"),
         ({"mission.run-up.begin": "ramp"}, "mission.run-up.begin", "a passage is a sweep"),
         ({"mission.run-up.seconds": 3}, "mission.run-up.seconds", "as long as its rate says"),
-        ({"mission.heavy.normal_load": -1.0}, "mission.heavy.normal_load", "greater than 0"),
+        ({"mission.heavy.normal_load": -1.0}, "mission.heavy.normal_load", "above 0"),
         ({"mission.heavy.area": 2e-4}, "mission.heavy", "contact pairs of run-up"),
         ({"mission.heavy.wear_coefficient": 1.0}, "mission.heavy.wear_coefficient", "the same in all blocks"),
         ({"mission.heavy.name": "cruise"}, "mission.name", "a name of its own"),

@@ -119,12 +119,12 @@ def test_nastran(folder):
         (["scene.model=lap.med"], "or the path of a scene file or of a model (.inp, .msh, .cdb)"),
         (["scene.units=mm-t-s", "scene.matrices=job"], "not mm-t-s: give `units` that fit"),
         (["scene.matrices=job", "scene.stress_stiffening=false"], "scene.stress_stiffening = false: leave it out"),
-        (['scene.contact=[["UNDER","UNDER"]]'], "scene.contact = UNDER and UNDER share"),
-        (["scene.cut_faces=['TIP','GROUND']"], "scene.n_sectors = missing: give the number of sectors"),
-        (["scene.rotation_speed=100"], "scene.axis = missing: give {point, direction}"),
+        (['scene.contact=[["UNDER","UNDER"]]'], "scene.contact: UNDER and UNDER share"),
+        (["scene.cut_faces=['TIP','GROUND']"], "scene.n_sectors: missing: give the number of sectors"),
+        (["scene.rotation_speed=100"], "scene.axis: missing: give {point, direction}"),
         (["scene.clamp=['GROUND','UNDER']"], "scene.contact = 4 nodes of UNDER are clamped, as node"),
-        (["scene.preload=[{set='BOLT',direction=[0,0,1],force=1.0}]"], "scene.preload.set = there is no set of nodes"),
-        (["scene.clamp=['GRND']"], 'scene.clamp = there is no set of nodes or surface "GRND" in lap.inp: give GROUND'),
+        (["scene.preload=[{set='BOLT',direction=[0,0,1],force=1.0}]"], "scene.preload.set: there is no set of nodes"),
+        (["scene.clamp=['GRND']"], 'scene.clamp: there is no set of nodes or surface "GRND" in lap.inp: give GROUND'),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_a_sentence(overrides, expected, folder):

@@ -99,19 +99,19 @@ def test_from_deck_to_worn_volume(folder, capsys):
     [
         (
             ['scene.contact=[["BLADS","DISKS"]]'],
-            'scene.contact = there is no surface or set of nodes "BLADS" in sector.inp: give BLADES',
+            'scene.contact: there is no surface or set of nodes "BLADS" in sector.inp: give BLADES',
         ),
-        (["scene.load.set=TOP"], 'wear.toml: scene.load.set = there is no set of nodes or surface "TOP"'),
-        (["scene.response.tip.set=TPI"], 'scene.response.tip.set = there is no set of nodes or surface "TPI"'),
-        (["scene.model=none.inp"], "scene.model = there is no file none.inp: give a path relative to the study file"),
-        (["scene.matrices=none"], "scene.matrices = there is no none.sti, none_STIF1.mtx"),
+        (["scene.load.set=TOP"], 'wear.toml: scene.load.set: there is no set of nodes or surface "TOP"'),
+        (["scene.response.tip.set=TPI"], 'scene.response.tip.set: there is no set of nodes or surface "TPI"'),
+        (["scene.model=none.inp"], "scene.model: there is no file none.inp: give a path relative to the study file"),
+        (["scene.matrices=none"], "scene.matrices: there is no none.sti, none_STIF1.mtx"),
         (["scene.units=inch"], 'scene.units = "inch": give'),
-        (["scene.n_sectors=47"], "scene.n_sectors = cut faces are 30 degrees apart, 47 sectors need 7.66: give"),
-        (["scene.friction_coefficient={BLADE=0.3}"], "coefficient.BLADE = no contact has this name: give one of"),
+        (["scene.n_sectors=47"], "scene.n_sectors: cut faces are 30 degrees apart, 47 sectors need 7.66: give"),
+        (["scene.friction_coefficient={BLADE=0.3}"], "coefficient.BLADE: no contact has this name: give one of"),
         (["scene.nodal_diameter=7"], "scene.nodal_diameter = 7: use at most n_sectors // 2 = 6"),
         (["scene.load.direction=[0,0,0]"], "scene.load.direction"),
         (["scene.frction=1"], "scene.frction = 1: unknown key, give"),
-        (["scene.clamp=[]"], "scene.clamp = at nodal diameter 0 nothing holds the glued structure"),
+        (["scene.clamp=[]"], "scene.clamp: at nodal diameter 0 nothing holds the glued structure"),
         (["scene.tolerance=1e-12", 'scene.contact=[["TIP","DISKS"]]'], "scene.contact ="),
     ],
 )  # fmt: skip
@@ -124,7 +124,7 @@ def test_wrong_decks_end_with_one_line(folder, capsys):
     assert main(["wear.toml", "--plan"]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert error.startswith("run-study: wear.toml: scene.model = sector.inp")
+    assert error.startswith("run-study: wear.toml: scene.model: sector.inp")
 
 
 def test_check_says_what_the_model_is(folder, capsys):

@@ -74,14 +74,16 @@ class Parameters(Table):
     )
     units: Literal["SI", "mm-t-s"] = Field(description='of the files, "SI" or "mm-t-s"')
     contact: Pairs | None = Field(
-        None, description="pairs of surfaces or sets of nodes; default: the deck's CONTACT PAIR, or its TIE"
+        None,
+        description="pairs of surfaces or sets of nodes, [[name, name]]; default: the deck's CONTACT PAIR, or its TIE",
     )
     load: SetDirection = Field(description="where the harmonic load of 1 N acts: {set, direction}")
     response: dict[str, SetDirection] | None = Field(
         None, description="mean displacements by name: {name = {set, direction}}; default: that of the load"
     )
     preload: Annotated[tuple[Preload, ...], BeforeValidator(_as_tuple)] = Field(
-        (), description="constant forces beside the centrifugal one, no part of the prestress: {set, direction, force}"
+        (),
+        description="constant forces beside the centrifugal one, no part of the prestress: [{set, direction, force}]",
     )
     nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites, -")
     loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")
@@ -97,7 +99,7 @@ class Parameters(Table):
     )
     gaps: bool = Field(False, description="whether distances of the surfaces in the mesh are gaps of the joint")
     clamp: Names | None = Field(
-        None, description="sets of nodes or surfaces that are held; default: the deck's BOUNDARY"
+        None, description="sets of nodes or surfaces that are held, [name]; default: the deck's BOUNDARY"
     )
     material: MaterialTable | dict[str, MaterialTable] | None = Field(
         None, description="of all elements, or by the name of a set of elements"
@@ -106,7 +108,9 @@ class Parameters(Table):
     stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")
     axis: AxisTable | None = Field(None, description="{point, direction}; default: the deck's")
     n_sectors: int | None = Field(None, ge=2, description="sectors of the whole; default: the deck's, -")
-    cut_faces: Pair | None = Field(None, description="sets of nodes or surfaces; default: the deck's, or found")
+    cut_faces: Pair | None = Field(
+        None, description="two sets of nodes or surfaces, [name, name]; default: the deck's, or found"
+    )
 
     @property
     def responses(self) -> Mapping[str, SetDirection]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from studies.fe_models.deck.mesh import Deck
 from studies.fe_models.from_files.parameters import Parameters
@@ -56,15 +56,12 @@ def find_surfaces(selections: Selections, parameters: Parameters, units: Units) 
             f"{deck.path} has neither CONTACT PAIR nor TIE",
             'give pairs of surfaces, as [["BLADES", "DISKS"]]',
         )
-    friction = list(_friction(chosen, parameters, deck))
-    contacts = [
-        _surfaces(selections, definition, parameters, units, "contact", coefficient)
-        for definition, coefficient in zip(chosen, friction, strict=True)
-    ]
+    # a name that the deck does not have is said before a friction coefficient that is missing for it
+    named = [_surfaces(selections, each, parameters, units, "contact") for each in chosen]
+    friction = _friction(chosen, parameters, deck)
+    contacts = [replace(each, friction_coefficient=value) for each, value in zip(named, friction, strict=True)]
     glued = [tie for tie in ties if not any(tie.joins(each.names) for each in chosen)]
-    return Surfaces(
-        tuple(contacts), tuple(_surfaces(selections, tie, parameters, units, "model", None) for tie in glued)
-    )
+    return Surfaces(tuple(contacts), tuple(_surfaces(selections, tie, parameters, units, "model") for tie in glued))
 
 
 def _capital(names: tuple[str, str]) -> tuple[str, str]:
@@ -82,13 +79,12 @@ def _surfaces(
     parameters: Parameters,
     units: Units,
     key: str,
-    friction_coefficient: float | None,
 ) -> ContactSurfaces:
     first, second = (selections.surface(name, key) for name in definition.names)
     tolerance = parameters.tolerance
     if tolerance is None and definition.tolerance is not None:
         tolerance = definition.tolerance * units.length
-    return ContactSurfaces(first, second, tolerance, friction_coefficient, with_gaps=parameters.gaps)
+    return ContactSurfaces(first, second, tolerance, None, with_gaps=parameters.gaps)
 
 
 def _friction(chosen: list[_Definition], parameters: Parameters, deck: Deck) -> Iterator[float | None]:

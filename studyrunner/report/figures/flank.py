@@ -21,10 +21,12 @@ from studyrunner.report.drawing import (
     new_panels,
     set_from_zero,
 )
+from studyrunner.report.figures.scar import draw_scar_depth, draw_scar_pressure
 from studyrunner.report.isolines import add_colour_bar, add_isolines
 from studyrunner.report.reading.choice import choose
 from studyrunner.report.reading.flanks import Flank, find_flanks
 from studyrunner.report.reading.result import Result, as_sentences
+from studyrunner.report.reading.scars import find_scar
 from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count
@@ -45,7 +47,10 @@ _NO_DEPTH = 1e-15
 def draw_flanks(result: Result) -> Iterator[Drawing | Missing]:
     """Figures of the pairs at the shown point; sentences where the file does not hold what they need."""
     yield from draw_wear(result)
-    if result.has("mean_pressure"):
+    scar = find_scar(result)
+    if scar is not None and result.has("mean_pressure"):
+        yield draw_scar_pressure(result, scar)
+    elif result.has("mean_pressure"):
         if _are_placed(result) or result.dataset.sizes["contact"] > _FEW_PAIRS:
             yield draw_pressure(result)
         elif len(result.cycles) > 1:
@@ -63,8 +68,11 @@ def draw_wear(result: Result) -> Iterator[Drawing | Missing]:
         return
     if result.dataset.sizes["contact"] > 1:
         yield draw_depths(result)
+    scar = find_scar(result)
     # Without positions there is nothing that the wear depth per pair does not show.
-    if _are_placed(result):
+    if scar is not None:
+        yield draw_scar_depth(result, scar)
+    elif _are_placed(result):
         yield draw_profile(result)
 
 
@@ -110,7 +118,6 @@ def draw_depths(result: Result) -> Drawing:
         + (f" at {result.describe(shown, [course])}" if course else ""),
         f"Deepest: {', '.join(deepest)}",
         choice.sentence,
-        "Fig. 5 of the paper",
     )
     return Drawing("wear_depth", "Wear depth of the pairs", text, figure)
 
@@ -152,7 +159,6 @@ def draw_pressure(result: Result) -> Drawing:
         f"Largest: {', '.join(largest)}",
         _how_drawn(flanks),
         left_out,
-        "Figs. 10 and 11 of the paper",
     )
     return Drawing("mean_pressure", "Mean pressure on the flanks", text, figure)
 
@@ -178,7 +184,7 @@ def draw_pressure_history(result: Result) -> Drawing:
         f"Contact pressure, mean over a period, at {result.describe(shown)}",
         f"Largest: {scale.show(float(np.nanmax(values[0])))} ({result.cycle_label(0)}),"
         f" {scale.show(float(np.nanmax(values[last])))} ({result.cycle_label(last)})",
-        "The file has no positions of the pairs, hence no map. In place of Figs. 10 and 11 of the paper",
+        "The file has no positions of the pairs, hence no map",
     )
     return Drawing("mean_pressure", "Mean contact pressure", text, figure)
 
@@ -206,7 +212,6 @@ def draw_profile(result: Result) -> Drawing:
         "Below, the depth along the flank, one line for each row of pairs" if on_grid else "",
         _how_drawn(flanks),
         left_out,
-        "Fig. 12 of the paper",
     )
     return Drawing("worn_profile", "Worn profile", text, figure)
 

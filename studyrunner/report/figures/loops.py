@@ -65,6 +65,11 @@ class _Loop:
     displacement: dict[str, NDArray[np.float64]]
     force: dict[str, NDArray[np.float64]]
 
+    def drift(self, tangent: str) -> float:
+        """Change of the mean displacement along a tangent from the first to the last cycle count, m."""
+        first, *_, last = self.displacement[tangent][:, :-1].mean(axis=1)
+        return float(last - first)
+
 
 def draw_loops(result: Result) -> Iterator[Drawing | Missing]:
     """Figures of the pairs whose loops the file holds; a sentence where it holds none."""
@@ -172,16 +177,17 @@ def _draw_fretting(loops: Sequence[_Loop], directions: _Directions, ends: Sequen
     def draw(panel: Axes, loop: _Loop, row: int) -> None:
         name = rows[row]
         if name in loop.displacement and name in loop.force:
-            _draw_ends(panel, length(loop.displacement[name]), load(loop.force[name]), ends)
+            _draw_ends(panel, length(_centred(loop.displacement[name])), load(_centred(loop.force[name])), ends)
         panel.set_xlabel(directions.label(name, "displacement", length))
         panel.set_ylabel(directions.label(name, "force", load))
 
     figure = _grid(loops, len(rows), draw, ends)
     text = as_sentences(
-        "Tangential force over relative displacement through a period: the area inside is the energy of friction",
+        "Tangential force over relative displacement through a period, each about its mean: the area inside is the"
+        " energy of friction",
         directions.told,
+        _tell_drift(loops, directions, ends),
         tail,
-        "Fig. 13 of the paper",
     )
     return Drawing("fretting_loops", _TITLE, text, figure)
 
@@ -207,7 +213,6 @@ def _draw_normal(loops: Sequence[_Loop], ends: Sequence[str], tail: str) -> Draw
     text = as_sentences(
         f"Normal force through a period; where it is zero the pair is open: {', '.join(open_part)}",
         tail,
-        "Fig. 14 of the paper",
     )
     return Drawing("normal_load", "Normal load through a period", text, figure)
 
@@ -226,20 +231,42 @@ def _draw_motion(loops: Sequence[_Loop], directions: _Directions, ends: Sequence
     length = scale_for("m", *(loop.displacement[name] for loop in loops for name in _TANGENTS))
 
     def draw(panel: Axes, loop: _Loop, _row: int) -> None:
-        _draw_ends(panel, length(loop.displacement["tangent_1"]), length(loop.displacement["tangent_2"]), ends)
+        across, along = (length(_centred(loop.displacement[name])) for name in _TANGENTS)
+        _draw_ends(panel, across, along, ends)
         panel.set_xlabel(directions.label("tangent_1", "displacement", length))
         panel.set_ylabel(directions.label("tangent_2", "displacement", length))
         panel.set_aspect("equal", adjustable="datalim")
 
     figure = _grid(loops, 1, draw, ends)
     text = as_sentences(
-        "Path of the relative displacement in the contact plane; a pair that sticks is a dot",
+        "Path of the relative displacement in the contact plane about its mean; a pair that sticks is a dot",
         directions.told,
+        _tell_drift(loops, directions, ends),
         f"Largest extent: {', '.join(_tell_extent(loop) for loop in loops)}",
         tail,
-        "Fig. 15 of the paper",
     )
     return Drawing("pair_motion", "Motion of the pairs in the contact plane", text, figure)
+
+
+def _centred(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Closed courses (n_ends, n) about their means over the period."""
+    return np.asarray(values - values[:, :-1].mean(axis=1, keepdims=True))
+
+
+def _tell_drift(loops: Sequence[_Loop], directions: _Directions, ends: Sequence[str]) -> str:
+    """How far the mean of each pair has moved along each tangent between the two cycle counts."""
+    if len(ends) < 2:
+        return ""
+    told = []
+    for loop in loops:
+        names = [name for name in _TANGENTS if name in loop.displacement]
+        length = scale_for("m", *(loop.drift(name) for name in names))
+        parts = [
+            f"{length.show(loop.drift(name))} {directions.labels[_TANGENTS.index(name)].replace('{}', '').strip()}"
+            for name in names
+        ]
+        told += [f"pair {loop.pair} {', '.join(parts)}"] if parts else []
+    return f"The mean displacement drifts from {ends[0]} to {ends[1]} by: {'; '.join(told)}" if told else ""
 
 
 def _tell_extent(loop: _Loop) -> str:

@@ -92,7 +92,6 @@ def draw_response(result: Result, course: Course) -> Drawing:
         f"Crosses: at these, {count(n_failed, 'point')} in all without a result" if n_failed else "",
         f"{more} more responses are in the file" if more else "",
         choice.sentence,
-        "Fig. 9 of the paper",
     )
     return Drawing("frequency_response", _TITLE, caption, figure)
 

@@ -40,7 +40,7 @@ def draw_sector(result: Result) -> Iterator[Drawing | Missing]:
         sentences.append(_draw_frequencies(result, panels[-1]))
     sentences.append(f"Of the sector at {result.describe(result.shown_point(), result.fixed)}" if result.fixed else "")
     name = "natural_frequencies" if frequencies else "mesh"
-    yield Drawing(name, _TITLE, as_sentences(*sentences, "Fig. 2 of the paper"), figure)
+    yield Drawing(name, _TITLE, as_sentences(*sentences), figure)
 
 
 def _draw_frequencies(result: Result, panel: Axes) -> str:

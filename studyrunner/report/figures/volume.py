@@ -146,8 +146,7 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
         schemes,
         choice.sentence,
     )
-    paper = "" if result.blocks is not None else " Fig. 4 of the paper."
-    return Drawing("worn_volume", f"Worn volume over {result.counted}", f"{text}{paper}", figure)
+    return Drawing("worn_volume", f"Worn volume over {result.counted}", text, figure)
 
 
 def slow_time(result: Result) -> str:
@@ -208,7 +207,6 @@ def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing
         if result.has("cycle_count")
         else "",
         choice.sentence,
-        "" if result.blocks is not None else f"Fig. {6 if name == 'worn_volume' else 7} of the paper",
     )
     return Drawing(f"{name}_map", f"{text.capitalize()} over {course.name} and {result.counted}", caption, figure)
 
@@ -300,7 +298,6 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
         "Bars: estimated error" if bars > 0.0 else "",
         *care,
         choice.sentence,
-        "" if result.blocks is not None else "Fig. 8 of the paper",
     )
     return Drawing("final_worn_volume", f"Final worn volume over {course.name}", caption, figure)
 

@@ -11,9 +11,13 @@ from numpy.typing import NDArray
 
 from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.units import scale_for
+from studyrunner.report.reading.units import Scale, scale_for
+from studyrunner.variables import CERTIFICATE
 
 _BYTES_A_BLOCK = 32e6
+
+_IN_PERCENT = ("worn_volume_error", "error_estimate", *(name for name in CERTIFICATE if name != "residual"))
+"""Relative errors."""
 
 Encoded = dict[str, str | float]
 """`data`: see `encode_floats`. Values times `factor` are in `unit`. `label`: name of the quantity."""
@@ -70,10 +74,9 @@ def tell_kept(what: str, kept: Kept, cycles: NDArray[np.int64], result: Result, 
         )
 
 
-def encode_kept(result: Result, name: str, kept: Kept, contacts: NDArray[np.int64] | None = None) -> Encoded:
+def encode_kept(result: Result, name: str, kept: Kept) -> Encoded:
     """A variable at the points and cycles that are kept, (point, cycle, others)."""
-    values = read_kept(result.dataset[name], kept)
-    return encode_values(result.dataset[name], values if contacts is None else values[:, :, contacts])
+    return encode_values(result.dataset[name], read_kept(result.dataset[name], kept))
 
 
 def read_kept(variable: xr.DataArray, kept: Kept) -> NDArray[np.float64]:
@@ -106,4 +109,6 @@ def encode_values(variable: xr.DataArray, values: NDArray[np.generic]) -> Encode
     """Values of a variable, with what it is called and how they are shown."""
     scale = scale_for(str(variable.attrs.get("units", "")), values)
     label = str(variable.attrs.get("long_name", variable.name))
+    if variable.name in _IN_PERCENT:
+        scale = Scale(100.0, "%")
     return {"label": label, "unit": scale.unit, "factor": scale.factor, "data": encode_floats(values)}

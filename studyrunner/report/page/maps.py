@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.report.figures.loops import component_labels
-from studyrunner.report.page.kept import Kept, encode_kept, fit_points, read_kept, tell_kept
+from studyrunner.report.page.kept import Kept, encode_kept, encode_values, fit_points, read_kept, tell_kept
 from studyrunner.report.page.panels import build_panels
 from studyrunner.report.reading.result import Result
 from studyrunner.report.reading.scene_pairs import axes_of_scenes, first_points
@@ -20,7 +20,8 @@ LAST_DEPTH = "wear_depth_last"
 LOOPS = ("loop_displacement", "loop_force")
 
 _FEWEST_MAP_CYCLES = 11
-_FEWEST_LOOP_CYCLES = 2
+_FEWEST_LOOP_CYCLES = 11
+_MOST_PHASES = 64
 _MOST_SCENES = 100
 
 
@@ -81,7 +82,9 @@ def build_loops(
     if not len(held):
         return None, 0.0
     sizes = result.dataset.sizes
-    each = len(LOOPS) * len(held) * sizes["phase"] * sizes["component"]
+    stride = -(-sizes["phase"] // _MOST_PHASES)
+    phases = -(-sizes["phase"] // stride)
+    each = len(LOOPS) * len(held) * phases * sizes["component"]
     kept = fit_points(result, cycles, each, floats, _FEWEST_LOOP_CYCLES)
     tell_kept("Loops", kept, cycles, result, notes)
     if not len(kept.points):
@@ -95,10 +98,13 @@ def build_loops(
         "cycles": np.searchsorted(cycles, kept.cycles).tolist(),
         "contacts": result.dataset["contact"].values[held].tolist(),
         "widest": _widest(result, held),
-        "phases": int(sizes["phase"]),
+        "phases": phases,
         "components": components,
         "labels": [labels.get(name, f"{name} {{}}") for name in components],
-        "variables": {name: encode_kept(result, name, kept, held) for name in LOOPS},
+        "variables": {
+            name: encode_values(variable, read_kept(variable, kept)[:, :, held, ::stride])
+            for name, variable in ((name, result.dataset[name]) for name in LOOPS)
+        },
     }
     return content, float(each * len(kept.points) * len(kept.cycles))
 

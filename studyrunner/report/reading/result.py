@@ -13,7 +13,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from studyrunner.report.reading.chosen import find_values
 from studyrunner.report.reading.endings import Ending, read_endings
+from studyrunner.report.reading.measured import Profile, read_profile
 from studyrunner.report.reading.missions import as_history
 from studyrunner.report.reading.opening import open_vetted
 from studyrunner.report.reading.sample_statistics import SAMPLE, statistics_of
@@ -40,13 +42,16 @@ class Result:
 
     dataset: read lazily. A variable that was read as a whole stays in memory. fixed: axes of which this holds one value
     of several, and how many the file has. blocks: of a result of missions what belongs to single blocks; in `dataset`
-    missions then have the name of the cycles that they replace.
+    missions then have the name of the cycles that they replace. chosen: values of axes of the point that figures of a
+    single point show. measured: a worn profile to compare with.
     """
 
     path: Path
     dataset: xr.Dataset
     fixed: Mapping[str, int] = field(default_factory=dict)
     blocks: xr.Dataset | None = None
+    chosen: Mapping[str, float | str] = field(default_factory=dict)
+    measured: Profile | None = None
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
@@ -259,14 +264,26 @@ class Result:
             amplitude = self.read("response_amplitude").isel(cycle=0)
             candidates.append(amplitude.max("response", skipna=False).values)
         candidates.append(np.ones(self.computed.shape))
-        usable = self.computed if self.computed.any() else self.held
+        wanted = self._wanted
+        usable = self.computed & wanted if (self.computed & wanted).any() else self.held & wanted
         trusted = usable & self._trusted
         for measure in candidates:
             known = np.where((trusted if trusted.any() else usable) & np.isfinite(measure), measure, 0.0)
             if known.max() > 0.0:
                 place = np.unravel_index(int(np.argmax(known)), known.shape)
                 return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
-        return dict.fromkeys(self.axes, 0)
+        place = np.unravel_index(int(np.argmax(wanted)), wanted.shape)
+        return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
+
+    @property
+    def _wanted(self) -> NDArray[np.bool_]:
+        """Points with the chosen values; in the shape of the axes."""
+        outcome = self.dataset["outcome"]
+        wanted = xr.ones_like(outcome, dtype=bool)
+        for name, value in self.chosen.items():
+            if name in outcome.dims and self.dataset.sizes[name] > 1:
+                wanted = wanted & (self.dataset[name] == value)
+        return np.asarray(wanted.transpose(*self.axes).values)
 
     @property
     def _trusted(self) -> NDArray[np.bool_]:
@@ -324,15 +341,20 @@ def as_sentences(*parts: str) -> str:
     return " ".join(part if part.endswith(".") else f"{part}." for part in parts if part)
 
 
-def open_for_report(path: Path | str) -> Result:
+def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None, measured: Path | None = None) -> Result:
     """Open a result file as the report reads it; variables are read when they are needed.
+
+    chosen: values of axes, as text, of the point that figures of a single point show. measured: CSV file of a worn
+    profile.
 
     Raises
     ------
     UserError
-        Where there is no such file or it is no result of `run-study`.
+        Where there is no such file, it is no result of `run-study`, or it has no such point.
     """
+    profile = None if measured is None else read_profile(measured)
     opened = open_vetted(path)
     with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
         dataset, blocks = as_history(check_dataset(opened, str(path)))
-        return Result(Path(path), dataset, blocks=blocks)
+        values = find_values(dataset, chosen or {})
+        return Result(Path(path), dataset, blocks=blocks, chosen=values, measured=profile)

@@ -49,6 +49,5 @@ def build_disk(result: Result, surface: RootSurface) -> Drawing | None:
     text = as_sentences(
         f"The {number} sectors of the disk, that of the mesh in full colour",
         f"Axis of rotation: z, towards the reader; parts: {', '.join(surface.bodies)}",
-        "Fig. 2a of the paper",
     )
     return Drawing("whole_disk", "The whole disk", text, figure)

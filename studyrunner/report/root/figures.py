@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from studyrunner.report.drawing import MAP, Drawing, Missing, new_figure, new_panels
 from studyrunner.report.reading.result import Result, as_sentences
+from studyrunner.report.reading.scars import find_scar
 from studyrunner.report.reading.scene_pairs import depths, tells_depth
 from studyrunner.report.reading.units import Scale, scale_for, show_number
 from studyrunner.report.root.contact_faces import face_normals
@@ -42,7 +43,8 @@ def draw_root(result: Result) -> Iterator[Drawing | Missing]:
     if surface is None:
         return
     state = _find_state(result)
-    if state is not None:
+    # of a cylinder or a sphere on a flat the scar over x shows more
+    if state is not None and find_scar(result) is None:
         yield draw_state(result, surface, views, state)
     yield draw_numbers(result, surface, views)
     disk = build_disk(result, surface)
@@ -199,7 +201,6 @@ def draw_numbers(result: Result, surface: RootSurface, views: Sequence[View]) ->
         "Each surface is seen from outside its body" if surface.is_mesh else "",
         "Only some of the numbers are written" if some else "",
         edge,
-        "Fig. 3b of the paper",
     )
     return Drawing("pair_numbers", "Numbers of the contact pairs", text, figure)
 

@@ -55,11 +55,11 @@ def find_writer(result: Result) -> Callable[[Path], Series]:
 def write_series(result: Result, surface: RootSurface, folder: Path) -> Series:
     """Writes `root.pvd` and `vtu/root_<number>.vtu`, one for each cycle count at which the shown point holds values.
 
-    Points are those of the mesh before wear, m. At the points: `FIELDS` in the units of the result, NaN where there is
-    no contact; `worn_displacement` (3), m, from there to the worn surface, which ParaView's filter "Warp By Vector"
-    exaggerates. Of the cells: `body` and `contact_surface`, numbers as told in a comment of the PVD file, -1 where
-    there is no contact. The time of the series is the cycle count, of a final state
-    without one the number of the output.
+    Points are those of the mesh before wear, m. At the points: `FIELDS` with their units in the name, as
+    "wear_depth (m)", NaN where there is no contact; "worn_displacement (m)", of 3 components, from there to the worn
+    surface, which ParaView's filter "Warp By Vector" exaggerates. Of the cells: `body` and `contact_surface`, numbers
+    as told in a comment of the PVD file, -1 where there is no contact. The time of the series is the cycle count, of a
+    final state without one the number of the output.
 
     Raises OSError where a file cannot be written.
     """
@@ -68,6 +68,7 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> Series:
     shown = result.shown_point()
     fields = {"wear_depth": depths(result, shown)} if tells_depth(result) else {}
     fields |= {name: result.at(name, shown).values for name in FIELDS if name not in fields and result.has(name)}
+    units = {name: str(result.dataset[name].attrs.get("units", "1")) for name in fields if result.has(name)}
     held = np.ones(len(result.cycles), dtype=np.bool_)
     for values in fields.values():
         held &= np.isfinite(values).all(axis=1)
@@ -90,7 +91,7 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> Series:
         mesh = meshio.Mesh(
             surface.nodes,
             cells,
-            point_data=_at_points(surface, {field: values[number] for field, values in fields.items()}),
+            point_data=_at_points(surface, {field: values[number] for field, values in fields.items()}, units),
             cell_data={key: [values[rows] for rows in chosen] for key, values in of_cells.items()},
         )
         meshio.vtu.write(folder / name, mesh)
@@ -104,14 +105,18 @@ def write_series(result: Result, surface: RootSurface, folder: Path) -> Series:
     return Series(path, len(numbers))
 
 
-def _at_points(surface: RootSurface, fields: dict[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+def _at_points(
+    surface: RootSurface, fields: dict[str, NDArray[np.float64]], units: dict[str, str]
+) -> dict[str, NDArray[np.float64]]:
     """Fields (n_nodes,) of values of pairs (n_contact,), and the way to the worn surface (n_nodes, 3)."""
     found = {}
     for name, values in fields.items():
-        found[name] = np.full(len(surface.nodes), np.nan)
-        found[name][surface.contact.nodes] = surface.contact.values(values)
+        unit = units.get(name, "m")
+        field = name if unit == "1" else f"{name} ({unit})"
+        found[field] = np.full(len(surface.nodes), np.nan)
+        found[field][surface.contact.nodes] = surface.contact.values(values)
     if "wear_depth" in fields:
-        found["worn_displacement"] = surface.worn(fields["wear_depth"], 1.0) - surface.nodes
+        found["worn_displacement (m)"] = surface.worn(fields["wear_depth"], 1.0) - surface.nodes
     return found
 
 

@@ -29,8 +29,8 @@ ALL_DRAWINGS = [
     "worn_root",
     "pair_numbers",
     "wear_depth",
-    "mean_pressure",
     "worn_profile",
+    "mean_pressure",
     "fretting_loops",
     "normal_load",
     "pair_motion",
@@ -122,14 +122,10 @@ def _check_panels(drawing: Drawing) -> None:
 
 
 @pytest.mark.slow
-def test_a_complete_file_gives_every_figure_of_the_paper_in_its_order() -> None:
+def test_a_complete_file_gives_every_figure_in_its_order() -> None:
     items = list(draw_report(_complete()))
     assert _names(items, Drawing) == ALL_DRAWINGS
     assert _names(items, Missing) == []
-    captions = " ".join(item.caption for item in items if isinstance(item, Drawing))
-    for number in (2, 4, 5, 6, 7, 8, 9, 12, 13, 14, 15):
-        assert f"Fig. {number} of the paper" in captions
-    assert "Figs. 10 and 11 of the paper" in captions
 
 
 def test_what_is_missing_says_which_output_to_ask_for() -> None:

@@ -120,7 +120,7 @@ def test_the_root_of_one_scene_is_written(
     assert series.n_files == n_files
     mesh = meshio.read(tmp_path / "vtu" / f"root_{n_files - 1:04d}.vtu")
     expected = last_depth(result, result.shown_point())
-    assert np.nanmax(mesh.point_data["wear_depth"]) == np.nanmax(expected)
+    assert np.nanmax(mesh.point_data["wear_depth (m)"]) == np.nanmax(expected)
 
 
 def test_drawn_values_are_taken() -> None:
@@ -161,5 +161,5 @@ def test_too_many_inputs_or_values_are_refused(monkeypatch: pytest.MonkeyPatch) 
 
 def test_a_result_without_samples_has_no_drawn_values() -> None:
     dataset: xr.Dataset = sample_file().isel(sample=0, drop=True)
-    with pytest.raises(UserError, match="sample_gap = dimensions contact"):
+    with pytest.raises(UserError, match="sample_gap: dimensions contact"):
         check_dataset(dataset, "samples.nc")

@@ -51,19 +51,23 @@ def test_the_files_hold_the_numbers_of_the_pairs(folder: Path, dataset: xr.Datas
         mesh = meshio.read(folder / "vtu" / f"root_{cycle:04d}.vtu")
         np.testing.assert_array_equal(mesh.points, np.stack([dataset[f"mesh_{axis}"] for axis in "xyz"], axis=1))
         np.testing.assert_array_equal(mesh.cells_dict["quad"], dataset["mesh_quad"])
-        held = np.isfinite(mesh.point_data["wear_depth"])
+        held = np.isfinite(mesh.point_data["wear_depth (m)"])
         assert held.sum() == 2 * len(pairs.area)
         way = np.linalg.norm(mesh.points[held][:, None] - pairs.position, axis=2)
         assert way.min(axis=1).max() < 1e-12
         for name in vtu.FIELDS:
             values = dataset[name].values.reshape(16, 5, -1)[point, cycle]
-            np.testing.assert_array_equal(mesh.point_data[name][held], values[way.argmin(axis=1)])
-        depth = mesh.point_data["wear_depth"][held]
+            units = dataset[name].attrs["units"]
+            field = name if units == "1" else f"{name} ({units})"
+            np.testing.assert_array_equal(mesh.point_data[field][held], values[way.argmin(axis=1)])
+        depth = mesh.point_data["wear_depth (m)"][held]
         # into the blade on one side of the joint, into the disk on the other
-        moved = np.einsum("ij,ij->i", mesh.point_data["worn_displacement"][held], pairs.frames[way.argmin(axis=1), 0])
+        moved = np.einsum(
+            "ij,ij->i", mesh.point_data["worn_displacement (m)"][held], pairs.frames[way.argmin(axis=1), 0]
+        )
         np.testing.assert_allclose(np.sort(moved), np.sort(np.where(moved > 0.0, depth, -depth)), rtol=1e-9)
         assert (moved > 0.0).sum() == len(pairs.area)
-        assert (mesh.point_data["worn_displacement"][~held] == 0.0).all()
+        assert (mesh.point_data["worn_displacement (m)"][~held] == 0.0).all()
         body, surface = (np.concatenate(mesh.cell_data[name]) for name in ("body", "contact_surface"))
         assert set(body) == {0, 1}
         assert (np.bincount(surface + 1)[1:] == 2 * 3).all()

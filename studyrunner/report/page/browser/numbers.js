@@ -21,10 +21,13 @@ for (const group of [data.points, courses, maps && maps.variables, loops && loop
 
 const counts = data.counts ? decode(data.counts) : null;
 
-function digits(value, count = 6) {
+// Thousands are set apart from five digits on, as in the figures.
+function digits(value, count = 4) {
   if (value === null || !Number.isFinite(value)) return "–";
-  if (Number.isInteger(value) && Math.abs(value) < 1e15) return String(value).replace(/\B(?=(\d{3})+$)/g, "\u00a0");
+  if (Number.isInteger(value) && Math.abs(value) < 1e15) return Math.abs(value) < 1e4 ? String(value) : String(value).replace(/\B(?=(\d{3})+$)/g, "\u00a0");
   const size = Math.abs(value);
+  // whole numbers of few known digits, as 2000, in full
+  if (size >= 10 ** count && size < 1e7) return digits(Number(value.toPrecision(count)));
   const text = size >= 1e-3 && size < 1e7 ? value.toPrecision(count) : value.toExponential(count - 1);
   const [head, power] = text.split("e");
   const short = head.includes(".") ? head.replace(/\.?0+$/, "") : head;
@@ -32,7 +35,15 @@ function digits(value, count = 6) {
 }
 
 const withUnit = (text, unit) => (unit && text !== "–" ? `${text}\u00a0${unit}` : text);
-const show = (entry, value) => withUnit(digits(value * entry.factor), entry.unit);
+// As many digits as the error of a value allows, of which two digits are worth telling; at least two.
+function digitsOf(value, error) {
+  if (!(error > 0) || !Number.isFinite(error) || !(Math.abs(value) > 0)) return 4;
+  const power = (number) => Math.floor(Math.log10(Math.abs(number)));
+  return Math.min(6, Math.max(2, power(value) - power(error) + 1));
+}
+// error: of the value, in its unit.
+const show = (entry, value, error) => withUnit(digits(value * entry.factor, entry.unit === "%" ? 2 : digitsOf(value * entry.factor, error)), entry.unit);
+const full = (entry, value) => withUnit(digits(value * entry.factor, 7), entry.unit);
 const titled = (text, unit) => (unit ? `${text} (${unit})` : text);
 // Texts of the file in a plot: plotly reads some HTML, of which nothing is wanted.
 const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");

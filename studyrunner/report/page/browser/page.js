@@ -4,6 +4,22 @@
 const MOST_FRAMES = 50;
 const FRAME = 150; // ms
 
+// Relative errors that the page holds of what stands in the list: over the cycles, or the largest over them.
+const ERRORS_OF = {
+  worn_volume: "worn_volume_error", wear_rate: "wear_rate_error", wear_depth_max: "worn_volume_error", largest_wear_depth: "error_estimate",
+  response_amplitude: "response_error", response_peak: "response_error", response_phase: "response_error",
+};
+
+const TWO_DIGITS = new Set(["residual", "run_time", "step_limit"]);
+
+// Absolute error of a value; NaN where the page does not hold it. That of a phase, in rad, is the relative one of its amplitude.
+function errorOf(name, value, point, cycle) {
+  const other = ERRORS_OF[name];
+  const relative = courses[other] ? course(other, point, cycle) : data.points[other] ? data.points[other].values[point] : NaN;
+  if (TWO_DIGITS.has(name)) return 0.1 * Math.abs(value);
+  return name === "response_phase" ? relative : relative * Math.abs(value);
+}
+
 function readout() {
   const { point, cycle, response } = state;
   const found = places(point);
@@ -17,21 +33,27 @@ function readout() {
   const of = data.responses.length > 1 ? `, ${data.responses[response]}` : "";
   for (const [name, entry] of Object.entries(courses)) {
     const label = name.includes("response") ? entry.label + of : entry.label;
-    rows.push([name, label, show(entry, course(name, point, cycle, name.includes("response") ? response : 0))]);
+    const value = course(name, point, cycle, name.includes("response") ? response : 0);
+    rows.push([name, label, show(entry, value, entry.factor * errorOf(name, value, point, cycle)), full(entry, value)]);
   }
   for (const [name, entry] of Object.entries(data.points)) {
     // What never happened to the point has no number.
-    if (Number.isFinite(entry.values[point])) rows.push([name, entry.label, show(entry, entry.values[point])]);
+    if (Number.isFinite(entry.values[point])) rows.push([name, entry.label, show(entry, entry.values[point], entry.factor * errorOf(name, entry.values[point], point, cycle)), full(entry, entry.values[point])]);
   }
-  byId("readout").replaceChildren(...rows.map(([name, label, text]) => {
+  byId("readout").replaceChildren(...rows.map(([name, label, text, all]) => {
     const row = document.createElement("div");
     row.dataset.name = name;
     row.appendChild(document.createElement("dt")).textContent = label;
-    row.appendChild(document.createElement("dd")).textContent = text;
+    const told = row.appendChild(document.createElement("dd"));
+    told.textContent = text;
+    told.title = all || text; // all digits, where the mouse rests
     return row;
   }));
   byId("selected").textContent = `${pointText(point)}: ${sentence(point)}`;
 }
+
+// colours are those of the page when it was opened
+DARK.addEventListener("change", () => location.reload());
 
 // ---- choices
 

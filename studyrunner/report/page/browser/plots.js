@@ -1,18 +1,26 @@
 // The plots of what is picked: response, course of the wear, maps and loops.
 "use strict";
 
+const DARK = window.matchMedia("(prefers-color-scheme: dark)");
+const [INK, PAPER, GRID, LINE, GREY] = DARK.matches
+  ? ["#e8e8e8", "#17191c", "#3a3d42", "#9a9a9a", "#8c8c8c"]
+  : ["#1a1a1a", "#fff", "#e0e0e0", "#777", "#8c8c8c"];
+// a third of white, against a dark page
+const lighter = (colour) => `#${[1, 3, 5].map((at) => Math.round(parseInt(colour.slice(at, at + 2), 16) * 0.67 + 84).toString(16).padStart(2, "0")).join("")}`;
+if (DARK.matches) data.colours = data.colours.map(lighter);
 const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
 const SYMBOLS = ["circle", "square", "triangle-up", "diamond", "triangle-down", "cross"];
-const FONT = { family: "system-ui, Segoe UI, Roboto, Helvetica Neue, Arial, sans-serif", size: 12, color: "#1a1a1a" };
+const FONT = { family: "system-ui, Segoe UI, Roboto, Helvetica Neue, Arial, sans-serif", size: 12, color: INK };
 const CONFIG = { responsive: true, displayModeBar: false };
+const PALE = DARK.matches ? "#5f5f5f" : "#bdbdbd"; // error bars behind their marks
 const TOUCH = window.matchMedia("(pointer: coarse)").matches;
 
 function layout(more) {
   return {
     font: FONT,
     margin: { l: 64, r: 14, t: 12, b: 46 },
-    paper_bgcolor: "#fff",
-    plot_bgcolor: "#fff",
+    paper_bgcolor: PAPER,
+    plot_bgcolor: PAPER,
     hovermode: "closest",
     separators: ".\u00a0",
     dragmode: TOUCH ? false : "zoom",
@@ -23,14 +31,14 @@ function layout(more) {
 function axisLayout(title, more) {
   return {
     title: { text: plain(title), standoff: 8 },
-    gridcolor: "#e0e0e0",
+    gridcolor: GRID,
     zeroline: false,
-    linecolor: "#777",
+    linecolor: LINE,
     ticks: "outside",
-    tickcolor: "#777",
+    tickcolor: LINE,
     exponentformat: "power",
     minexponent: 6,
-    separatethousands: true,
+    separatethousands: title === "cycles",
     automargin: true,
     ...more,
   };
@@ -82,8 +90,8 @@ function drawResponse() {
       traces.push({
         x: line.points.map(at), y: line.points.map((point) => value(point, 0)),
         mode: line.points.length > 1 ? "lines" : "markers", hoverinfo: "skip", name: plain(cycleText(0)),
-        line: { color: "#8c8c8c", width: 1.5, dash: DASHES[number % DASHES.length] },
-        marker: { color: "#8c8c8c", size: 6 }, showlegend: !ghosts, legendrank: 2000, meta: "first",
+        line: { color: GREY, width: 1.5, dash: DASHES[number % DASHES.length] },
+        marker: { color: GREY, size: 6 }, showlegend: !ghosts, legendrank: 2000, meta: "first",
       });
       ghosts = true;
     }
@@ -100,7 +108,7 @@ function drawResponse() {
         x: bad.map(at), y: bad.map(() => 0), customdata: bad, mode: "markers", name: "no result",
         text: bad.map((point) => plain(`${pointText(point)}: ${sentence(point)}`).replace(/(.{50,}?) /g, "$1<br>")),
         hovertemplate: "%{text}<extra></extra>", showlegend: !failures, legendrank: 3000, cliponaxis: false,
-        marker: { color: "#000", size: 9, symbol: "x-thin", line: { color: "#000", width: 2 } }, meta: "failed",
+        marker: { color: INK, size: 9, symbol: "x-thin", line: { color: INK, width: 2 } }, meta: "failed",
       });
       failures = true;
     }
@@ -108,15 +116,16 @@ function drawResponse() {
   traces.push({
     x: [at(state.point)], y: [known(state.point, state.cycle) ? value(state.point, state.cycle) : 0], mode: "markers",
     hoverinfo: "skip", name: "picked", legendrank: 1500, cliponaxis: false, meta: "picked",
-    marker: { symbol: "circle-open", size: 17, color: "#000", line: { width: 2.5 } },
+    marker: { symbol: "circle-open", size: 17, color: INK, line: { width: 2.5 } },
   });
+  const numbers = axis.label === "frequency" ? { tickformat: ".9~g" } : {};
   const words = axis.words ? { type: "category", categoryorder: "array", categoryarray: axis.values.map(written) } : {};
   byId("response-hint").textContent = varying.length
     ? (TOUCH ? "Touch a point to pick it." : "Click a point to pick it; drag to zoom in, double-click to zoom out.") + (failures ? " Crosses on the zero line: points without a value there." : "")
     : "The study has a single point.";
   Plotly.react("response-plot", traces, layout({
     height: 380, uirevision: `${state.response}`, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
-    xaxis: axisLayout(titled(axis.label, axis.unit), words),
+    xaxis: axisLayout(titled(axis.label, axis.unit), axis.words ? words : numbers),
     yaxis: axisLayout("", { ...(entry ? upright("amplitude", entry.unit) : {}), rangemode: "tozero" }),
   }), CONFIG);
 }
@@ -163,11 +172,11 @@ function drawCourse() {
     });
     if (name === "worn_volume" && courses.exact_worn_volume) {
       traces.push({ ...place, x: across, y: scaled("exact_worn_volume"), mode: "lines", name: "exact", meta: "exact",
-        line: { color: "#000", width: 1.5, dash: "dot" }, hoverinfo: "skip" });
+        line: { color: INK, width: 1.5, dash: "dot" }, hoverinfo: "skip" });
     }
     traces.push({
       ...place, x: [across[state.cycle]], y: [values[state.cycle]], mode: "markers", hoverinfo: "skip", showlegend: false,
-      marker: { symbol: "circle-open", size: 13, color: "#000", line: { width: 2.5 } }, cliponaxis: false, meta: "picked",
+      marker: { symbol: "circle-open", size: 13, color: INK, line: { width: 2.5 } }, cliponaxis: false, meta: "picked",
     });
     const alone = beside || i === panels.length - 1;
     shape[`xaxis${suffix}`] = axisLayout(alone && !leaps ? `${data.counted}s` : "", {
@@ -272,12 +281,16 @@ function drawLoop() {
   const closed = (entry, column) => {
     const start = ((found.row * loops.cycles.length + column) * loops.contacts.length + state.loop) * loops.phases;
     const values = Array.from({ length: loops.phases }, (_, phase) => entry.values[(start + phase) * parts + state.component] * entry.factor);
-    return values.concat(values.slice(0, 1));
+    // a joint creeps: loops are shown about their means, which the legend tells
+    const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
+    return { mean, at: values.concat(values.slice(0, 1)).map((value) => value - mean) };
   };
   const traces = [found.column ? 0 : null, found.column].filter((column) => column !== null).map((column) => {
     const now = column === found.column;
-    return { x: closed(displacement, column), y: closed(force, column), mode: "lines", name: cycleText(loops.cycles[column]),
-      line: { color: now ? data.colours[0] : "#8c8c8c", width: now ? 2 : 1.5, dash: now ? "solid" : "dash" }, meta: now ? "loop" : "first",
+    const [x, y] = [closed(displacement, column), closed(force, column)];
+    const mean = `mean ${digits(x.mean, 3)} ${plain(displacement.unit)}, ${digits(y.mean, 3)} ${plain(force.unit)}`;
+    return { x: x.at, y: y.at, mode: "lines", name: `${cycleText(loops.cycles[column])}: ${mean}`,
+      line: { color: now ? data.colours[0] : GREY, width: now ? 2 : 1.5, dash: now ? "solid" : "dash" }, meta: now ? "loop" : "first",
       hovertemplate: `%{x:.4~g} ${plain(displacement.unit)}, %{y:.4~g} ${plain(force.unit)}<extra></extra>` };
   });
   const name = (quantity) => loops.labels[state.component].replace("{}", quantity);

@@ -4,6 +4,8 @@
 const GREY_EDGE = "#555";
 const DISTANCE = 1.45; // of the eye, over the longest side of what is seen
 const MARGIN = 0.04;
+const SCALE_WIDTH = 80; // px, of the scale of colours beside the root
+const SCALE_HEIGHT = 70; // px, below it
 const WHAT = root && root.mesh ? "The root" : "The contact pairs";
 const DEPTH = maps && ["wear_depth", "wear_depth_last"].find((name) => maps.variables[name]);
 const LIT = { ambient: 0.65, diffuse: 0.5, specular: 0.05, roughness: 0.9, fresnel: 0.05, facenormalsepsilon: 0 };
@@ -157,15 +159,20 @@ function drawRoot() {
   const ratio = parts.box.map(([low, high]) => (high - low) / longest);
   const axis = (number) => ({
     title: { text: `${"xyz"[number]} (mm)` }, range: parts.box[number], showbackground: false, showspikes: false,
-    nticks: Math.max(2, Math.round(6 * ratio[number])), gridcolor: "#ececec", zeroline: false, linecolor: "#bbb",
+    nticks: Math.max(2, Math.round(6 * ratio[number])), gridcolor: GRID, zeroline: false, linecolor: LINE,
   });
-  const [ex, ey, ez] = view.eye.map((each) => each * DISTANCE);
+  // a narrow window shows as much as a wide one, from farther away and without the width of a scale beside it
+  const wide = byId("root-plot").clientWidth;
+  const height = Math.max(320, Math.min(560, wide));
+  const narrow = wide < 600;
+  const far = DISTANCE * Math.max(1, 1.15 * height / (narrow ? wide : wide - SCALE_WIDTH));
+  const [ex, ey, ez] = view.eye.map((each) => each * far);
   const [ux, uy, uz] = view.up;
   Plotly.react("root-plot", traces, layout({
-    height: 560, margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false,
+    height: height + (narrow ? SCALE_HEIGHT : 0), margin: { l: 0, r: 0, t: 0, b: narrow ? SCALE_HEIGHT : 0 }, showlegend: false,
     coloraxis: { colorscale: "Cividis", cmin: 0, cmax: state.colour === "open_fraction" ? 1 : coloured.largest * entry.factor || 1,
-      colorbar: { title: { text: plain(entry.unit), side: "top" }, thickness: 14, outlinewidth: 0, len: 0.8 } },
-    scene: { dragmode: "orbit", aspectmode: "manual", aspectratio: { x: ratio[0], y: ratio[1], z: ratio[2] },
+      colorbar: { title: { text: plain(entry.unit), side: "top" }, thickness: 14, outlinewidth: 0, ...(narrow ? { orientation: "h", y: -0.02, yanchor: "top", len: 0.95 } : { len: 0.8 }) } },
+    scene: { domain: { x: [0, 1], y: [0, 1] }, dragmode: "orbit", aspectmode: "manual", aspectratio: { x: ratio[0], y: ratio[1], z: ratio[2] },
       xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), uirevision: String(state.view),
       camera: { eye: { x: ex, y: ey, z: ez }, up: { x: ux, y: uy, z: uz }, center: { x: 0, y: 0, z: 0 } } },
   }), CONFIG);

@@ -6,7 +6,7 @@ const { scatter } = data;
 const scattered = { input: 0, along: 0, exceeded: 0, drawn: "" };
 const GROUPS = ["samples", "lower group", "upper group", "between the groups"];
 const GROUP_SYMBOLS = ["circle", "circle", "square", "diamond"];
-const GROUP_COLOURS = [data.colours[0], data.colours[0], data.colours[1], "#8c8c8c"];
+const GROUP_COLOURS = [data.colours[0], data.colours[0], data.colours[1], GREY];
 const SHADES = ["rgba(0, 114, 178, 0.18)", "rgba(0, 114, 178, 0.34)"];
 const BAND = { mode: "lines", line: { width: 0 }, fill: "toself", hoverinfo: "skip" };
 const N_QUANTILES = 5;
@@ -55,12 +55,12 @@ function drawSamples(row, picked) {
       x: own.map(across), y: worn, customdata: own, mode: "markers", name, meta: number ? `group ${number}` : "samples", showlegend: true,
       text: own.map((point, i) => plain(`${pointText(point)}: ${withUnit(digits(worn[i], 4), scatter.unit)}${wrong[i] ? ` ± ${digits(wrong[i], 2)}` : ""}`)),
       hovertemplate: "%{text}<extra></extra>", marker: { color: GROUP_COLOURS[number], symbol: GROUP_SYMBOLS[number], size: points.length > 300 ? 5 : 8 },
-      error_y: { type: "data", array: wrong, visible: wrong.some((each) => each > 0) && points.length <= 300, color: "#bdbdbd", thickness: 1, width: 0 },
+      error_y: { type: "data", array: wrong, visible: wrong.some((each) => each > 0) && points.length <= 300, color: PALE, thickness: 1, width: 0 },
     };
   }).filter((trace) => trace.x.length);
   traces.push({
     x: [across(state.point)], y: [wornOf(state.point) * scatter.factor], mode: "markers", hoverinfo: "skip", showlegend: false, meta: "picked",
-    marker: { symbol: "circle-open", size: 17, color: "#000", line: { width: 2.5 } }, cliponaxis: false,
+    marker: { symbol: "circle-open", size: 17, color: INK, line: { width: 2.5 } }, cliponaxis: false,
   });
   Plotly.react("scatter-plot", traces, layout({
     height: 380, uirevision: `${row} ${scattered.input}`, legend: LEGEND, showlegend: traces.length > 2,
@@ -96,7 +96,7 @@ function drawBands(row, picked) {
   }));
   const own = scattered.along ? ordered(data.horizontal).map((place) => pointAt(picked.with(data.horizontal, place))) : [];
   traces.push({
-    ...line, name: "picked sample", meta: "picked", line: { color: "#000", width: 1.5 },
+    ...line, name: "picked sample", meta: "picked", line: { color: INK, width: 1.5 },
     x: scattered.along ? at : cycles, y: scattered.along ? own.map((point) => wornOf(point) * scatter.factor) : cycles.map((_, cycle) => course("worn_volume", state.point, cycle) * scatter.factor),
   });
   const axis = axes[data.horizontal];
@@ -119,7 +119,7 @@ function drawExceedance(row) {
   ];
   const depth = data.points.largest_wear_depth;
   const own = scattered.exceeded === 0 ? wornOf(state.point) : depth ? depth.values[state.point] : NaN;
-  if (Number.isFinite(own)) traces.push({ x: [own * entry.factor, own * entry.factor], y: [0, 1], mode: "lines", name: "picked sample", meta: "picked", hoverinfo: "skip", line: { color: "#000", width: 1.5 } });
+  if (Number.isFinite(own)) traces.push({ x: [own * entry.factor, own * entry.factor], y: [0, 1], mode: "lines", name: "picked sample", meta: "picked", hoverinfo: "skip", line: { color: INK, width: 1.5 } });
   Plotly.react("exceedance-plot", traces, layout({
     height: 340, uirevision: `${row} ${scattered.exceeded}`, legend: LEGEND, showlegend: true,
     xaxis: axisLayout(titled(entry.label, entry.unit), { rangemode: "tozero" }), yaxis: axisLayout("", { ...upright("probability of more", ""), range: [0, 1.02] }),
@@ -134,7 +134,7 @@ function drawIndices(row) {
     const middle = names.map((_, i) => (end(name, i, 0) + end(name, i, 1)) / 2);
     return {
       type: "bar", x: names, y: middle, name: words, meta: name, marker: { color: data.colours[colour] }, hovertemplate: "%{y:.2f}<extra></extra>",
-      error_y: { type: "data", symmetric: false, thickness: 1.2, width: 4, color: "#333",
+      error_y: { type: "data", symmetric: false, thickness: 1.2, width: 4, color: INK,
         array: middle.map((each, i) => Math.max(end(`${name}_interval`, i, 1) - each, 0) || 0), arrayminus: middle.map((each, i) => Math.max(each - end(`${name}_interval`, i, 0), 0) || 0) },
     };
   });

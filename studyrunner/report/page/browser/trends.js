@@ -3,7 +3,6 @@
 
 const trends = data.trends || [];
 const trend = { quantity: 0, axis: 0, mapped: 0, across: 0, up: 0, drawn: {} };
-const PALE = "#bdbdbd";
 const LEFT = { align: "left" };
 const DECADES = 30; // largest over smallest value from which an axis is logarithmic
 const MOST_TICKS = 8;
@@ -97,12 +96,12 @@ function drawTrend() {
   if (bad.length) {
     traces.push({
       x: bad.map(at), y: bad.map(() => low), ...drawn(bad), mode: "markers", name: "not known", cliponaxis: false, meta: "failed",
-      marker: { color: "#000", size: 9, symbol: "x-thin", line: { color: "#000", width: 2 } },
+      marker: { color: INK, size: 9, symbol: "x-thin", line: { color: INK, width: 2 } },
     });
   }
   traces.push({
     x: [at(picked)], y: [Number.isFinite(value(picked)) ? value(picked) : low], mode: "markers", hoverinfo: "skip", name: "picked",
-    showlegend: false, cliponaxis: false, meta: "picked", marker: { symbol: "circle-open", size: 17, color: "#000", line: { width: 2.5 } },
+    showlegend: false, cliponaxis: false, meta: "picked", marker: { symbol: "circle-open", size: 17, color: INK, line: { width: 2.5 } },
   });
   Plotly.react("trend-plot", traces, layout({
     height: 380, uirevision: `${trend.quantity} ${axis}`, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 }, showlegend: true,
@@ -143,12 +142,12 @@ function drawTrendMap() {
   if (bad.length) {
     traces.push({
       ...place(bad), mode: "markers", customdata: bad.map(pointAt), text: bad.map((found) => trendText(entry, found)),
-      hovertemplate: "%{text}<extra></extra>", hoverlabel: LEFT, meta: "failed", marker: { color: "#000", size: 9, symbol: "x-thin", line: { color: "#000", width: 2 } },
+      hovertemplate: "%{text}<extra></extra>", hoverlabel: LEFT, meta: "failed", marker: { color: INK, size: 9, symbol: "x-thin", line: { color: INK, width: 2 } },
     });
   }
   traces.push({
     ...place([picked]), mode: "markers", hoverinfo: "skip", meta: "picked",
-    marker: { symbol: "circle", size: 11, color: "#fff", line: { color: "#000", width: 2.5 } },
+    marker: { symbol: "circle", size: 11, color: PAPER, line: { color: INK, width: 2.5 } },
   });
   Plotly.react("trend-map-plot", traces, layout({
     height: 380, showlegend: false, uirevision: `${trend.mapped} ${across} ${up}`, xaxis: cellAxis(across), yaxis: cellAxis(up),
