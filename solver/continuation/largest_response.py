@@ -15,12 +15,12 @@ import numpy as np
 
 from solver.continuation.options import CONTINUATION
 from solver.continuation.phase_lag import LaggingState, excitation_product, frequency_derivative, solve_at_lag
-from solver.harmonic_balance.dlft import Balance, Linearisation
+from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
 from solver.structure.fourier import to_complex
-from solver.structure.joint import Case
+from solver.structure.joint import Case, Joint
 
 
 def solve_at_peak(
@@ -31,6 +31,7 @@ def solve_at_peak(
     solver: JacobianSolver,
     budget: Budget,
     most: int | None = None,
+    near: Joint | None = None,
 ) -> tuple[LaggingState, float] | None:
     """The state of the largest amplitude near a phase lag, rad, and its lag; None where it is not found.
 
@@ -40,7 +41,7 @@ def solve_at_peak(
     below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
     before: tuple[float, float] | None = None
     for _ in range(CONTINUATION.peak_solves):
-        found = solve_at_lag(case, balance, start, lag, solver, case.settings.tolerance, budget, most)
+        found = solve_at_lag(case, balance, start, lag, solver, budget, most, near)
         if found is None:
             return None
         rise, turn = rise_of_response(case, found, solver)
@@ -50,14 +51,15 @@ def solve_at_peak(
         rise /= turn
         below, above = (lag, above) if rise > 0.0 else (below, lag)
         if abs(rise) <= accuracy or above - below <= accuracy:
-            return replace(found, turn=turn), lag
+            # before the lag is too far from that of the largest amplitude: one solve a state while it drifts
+            return replace(found, turn=turn), lag + rise if abs(rise) > 0.5 * accuracy else lag
         # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
         slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
         largest = CONTINUATION.largest_lag_step
         step = float(np.clip(-rise / min(slope, -CONTINUATION.least_peak_slope), -largest, largest))
         before = lag, rise
         lag = lag + step if below < lag + step < above else 0.5 * (below + above)
-        balance, start = found.balance, found.at.predicted_h
+        balance, start, near = found.balance, found.at.predicted_h, balance.joint
     return None
 
 
@@ -79,7 +81,7 @@ def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) ->
     held = Balance.frozen(state.balance.joint, state.at.history, state.at.wear_depth)
     state = replace(state, balance=held)
     by_frequency, tangent, joint = frequency_derivative(case, state), held.linearise(state.at), held.joint
-    step = _accurately(tangent, -by_frequency.residual, solver)
+    step = solver.solve(tangent, -by_frequency.residual)
     moved = state.at.displacement_h + by_frequency.length * tangent.transmit(step)[0]
     if joint.penalty.inertial.any():
         ahead = replace(held, joint=by_frequency.ahead).evaluate(state.at.predicted_h)
@@ -91,14 +93,3 @@ def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) ->
     (response, product), (response_ahead, product_ahead) = values
     rise = math.log(abs(response_ahead) / abs(response)) / by_frequency.length
     return rise, -cmath.phase(product_ahead / product) / by_frequency.length
-
-
-def _accurately(tangent: Linearisation, right: FloatArray, solver: JacobianSolver) -> FloatArray:
-    """Step (n_rel, m) with Jacobian times step = right (n_rel, m): more accurate than a Newton direction."""
-    step, left = np.zeros_like(right), right
-    for _ in range(CONTINUATION.derivative_solves):
-        step = step + solver.solve(tangent, left)
-        left = right - tangent.apply(step)
-        if np.linalg.norm(left) <= CONTINUATION.derivative_error * np.linalg.norm(right):
-            break
-    return step

@@ -88,10 +88,6 @@ class ContinuationOptions:
     hundred times as long (`tests/solver/test_phase_lag.py`)."""
     largest_frequency_change: float = 0.02
     """Largest change of the frequency in an iteration, over the frequency."""
-    derivative_solves: int = 4
-    """Most solves for a derivative of the motion, each of which gains the digits of a Newton direction."""
-    derivative_error: float = 1e-5
-    """Relative residual of a derivative of the motion."""
 
     # largest amplitudes over the frequency
     peak_rise: float = 2.0
