@@ -51,8 +51,7 @@ def solve_at_peak(
         rise /= turn
         below, above = (lag, above) if rise > 0.0 else (below, lag)
         if abs(rise) <= accuracy or above - below <= accuracy:
-            # before the lag is too far from that of the largest amplitude: one solve a state while it drifts
-            return replace(found, turn=turn), lag + rise if abs(rise) > 0.5 * accuracy else lag
+            return replace(found, turn=turn), lag
         # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
         slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
         largest = CONTINUATION.largest_lag_step

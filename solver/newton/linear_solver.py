@@ -78,7 +78,7 @@ class JacobianSolver:
         return steps[0], steps[1]
 
     def _near(self, guess: FloatArray | None, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
-        """Step (n_rel, m) as from `solve`; a guess (n_rel, m) is used where its residual is below the right-hand side."""
+        """Step (n_rel, m) as from `solve`, from a guess (n_rel, m) where this is nearer than zero."""
         if guess is None or guess.shape != right.shape:
             return self.solve(tangent, right, rtol)
         left, size = right - tangent.apply(guess), float(np.linalg.norm(right))
