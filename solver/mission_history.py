@@ -125,6 +125,8 @@ def _check_neighbours(before: Block, block: Block, place: int) -> None:
     same = one.n_contact == other.n_contact and (one.area == other.area).all() and one.surface == other.surface
     if not same or ((one.dofs < 0) != (other.dofs < 0)).any():
         raise ValueError(f"{_called(place, block)}: model: give equal contact pairs to all blocks")
+    if before.model.response_names != block.model.response_names:
+        raise ValueError(f"{_called(place, block)}: model: give equal responses to all blocks")
     if block.begin != "continue":
         return
     if before.excitation_amplitude == 0.0:

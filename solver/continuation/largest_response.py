@@ -18,7 +18,9 @@ from solver.continuation.phase_lag import LaggingState, excitation_product, freq
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget
+from solver.options import COMMON
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
@@ -40,7 +42,7 @@ def solve_at_peak(
     """
     below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
     before: tuple[float, float] | None = None
-    for _ in range(CONTINUATION.peak_solves):
+    for _ in range(CONTINUATION.attempts):
         found = solve_at_lag(case, balance, start, lag, solver, budget, most, near)
         if found is None:
             return None
@@ -55,7 +57,7 @@ def solve_at_peak(
         # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
         slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
         largest = CONTINUATION.largest_lag_step
-        step = float(np.clip(-rise / min(slope, -CONTINUATION.least_peak_slope), -largest, largest))
+        step = float(np.clip(-rise / min(slope, -COMMON.negligible), -largest, largest))
         before = lag, rise
         lag = lag + step if below < lag + step < above else 0.5 * (below + above)
         balance, start, near = found.balance, found.at.predicted_h, balance.joint
@@ -64,7 +66,7 @@ def solve_at_peak(
 
 def accepted_rise(rtol: float) -> float:
     """Rise of the logarithm of an amplitude with the phase lag, 1/rad, at which the amplitude counts as the largest."""
-    return min(CONTINUATION.peak_rise * rtol, CONTINUATION.largest_peak_rise)
+    return CONTINUATION.peak_rise * rtol
 
 
 def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) -> tuple[float, float]:
@@ -80,7 +82,9 @@ def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) ->
     held = Balance.frozen(state.balance.joint, state.at.history, state.at.wear_depth)
     state = replace(state, balance=held)
     by_frequency, tangent, joint = frequency_derivative(case, state), held.linearise(state.at), held.joint
-    step = solver.solve(tangent, -by_frequency.residual)
+    # well below the largest rise that is accepted
+    rtol = min(NEWTON.forcing, 0.1 * accepted_rise(case.settings.rtol))
+    step = solver.solve(tangent, -by_frequency.residual, rtol)
     moved = state.at.displacement_h + by_frequency.length * tangent.transmit(step)[0]
     if joint.penalty.inertial.any():
         ahead = replace(held, joint=by_frequency.ahead).evaluate(state.at.predicted_h)

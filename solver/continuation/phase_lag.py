@@ -27,6 +27,7 @@ from solver.newton.iteration import solve_newton
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget
+from solver.options import COMMON
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
@@ -153,7 +154,7 @@ def frequency_derivative(case: Case, state: LaggingState, near: Joint | None = N
     near: the joint at another frequency, where its condensation is known: for a direction of Newton's method.
     """
     joint, at = state.balance.joint, state.at
-    length = CONTINUATION.frequency_difference * joint.omega
+    length = COMMON.difference * joint.omega
     ahead = near
     if ahead is None or abs(ahead.omega - joint.omega) < length:
         ahead = case.joint(joint.omega + length, joint.excitation_amplitude)

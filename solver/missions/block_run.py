@@ -32,6 +32,8 @@ class BlockRun:
     missions (n,): ascending numbers of missions, the first 0.
     growth (n, n_contact): wear depth since the start of the block at these numbers, m.
     response (n, n_response): complex first harmonic, m.
+    peak (n, n_response): largest magnitude over a period, m.
+    response_error (n,): estimated relative error of both.
     failure: reason of the end; the outcome CONVERGED for a regular end.
     start_rate (n_contact,): wear rate at the start, m per cycle.
     start_error: estimated relative error of this rate by harmonics, samples and the way to the start state.
@@ -48,6 +50,8 @@ class BlockRun:
     missions: tuple[int, ...]
     growth: FloatArray
     response: ComplexArray
+    peak: FloatArray
+    response_error: FloatArray
     failure: Failure
     start_rate: FloatArray
     start_error: float = 0.0
@@ -144,6 +148,8 @@ def _read(case: BlockCase, ended: Ended, values: dict[str, Any], start: StartSta
         missions=case.missions,
         growth=values["wear_depth"],
         response=values["response"],
+        peak=values["response_peak"],
+        response_error=values["response_error"],
         failure=ended.failure,
         start_rate=values["depth_rate"][0],
         start_error=float(values["wear_rate_error"][0]),
@@ -178,12 +184,15 @@ def _last(case: BlockCase, ended: Ended, start: StartState) -> StartState:
         response_error=choice.estimate.response,
         wear_rate_error=choice.estimate.wear_rate,
         message="",
-        coarse=None,
+        reference=None,
     )
 
 
 def not_flown(case: BlockCase, failure: Failure, iterations: int) -> BlockRun:
     """A block that was not flown to its end."""
     unknown = np.full((len(case.missions), case.depth.size), np.nan)
-    response = np.full((len(case.missions), len(case.block.model.response_names)), np.nan, complex)
-    return BlockRun(case.missions, unknown, response, failure, unknown[0], iterations=iterations)
+    response = np.full((len(case.missions), len(case.block.model.response_names)), np.nan)
+    return BlockRun(
+        case.missions, unknown, response.astype(complex), response, response[:, 0], failure, unknown[0],
+        iterations=iterations,
+    )  # fmt: skip

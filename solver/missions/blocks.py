@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.loading_history.sweep_start import Sweep
 from solver.model import FloatArray, ReducedModel
@@ -58,6 +60,12 @@ class Block:
     name: str = ""
 
     @property
+    def ends(self) -> tuple[float, float]:
+        """Frequencies at begin and end, Hz."""
+        of = self.frequency
+        return (of.start, of.stop) if isinstance(of, Passage) else (of, of)
+
+    @property
     def steady(self) -> tuple[float, float]:
         """Frequency, Hz, and cycles of a block that is no passage."""
         assert isinstance(self.frequency, float)
@@ -92,6 +100,11 @@ class Mission:
     def area(self) -> FloatArray:
         """Area of the pairs (n_contact,), m2."""
         return self.blocks[0].model.contact.area
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Frequencies (n_block, 2) at begin and end of the blocks, Hz."""
+        return np.array([block.ends for block in self.blocks])
 
     @property
     def reversible(self) -> bool:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.missions.block_run import BlockRun
 from solver.model import ComplexArray, FloatArray
@@ -17,14 +19,20 @@ from solver.wear.state import Failure
 @packable
 @dataclass(frozen=True)
 class Responses:
-    """Responses (n_block, n_response) at begin and end of the blocks of one mission, m, and the number of the mission.
+    """Responses (n_block, n_response) at begin and end of the blocks of one mission.
 
     mission: missions flown before.
+    response_begin, response_end: complex first harmonic, m.
+    response_peak_begin, response_peak_end: largest magnitude over a period, m.
+    response_error (n_block,): estimated relative error of these values.
     """
 
     mission: int
-    begin: ComplexArray
-    end: ComplexArray
+    response_begin: ComplexArray
+    response_end: ComplexArray
+    response_peak_begin: FloatArray
+    response_peak_end: FloatArray
+    response_error: FloatArray
 
 
 @packable
@@ -89,27 +97,27 @@ class MissionCourse:
             found[row] = growth_within(before, after, float(missions[row]))
         return found
 
-    def responses_at(self, missions: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Responses (n, n_block, n_response) at begin and end of the blocks of the mission that ends at each number.
+    def responses_at(self, missions: FloatArray) -> dict[str, NDArray[Any]]:
+        """Values of `Responses` (n, n_block, ...) in the missions that end at some numbers, by name.
 
         They are linear between the missions whose responses are known. At the number 0 those of the first mission.
         """
         known = [of for node in self.nodes for of in node.responses]
-        shape = missions.size, self.nodes[0].growth.shape[0], known[0].begin.shape[1] if known else 0
-        if not known:
-            return np.full(shape, np.nan, complex), np.full(shape, np.nan, complex)
+        names = [each.name for each in fields(Responses)[1:]]
         at, reached = np.array([of.mission for of in known], np.float64), missions <= self.ends[-1]
         wanted = np.clip(missions - 1.0, 0.0, None)
         place = np.clip(np.searchsorted(at, wanted, "right") - 1, 0, len(at) - 1)
         beyond = np.minimum(place + 1, len(at) - 1)
         width = at[beyond] - at[place]
         share = np.clip(np.divide(wanted - at[place], width, out=np.zeros_like(wanted), where=width > 0.0), 0.0, 1.0)
-        read = []
-        for values in (np.array([of.begin for of in known]), np.array([of.end for of in known])):
-            rows = values[place] + share[:, None, None] * (values[beyond] - values[place])
+        read = {}
+        for name in names:
+            values = np.array([getattr(of, name) for of in known])
+            first, weights = values[place], share.reshape(-1, *[1] * (values.ndim - 1))
+            rows = first + weights * (values[beyond] - first)
             rows[~reached] = np.nan
-            read.append(rows)
-        return read[0], read[1]
+            read[name] = rows
+        return read
 
 
 def growth_within(before: MissionNode, after: MissionNode, mission: float) -> FloatArray:
@@ -141,7 +149,17 @@ def responses_of(first: int, runs: tuple[BlockRun, ...]) -> tuple[Responses, ...
     n = runs[0].missions[-1]
     found = []
     for mission in dict.fromkeys((0, n - 1)):
-        begin = [run.response[0 if run.begins_alike else run.missions.index(mission)] for run in runs]
-        end = [run.response[run.missions.index(mission + 1)] for run in runs]
-        found.append(Responses(first + mission, np.array(begin), np.array(end)))
+        begin = [0 if run.begins_alike else run.missions.index(mission) for run in runs]
+        end = [run.missions.index(mission + 1) for run in runs]
+        error = [run.response_error[[one, other]].max() for run, one, other in zip(runs, begin, end, strict=True)]
+        found.append(
+            Responses(
+                first + mission,
+                np.array([run.response[at] for run, at in zip(runs, begin, strict=True)]),
+                np.array([run.response[at] for run, at in zip(runs, end, strict=True)]),
+                np.array([run.peak[at] for run, at in zip(runs, begin, strict=True)]),
+                np.array([run.peak[at] for run, at in zip(runs, end, strict=True)]),
+                np.array(error),
+            )
+        )
     return tuple(found)

@@ -67,12 +67,10 @@ def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: Miss
     depth, volumes = growth.sum(axis=1), growth @ area
     other = np.full_like(depth, np.nan) if reference is None else reference.growth_at(counts).sum(axis=1)
     relative, of_pairs = _errors(counts, fine, reference, (depth, other), area)
-    begin, end = fine.responses_at(counts)
     reached = np.flatnonzero(np.isfinite(relative))
     failure = fine.failure or Failure(Outcome.CONVERGED)
-    values: dict[str, Any] = {"response_begin": begin, "response_end": end}
     history = MissionHistory(
-        **values,
+        **_responses(mission, counts, fine, reference),
         outcome=failure.outcome,
         message=failure.message,
         missions=counts,
@@ -81,6 +79,8 @@ def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: Miss
         wear_depth=depth,
         wear_depth_error=of_pairs,
         block_volume=volumes,
+        block_volume_error=_block_errors(counts, fine, reference, area),
+        excitation_frequency=mission.frequencies,
         reference_volume=other @ area,
         sweep_rate=fine.sweep_rate,
         error_estimate=float(relative[reached[-1]]) if reached.size else math.nan,
@@ -133,6 +133,43 @@ def _errors(
         of_pairs = difference + np.where(depth > 0.0, rest[:, None] * depth, 0.0)
     of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
     return relative, of_pairs
+
+
+def _block_errors(
+    counts: FloatArray, fine: MissionCourse, reference: MissionCourse | None, area: FloatArray
+) -> FloatArray:
+    """Estimated relative errors (n_output, n_block) of the worn volumes of the blocks; see `_errors`."""
+    growth = fine.growth_at(counts)
+    volume = growth @ area
+    other = np.full_like(growth, np.nan) if reference is None else reference.growth_at(counts)
+    apart = ACCURACY.history_safety * np.abs(growth - other) @ area
+    error = np.divide(apart, volume, out=np.zeros_like(volume), where=volume > 0.0)
+    error = np.where(volume > 0.0, np.fmax(error, _start_errors(fine, reference, area)), 0.0)
+    error[(volume > 0.0) & np.isnan(apart)] = np.inf
+    return np.where(np.isfinite(volume), error, np.nan)
+
+
+def _responses(
+    mission: Mission, counts: FloatArray, fine: MissionCourse, reference: MissionCourse | None
+) -> dict[str, Any]:
+    """Responses of the result, with the errors of their states and their difference to the reference solution."""
+    if len(fine.nodes) < 2:
+        nothing = np.full((counts.size, len(mission.blocks), len(mission.blocks[0].model.response_names)), np.nan)
+        names = ("response_begin", "response_end", "response_peak_begin", "response_peak_end")
+        return dict.fromkeys(names, nothing) | {"response_error": nothing[:, :, 0]}
+    found = fine.responses_at(counts)
+    if reference is None or len(reference.nodes) < 2:
+        unknown = np.where(np.isnan(found["response_error"]), np.nan, np.inf)
+        return found | {"response_error": unknown}
+    other, error = reference.responses_at(counts), found["response_error"]
+    for name in found:
+        if name == "response_error":
+            continue
+        size = np.linalg.norm(found[name], axis=2)
+        apart = ACCURACY.history_safety * np.linalg.norm(found[name] - other[name], axis=2)
+        apart[np.isfinite(size) & np.isnan(apart)] = np.inf
+        error = np.fmax(error, np.divide(apart, size, out=np.zeros_like(size), where=size > 0.0))
+    return found | {"response_error": error}
 
 
 def _order_errors(counts: FloatArray, fine: MissionCourse) -> FloatArray:

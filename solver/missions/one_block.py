@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import Sweep
 from solver.missions.blocks import Mission, Passage
 from solver.missions.result import MissionHistory
+from solver.model import IntArray
 from solver.packing import Packed
 from solver.results.history import WearHistory
 from solver.wear.history import integrate_wear
@@ -47,30 +49,39 @@ def integrate_one_block(
     asked = SlowTime(mission.wear_coefficient, "adaptive", cycles * read, law=mission.law, until=mission.until)
     history = integrate_wear(block.model, block.friction_coefficient, mission.settings, start, asked, keep, resume)
     rows, of_begins = np.searchsorted(read, ends), np.searchsorted(read, begins)
-    return _as_missions(history, ends, cycles, rows, (of_begins, np.searchsorted(read, begins + 1.0)))
+    rows_of_missions = of_begins, np.searchsorted(read, begins + 1.0)
+    return _as_missions(history, mission, rows, rows_of_missions)
 
 
 def _as_missions(
-    history: WearHistory, ends: np.ndarray, cycles: float, rows: np.ndarray, mission_rows: tuple[np.ndarray, np.ndarray]
+    history: WearHistory, mission: Mission, rows: IntArray, mission_rows: tuple[IntArray, IntArray]
 ) -> MissionHistory:
     """A wear history in missions. rows: of the missions; mission_rows: of begin and end of the missions before."""
+    _, cycles = mission.blocks[0].steady
     target = history.cycles_to_target / cycles
     volume, error = history.worn_volume[rows], history.worn_volume_error[rows]
     reached = np.flatnonzero(np.isfinite(error))
     at_rate = history.wear_rate[rows[reached[-1]]] * cycles if reached.size else np.nan
-    begin, end = (history.response[at][:, None] for at in mission_rows)
-    begin[~np.isfinite(volume)] = end[~np.isfinite(volume)] = np.nan
+    responses: dict[str, Any] = {}
+    for name in ("response", "response_peak"):
+        for place, at in zip(("begin", "end"), mission_rows, strict=True):
+            responses[f"{name}_{place}"] = np.where(
+                np.isfinite(volume)[:, None, None], getattr(history, name)[at][:, None], np.nan
+            )
+    known = np.fmax(*(history.response_error[at] for at in mission_rows))
     return MissionHistory(
+        **responses,
+        response_error=np.where(np.isfinite(volume), known, np.nan)[:, None],
+        excitation_frequency=mission.frequencies,
         outcome=history.outcome,
         message=history.message,
-        missions=ends,
+        missions=np.array(mission.missions, np.float64),
         worn_volume=volume,
         worn_volume_error=error,
         wear_depth=history.wear_depth[rows],
         wear_depth_error=history.wear_depth_error[rows],
         block_volume=volume[:, None],
-        response_begin=begin,
-        response_end=end,
+        block_volume_error=error[:, None],
         reference_volume=history.reference_volume[rows],
         sweep_rate=np.zeros(1),
         error_estimate=history.error_estimate,

@@ -22,14 +22,17 @@ import numpy as np
 from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.reference import RTOL_RATIO
 from solver.clock import computing_time
+from solver.harmonic_balance.response_peak import largest_responses
 from solver.loading_history.start_states import follow_branch
 from solver.missions.block_run import BlockCase, BlockRun, not_flown
 from solver.missions.blocks import Passage, worn
 from solver.missions.options import MISSIONS
 from solver.model import ComplexArray, FloatArray
+from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.packing import in_rows
 from solver.results.history import StartState
+from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
 from solver.wear.solutions import Like
 from solver.wear.state import Failure
@@ -44,12 +47,14 @@ class SweptState:
     start: the state.
     density (n_contact,): wear in one passage over frequency, m/Hz.
     response (n_response,): complex first harmonic, m.
+    peak (n_response,): largest magnitude over a period, m.
     """
 
     frequency: float
     start: StartState
     density: FloatArray
     response: ComplexArray
+    peak: FloatArray
 
 
 @dataclass(frozen=True)
@@ -87,11 +92,13 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
     by_states = sum(
         _part(first.states, place) @ area * state.start.wear_rate_error for place, state in enumerate(first.states)
     )
-    ends = [states[0].response, *(states[-1].response for _ in case.missions[1:])]
+    ends = [states[0], *(states[-1] for _ in case.missions[1:])]
     found = BlockRun(
         missions=case.missions,
         growth=np.array(case.missions, np.float64)[:, None] * wear,
-        response=np.array(ends),
+        response=np.array([state.response for state in ends]),
+        peak=np.array([state.peak for state in ends]),
+        response_error=np.array([state.start.response_error for state in ends]),
         failure=Failure(Outcome.CONVERGED),
         start_rate=first.wear / passage.cycles,
         start_error=float(by_states + first.error) / volume if volume > 0.0 else 0.0,
@@ -145,7 +152,7 @@ def _swept(case: BlockCase, passage: Passage, depth: FloatArray, aim: float) -> 
 def _between(one: SweptState, other: SweptState) -> list[float]:
     """Further frequencies between two, Hz: both sides of a jump, or the middle."""
     low, high = one.frequency, other.frequency
-    near = MISSIONS.beside_jump * low
+    near = COMMON.negligible * low
     folds = {
         state.start.fold_frequency for state in (one, other) if low + near < state.start.fold_frequency < high - near
     }
@@ -196,8 +203,8 @@ def _states(
         frequency = float(frequencies[index])
         density = work.rate(at) * frequency / abs(passage.rate)
         joint = work.at(begun)
-        response = joint.structure.response_h(joint.to_relative(at.displacement_h))
-        found.append(SweptState(frequency, start, density, response[:, 1] - 1j * response[:, 2]))
+        response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
+        found.append(SweptState(frequency, start, density, response, largest_responses(joint, at)))
     return found
 
 

@@ -18,8 +18,12 @@ class MissionHistory:
       and their propagation, harmonics, samples and start states; 0 where nothing has worn.
     - wear_depth, wear_depth_error (n_output, n_contact): m.
     - block_volume (n_output, n_block): m3, worn volume by block; their sum is `worn_volume`.
+    - block_volume_error (n_output, n_block): estimated relative error of `block_volume`; 0 where a block wears nothing.
     - response_begin, response_end (n_output, n_block, n_response): complex first harmonic, m, at begin and end of each
       block, in the mission that ends at the number, at 0 in the first one.
+    - response_peak_begin, response_peak_end (n_output, n_block, n_response): largest magnitude over a period there, m.
+    - response_error (n_output, n_block): estimated relative error of these responses.
+    - excitation_frequency (n_block, 2): Hz, at begin and end of each block.
     - reference_volume (n_output,): m3, worn volume of the reference solution.
     - sweep_rate (n_block,): `|df/dt| / (zeta f)^2` of each passage, with its half-power width 2 zeta f; 0 where none is
       passed and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).
@@ -40,8 +44,13 @@ class MissionHistory:
     wear_depth: FloatArray
     wear_depth_error: FloatArray
     block_volume: FloatArray
+    block_volume_error: FloatArray
     response_begin: ComplexArray
     response_end: ComplexArray
+    response_peak_begin: FloatArray
+    response_peak_end: FloatArray
+    response_error: FloatArray
+    excitation_frequency: FloatArray
     reference_volume: FloatArray
     sweep_rate: FloatArray
     error_estimate: float

@@ -64,6 +64,12 @@ def test_one_block_is_a_wear_history_to_the_last_bit(flown: tuple[int, float]) -
         np.testing.assert_array_equal(getattr(history, name), getattr(one, name))
     np.testing.assert_array_equal(history.response_end[1:, 0], one.response[1:])
     np.testing.assert_array_equal(history.response_begin[1:, 0], one.response[:-1])
+    np.testing.assert_array_equal(history.response_peak_end[1:, 0], one.response_peak[1:])
+    np.testing.assert_array_equal(history.response_peak_begin[1:, 0], one.response_peak[:-1])
+    np.testing.assert_array_equal(
+        history.response_error[1:, 0], np.fmax(one.response_error[1:], one.response_error[:-1])
+    )
+    np.testing.assert_array_equal(history.excitation_frequency, [[160.0, 160.0]])
     assert history.outcome is one.outcome is Outcome.CONVERGED
 
 
@@ -128,7 +134,9 @@ def exact_run(case: Any, like: Any = None) -> BlockRun:
         growth.append(vectors @ (decay * (modal - values * now)))
     response = np.array([[complex(depth.sum())] for depth in case.depth + np.array(growth)])
     done = Failure(Outcome.CONVERGED)
-    return BlockRun(case.missions, np.array(growth), response, done, rate - loss @ case.depth, like=Like((), 1.0, 1))
+    peak, none = np.abs(response), np.zeros(len(case.missions))
+    start_rate = rate - loss @ case.depth
+    return BlockRun(case.missions, np.array(growth), response, peak, none, done, start_rate, like=Like((), 1.0, 1))
 
 
 @pytest.fixture
@@ -297,6 +305,12 @@ def test_missions_of_the_slider_agree_with_missions_one_by_one_and_go_on_to_the_
     # missions whose responses are known
     np.testing.assert_allclose(many.response_begin[0], once.response_begin[0], rtol=1e-3)
     np.testing.assert_allclose(many.response_end[[0, 2]], once.response_end[[0, 2]], rtol=0.03)
+    for name in ("response_begin", "response_end", "response_peak_begin", "response_peak_end"):
+        one, other = (np.linalg.norm(getattr(of, name), axis=2) for of in (many, once))
+        assert (np.abs(one - other) <= many.response_error * one + once.response_error * other).all()
+    assert (many.response_error < 0.1).all()
+    assert (np.abs(many.block_volume - once.block_volume) <= many.block_volume_error * many.block_volume).all()
+    np.testing.assert_array_equal(many.excitation_frequency, [[160.0, 160.0], [150.0, 150.0]])
     # less load, less friction: the vibration grows
     assert (np.diff(np.abs(once.response_end[:, :, 0]), axis=0)[1:] > 0.0).all()
     assert equal(integrate_missions(mission, resume=kept[-4]), many)
@@ -320,7 +334,7 @@ def test_depths_of_a_table_count_from_the_unworn_joint() -> None:
 def state(frequency: float, density: float, branch: int = 0, response: float = 0.0) -> SweptState:
     nan = float("nan")
     start = StartState(Outcome.CONVERGED, None, nan, Resolution((1,), 4), 0.0, 0.0, 0, 0.0, branch, 1.5)
-    return SweptState(frequency, start, np.array([density]), np.array([response + 0j]))
+    return SweptState(frequency, start, np.array([density]), np.array([response + 0j]), np.array([response]))
 
 
 def test_the_error_of_the_trapezoidal_rule_is_known_on_both_sides_of_a_jump() -> None:

@@ -1,0 +1,73 @@
+"""Wear of a passage through a resonance, by time integration, over the wear of its steady states.
+
+`python -m tests.benchmarks.run_up [--scene sdof_slider] [--rates 0.1 0.3 1 3]` prints both for some sweep rates, each
+as |df/dt| / (zeta f)^2. The time integration is that of `time_integration`: the phase of the excitation runs with the
+frequency, up or down, and the slip work is summed at constant depth.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from solver import Block, Passage, SolverSettings, integrate_mission
+from solver.model import FloatArray, ReducedModel
+from studies import build_scene
+from tests.benchmarks.time_integration import advance, at_rest, build, settle
+
+FRICTION, WEAR = 0.5, 1.1e-11
+CASES = {
+    "sdof_slider": ({"damping": 6.0, "normal_stiffness": 0.0}, (180.0, 220.0), 10.0),
+    "dovetail_sector": ({"mesh": 1}, (209.0, 214.0), 0.5),
+}
+"""Changes of the scene, range, Hz, and amplitude, N."""
+
+
+def time_integrated(model: ReducedModel, passage: Passage, amplitude: float, n_steps: int) -> FloatArray:
+    """Slip work of the pairs (n_contact,), J, of a passage at constant depth, begun with the settled motion."""
+    gap, middle = model.contact.gap, 0.5 * (passage.start + passage.stop)
+    structure = build(model, FRICTION, passage.start, amplitude, n_steps)
+    motion, _ = settle(structure, at_rest(model, structure, gap), gap)
+    # equal steps, with weights for the middle of the range
+    structure = build(model, FRICTION, middle, amplitude, n_steps)
+    rate = passage.rate * np.sign(passage.stop - passage.start)
+    n_all = int(np.ceil(abs(passage.stop - passage.start) / passage.rate / structure.step))
+    work = np.zeros(model.contact.n_contact)
+    for first in range(0, n_all, 20 * n_steps):
+        at = structure.step * (np.arange(first, min(first + 20 * n_steps, n_all)) + 1.0)
+        phase = 2.0 * np.pi * (passage.start * at + 0.5 * rate * at**2)
+        varying = np.outer(np.cos(phase), structure.cosine) + np.outer(np.sin(phase), structure.sine)
+        motion = advance(structure, motion, gap, structure.static + varying)
+        work += motion.work
+    return work
+
+
+def main() -> None:
+    """Both wears for each rate and direction."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scene", choices=CASES, default="sdof_slider")
+    parser.add_argument("--rates", type=float, nargs="+", default=[0.1, 0.3, 1.0, 3.0])
+    parser.add_argument("--steps", type=int, default=400)
+    given = parser.parse_args()
+    changes, ends, amplitude = CASES[given.scene]
+    model = build_scene(given.scene, **changes)
+    for start, stop in (ends, ends[::-1]):
+        slow = Passage(start, stop, 1.0)
+        block = Block(model, slow, amplitude, FRICTION, begin=slow.sweep)
+        history = integrate_mission((replace(block, cycles=None),), 1e-30, 1, settings=SolverSettings())
+        volume, unit = float(history.worn_volume[-1]) / 1e-30, float(history.sweep_rate[0])
+        print(f"{slow.sweep}: steady states, 1 Hz/s = {unit:.3g} (zeta f)^2: {history.message}", flush=True)
+        for rate in given.rates:
+            began = time.process_time()
+            passage = replace(slow, rate=rate / unit)
+            work = time_integrated(model, passage, amplitude, given.steps)
+            ratio = float(work.sum()) / (volume / passage.rate)
+            spent = time.process_time() - began
+            print(f"  {rate:.3g} (zeta f)^2, {passage.rate:.3g} Hz/s: {ratio:.4f}, {spent:.0f} CPU s", flush=True)
+
+
+if __name__ == "__main__":
+    main()
