@@ -42,7 +42,10 @@ def print_brute_force(model: ReducedModel, word: Followed) -> None:
     """Frequencies of a history beside those of the responses around its states."""
     cycles = np.linspace(0.0, 1e5, STEPS + 1)
     history = followed_states(model, FollowedFrequency(word, *BETWEEN), LOAD, WEAR, cycles)
-    for state, error in zip(history.states[:: STEPS // 10], history.errors[:: STEPS // 10], strict=True):
+    counts = np.array([state.cycle for state in history.states])
+    # a step whose end is not found is divided: the states at the tenths are not evenly numbered
+    for place in (int(np.argmin(abs(counts - tenth))) for tenth in cycles[:: STEPS // 10]):
+        state, error = history.states[place], history.errors[place]
         width = 4.0 * error if word == "resonance" else 2.0 * error
         frequencies, (products, responses) = responses_around(history.work, state, width, 6)
         quadrature, largest = in_quadrature(frequencies, products), at_maximum(frequencies, responses)
