@@ -22,7 +22,7 @@ from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget
 from solver.options import COMMON
 from solver.structure.fourier import to_complex
-from solver.structure.joint import Case
+from solver.structure.joint import Case, Joint
 
 
 def solve_at_peak(
@@ -33,6 +33,7 @@ def solve_at_peak(
     solver: JacobianSolver,
     budget: Budget,
     most: int | None = None,
+    near: Joint | None = None,
 ) -> tuple[LaggingState, float] | None:
     """The state of the largest amplitude near a phase lag, rad, and its lag; None where it is not found.
 
@@ -42,7 +43,7 @@ def solve_at_peak(
     below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
     before: tuple[float, float] | None = None
     for _ in range(CONTINUATION.attempts):
-        found = solve_at_lag(case, balance, start, lag, solver, case.settings.tolerance, budget, most)
+        found = solve_at_lag(case, balance, start, lag, solver, budget, most, near)
         if found is None:
             return None
         rise, turn = rise_of_response(case, found, solver)
@@ -59,7 +60,7 @@ def solve_at_peak(
         step = float(np.clip(-rise / min(slope, -COMMON.negligible), -largest, largest))
         before = lag, rise
         lag = lag + step if below < lag + step < above else 0.5 * (below + above)
-        balance, start = found.balance, found.at.predicted_h
+        balance, start, near = found.balance, found.at.predicted_h, balance.joint
     return None
 
 
@@ -81,8 +82,9 @@ def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) ->
     held = Balance.frozen(state.balance.joint, state.at.history, state.at.wear_depth)
     state = replace(state, balance=held)
     by_frequency, tangent, joint = frequency_derivative(case, state), held.linearise(state.at), held.joint
-    # the rise is a small difference: two more digits than a Newton direction
-    step = solver.solve(tangent, -by_frequency.residual, NEWTON.forcing**2)
+    # well below the largest rise that is accepted
+    rtol = min(NEWTON.forcing, 0.1 * accepted_rise(case.settings.rtol))
+    step = solver.solve(tangent, -by_frequency.residual, rtol)
     moved = state.at.displacement_h + by_frequency.length * tangent.transmit(step)[0]
     if joint.penalty.inertial.any():
         ahead = replace(held, joint=by_frequency.ahead).evaluate(state.at.predicted_h)

@@ -78,9 +78,9 @@ def solve_at_lag(
     start: FloatArray,
     lag: float,
     solver: JacobianSolver,
-    tolerance: float,
     budget: Budget,
     most: int | None = None,
+    near: Joint | None = None,
 ) -> LaggingState | None:
     """The state with a given lag; None where Newton's method fails.
 
@@ -94,10 +94,13 @@ def solve_at_lag(
         First predicted force, N.
     lag : float
         rad, between 0 and pi.
-    solver, tolerance, budget, most
+    solver, budget, most
         As in `solve_balance`.
+    near : Joint, optional
+        Joint at a frequency near the first one, for the derivative by the frequency.
     """
     shape, unit, amplitude = start.shape, cmath.exp(1j * lag), balance.joint.excitation_amplitude
+    tolerance = case.settings.tolerance
 
     def error(product: complex) -> float:
         return -(unit * product).imag / max(abs(product), 1e-300)
@@ -107,13 +110,14 @@ def solve_at_lag(
         at = here.evaluate(unknown[:-1].reshape(shape))
         return LaggingState(here, at, error(excitation_product(here.joint, at.displacement_h)))
 
-    turn = math.nan
+    turn, before = math.nan, near
 
     def direction(state: LaggingState) -> FloatArray:
-        nonlocal turn
+        nonlocal turn, before
         budget.check_time()
         rtol = max(NEWTON.forcing, 0.1 * tolerance / max(state.scaled_residual(), tolerance))
-        tangent, by_frequency = state.balance.linearise(state.at), frequency_derivative(case, state)
+        tangent, by_frequency = state.balance.linearise(state.at), frequency_derivative(case, state, before)
+        before = state.balance.joint
         steps = solver.solve_two(tangent, -state.at.residual, -by_frequency.residual, rtol)
         own, with_frequency = (_product_change(tangent, step) for step in steps)
         product = excitation_product(state.balance.joint, state.at.displacement_h)
@@ -144,11 +148,17 @@ class FrequencyDerivative:
     length: float
 
 
-def frequency_derivative(case: Case, state: LaggingState) -> FrequencyDerivative:
-    """Derivatives at a state, by differences; the motion of masses on rigid ground depends on the frequency, too."""
+def frequency_derivative(case: Case, state: LaggingState, near: Joint | None = None) -> FrequencyDerivative:
+    """Derivatives at a state, by differences; the motion of masses on rigid ground depends on the frequency, too.
+
+    near: the joint at another frequency, where its condensation is known: for a direction of Newton's method.
+    """
     joint, at = state.balance.joint, state.at
     length = COMMON.difference * joint.omega
-    ahead = case.joint(joint.omega + length, joint.excitation_amplitude)
+    ahead = near
+    if ahead is None or abs(ahead.omega - joint.omega) < length:
+        ahead = case.joint(joint.omega + length, joint.excitation_amplitude)
+    length = ahead.omega - joint.omega
     moved = at.displacement_h
     if joint.penalty.inertial.any():
         other = replace(state.balance, joint=ahead).evaluate(at.predicted_h)

@@ -26,12 +26,13 @@ class JacobianSolver:
 
     _factor: Factor | None = field(default=None, repr=False)
     _recycled: Recycled = field(default_factory=Recycled, repr=False)
+    _by_parameter: FloatArray | None = field(default=None, repr=False)
     _epoch: int = field(default=0, repr=False)
 
     def renew(self, epoch: int) -> None:
         """Drop the factorisation unless it was kept in this epoch of a journal (`solver.newton.journal`)."""
         if epoch != self._epoch:
-            self._factor, self._recycled, self._epoch = None, Recycled(), epoch
+            self._factor, self._recycled, self._by_parameter, self._epoch = None, Recycled(), None, epoch
 
     def solve(self, tangent: Linearisation, right: FloatArray, rtol: float = NEWTON.forcing) -> FloatArray:
         """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
@@ -53,11 +54,17 @@ class JacobianSolver:
     def solve_two(
         self, tangent: Linearisation, first: FloatArray, second: FloatArray, rtol: float = NEWTON.forcing
     ) -> tuple[FloatArray, FloatArray]:
-        """Steps (n_rel, m) for two right-hand sides; a small system is factorised once."""
+        """Steps (n_rel, m) for two right-hand sides; a small system is factorised once.
+
+        The second one is that of a parameter. Its step changes little from solve to solve: a large system is solved for
+        the difference to the step before.
+        """
         pairs = tangent.active()
         rows = tangent.joint.rows_of(pairs)
         if not rows.size or not is_dense_cheapest(rows.size * first.shape[1], rows.size):
-            return self.solve(tangent, first, rtol), self.solve(tangent, second, rtol)
+            step = self.solve(tangent, first, rtol)
+            self._by_parameter = self._near(self._by_parameter, tangent, second, rtol)
+            return step, self._by_parameter
         both = np.stack([first[rows].ravel(), second[rows].ravel()], axis=1)
         solved = _solve_dense(tangent.dense(pairs), both)
         steps = []
@@ -69,6 +76,16 @@ class JacobianSolver:
             step[rest] = (right - tangent.apply_roughly(step))[rest]
             steps.append(step)
         return steps[0], steps[1]
+
+    def _near(self, guess: FloatArray | None, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
+        """Step (n_rel, m) as from `solve`, from a guess (n_rel, m) where this is nearer than zero."""
+        if guess is None or guess.shape != right.shape:
+            return self.solve(tangent, right, rtol)
+        left, size = right - tangent.apply(guess), float(np.linalg.norm(right))
+        fraction = float(np.linalg.norm(left)) / max(size, 1e-300)
+        if not fraction < 1.0:
+            return self.solve(tangent, right, rtol)
+        return guess + self.solve(tangent, left, rtol / max(fraction, rtol))
 
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.

@@ -47,12 +47,12 @@ def end_at_resonance(
         As in `solve_balance`.
     """
     found: LaggingState | None
-    lag = state.lag
+    lag, near = state.lag, case.joint(state.omega, balance.joint.excitation_amplitude)
     if follow.of == "peak":
-        peak = solve_at_peak(case, balance, start, lag, solver, budget, most)
+        peak = solve_at_peak(case, balance, start, lag, solver, budget, most, near)
         found, lag = (None, lag) if peak is None else peak
     else:
-        found = solve_at_lag(case, balance, start, lag, solver, case.settings.tolerance, budget, most)
+        found = solve_at_lag(case, balance, start, lag, solver, budget, most, near)
     if found is None:
         return None
     turn = abs(found.turn)

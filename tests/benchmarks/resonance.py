@@ -1,92 +1,93 @@
-"""A followed resonance of the dovetail root against responses of the worn joint over the frequency, and cost.
+"""A followed resonance of the dovetail root against the responses around its states, and what following costs.
 
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.resonance
 
-For each tenth of 1e5 cycles: frequency and amplitude of the history with their errors, and those of a sweep up of the
-joint as it is worn at this count. The sweep has a friction history of its own, which the worn joint did not have: after
-1e4 cycles both differ by 0.01 Hz and 1 %, later by more than any error (at a given frequency a worn joint of a history
-and a sweep of the same depths differ by as much).
-Then the CPU time of a followed step over that of a step at a fixed frequency, from the same start, in one process.
+For each tenth of 1e5 cycles: frequency of the history with its error, and the frequency that the responses around this
+state have in quadrature with the excitation, or where they are largest (`tests.followed_states`). A sweep of its own to
+the worn joint would have another friction history than the joint that has worn: after 1e4 cycles both differ by 0.01 Hz
+and 1 %, later by more than any error. At a given frequency they differ by as much.
+Then the CPU time and the Newton iterations of a history with followed frequency over those at the first frequency, from
+the same start, in one process, without start states and reference solutions.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from solver import frequency_response, march_wear
 from solver.clock import computing_time
-from solver.model import ComplexArray, FloatArray, ReducedModel
-from solver.settings import FOLLOWED, Followed
+from solver.loading_history.start_states import follow_branch
+from solver.model import ReducedModel
+from solver.results.history import StartState
+from solver.settings import FOLLOWED, Followed, FollowedFrequency, Scheme, SolverSettings
+from solver.structure.joint import build_case
+from solver.wear.solutions import SlowTime, Solutions
 from studies import build_scene
+from tests.followed_states import at_maximum, followed_states, in_quadrature, responses_around
 
 BETWEEN = (205.0, 220.0)  # Hz
 LOAD, FRICTION, WEAR = 0.5, 0.5, 1.1e-11  # N, 1, 1/Pa
+STEPS = 100  # of 1e5 cycles
 
 
 def main() -> None:
     """Print both tables."""
     model = build_scene("dovetail_sector", mesh=1)
-    print_cost(model)
     for word in FOLLOWED:
         print_brute_force(model, word)
+    for scheme in ("adaptive", "implicit"):
+        print_cost(model, scheme)
 
 
 def print_brute_force(model: ReducedModel, word: Followed) -> None:
-    """Frequencies and amplitudes of a history beside those of sweeps of the worn joint."""
-    history = march_wear(model, word, LOAD, FRICTION, WEAR, np.linspace(0.0, 1e5, 11), between=BETWEEN)
-    print(f"{word}: {history.outcome.meaning}, {1e9 * history.worn_volume[-1]:.4g} mm3")
-    for row, depth in enumerate(history.wear_depth):
-        found, error = history.excitation_frequency[row], history.excitation_frequency_error[row]
-        around = found + (np.linspace(-0.2, 0.2, 9) if word == "peak" else np.linspace(-0.05, 0.05, 5))
-        answer = frequency_response(model, around, LOAD, FRICTION, wear_depth=depth).response[:, 0]
-        place, size = (_largest if word == "peak" else _in_quadrature)(around, answer)
+    """Frequencies of a history beside those of the responses around its states."""
+    cycles = np.linspace(0.0, 1e5, STEPS + 1)
+    history = followed_states(model, FollowedFrequency(word, *BETWEEN), LOAD, WEAR, cycles)
+    counts = np.array([state.cycle for state in history.states])
+    # a step whose end is not found is divided: the states at the tenths are not evenly numbered
+    for place in (int(np.argmin(abs(counts - tenth))) for tenth in cycles[:: STEPS // 10]):
+        state, error = history.states[place], history.errors[place]
+        width = 4.0 * error if word == "resonance" else 2.0 * error
+        frequencies, (products, responses) = responses_around(history.work, state, width, 6)
+        quadrature, largest = in_quadrature(frequencies, products), at_maximum(frequencies, responses)
+        here = state.omega / (2.0 * np.pi)
+        amplitude = abs(responses[np.argmin(abs(frequencies - here))])
         print(
-            f"{history.cycles[row]:8.0f} cycles  {found:.4f} +- {error:.4f} Hz, sweep {place:.4f} Hz;"
-            f"  {1e3 * abs(history.response[row, 0]):.4f} mm +- {100 * history.response_error[row]:.2g} %,"
-            f" sweep {1e3 * size:.4f} mm",
+            f"{word} {state.cycle:8.0f} cycles: {here:.5f} +- {error:.5f} Hz, in quadrature {quadrature:.5f},"
+            f" largest {largest:.5f} Hz; {1e3 * amplitude:.4f} mm, largest {1e3 * abs(responses).max():.4f} mm"
+            f" from {frequencies[0]:.4f} to {frequencies[-1]:.4f} Hz",
             flush=True,
         )
 
 
-def _in_quadrature(frequency: FloatArray, response: ComplexArray) -> tuple[float, float]:
-    """Frequency, Hz, and amplitude, m, where the tip moves in quadrature with the load, which acts there."""
-    real = np.polynomial.Polynomial.fit(frequency, response.real, 2)
-    roots = real.roots()
-    place = float(roots[np.argmin(abs(roots - frequency.mean()))].real)
-    return place, float(abs(np.polynomial.Polynomial.fit(frequency, response.imag, 2)(place)))
+def print_cost(model: ReducedModel, scheme: Scheme) -> None:
+    """CPU time and iterations of 1e4 cycles with followed frequency over those at the first frequency."""
+    settings, resonance = SolverSettings(), FollowedFrequency("resonance", *BETWEEN)
+    ((_, followed),) = follow_branch(model, FRICTION, LOAD, resonance, "up", settings)
+    assert followed.state is not None
+    at = np.array([followed.state.omega / (2.0 * np.pi)])
+    ((_, fixed),) = follow_branch(model, FRICTION, LOAD, at, "up", settings)
+    given: list[tuple[str, StartState, FollowedFrequency | None]] = [("fixed", fixed, None)]
+    given += [(word, followed, FollowedFrequency(word, *BETWEEN)) for word in FOLLOWED]
+    first = None
+    for word, start, follow in given:
+        spent, iterations = zip(*(_spent(model, start, scheme, follow) for _ in range(3)), strict=True)
+        first = first or (min(spent), iterations[0])
+        print(
+            f"{scheme} {word}: {min(spent):.2f} s, {min(spent) / first[0]:.2f} of fixed;"
+            f" {iterations[0]} iterations, {iterations[0] / first[1]:.2f} of fixed",
+            flush=True,
+        )
 
 
-def _largest(frequency: FloatArray, response: ComplexArray) -> tuple[float, float]:
-    """Frequency, Hz, and size, m, of the largest amplitude.
-
-    An amplitude that is known to 1e-3 places the flat top within 0.02 Hz only.
-    """
-    curve = np.polynomial.Polynomial.fit(frequency, abs(response), 4)
-    fine = np.linspace(frequency[0], frequency[-1], 2001)
-    place = float(fine[np.argmax(curve(fine))])
-    return place, float(curve(place))
-
-
-def print_cost(model: ReducedModel) -> None:
-    """CPU time of 40 followed steps over that of 40 steps at the first frequency."""
-    first = march_wear(model, "resonance", LOAD, FRICTION, 0.0, 0.0, between=BETWEEN)
-    given: tuple[float | Followed, ...] = (float(first.excitation_frequency[0]), *FOLLOWED)
-    seconds = []
-    for frequency in given:
-        between = BETWEEN if isinstance(frequency, str) else None
-        starting, whole = (_seconds(model, frequency, between, cycles) for cycles in (0.0, 1e4))
-        seconds.append(whole - starting)
-        ratio = seconds[-1] / seconds[0]
-        print(f"{frequency}: start {starting:.2f} s, 40 steps {seconds[-1]:.2f} s, {ratio:.2f} of given", flush=True)
-
-
-def _seconds(
-    model: ReducedModel, frequency: float | Followed, between: tuple[float, float] | None, cycles: float
-) -> float:
-    """CPU time of a history, s."""
+def _spent(
+    model: ReducedModel, start: StartState, scheme: Scheme, follow: FollowedFrequency | None
+) -> tuple[float, int]:
+    """CPU time, s, and Newton iterations of a history."""
+    case = build_case(model, FRICTION, start.penalty_omega, SolverSettings(), start.resolution)
+    asked = SlowTime(WEAR, scheme, np.array([0.0, 1e4]), 250.0, follow=follow)
     began = computing_time()
-    march_wear(model, frequency, LOAD, FRICTION, WEAR, cycles, scheme="implicit", step=250.0, between=between)
-    return computing_time() - began
+    ended = Solutions(case, start, asked).history()
+    return computing_time() - began, ended.iterations
 
 
 if __name__ == "__main__":

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from solver import frequency_response, march_wear
+from solver import march_wear
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.history import StartState, WearHistory
 from solver.settings import Followed, FollowedFrequency, Scheme, SolverSettings
 from solver.wear.options import WEAR as WEAR_OPTIONS
+from tests.followed_states import at_maximum, followed_states, in_quadrature, responses_around
 from tests.references import slider_orbit
 from tests.solver.models import march_wear as march_from
 from tests.solver.models import scene
@@ -84,18 +85,22 @@ def test_the_largest_amplitude_is_that_of_the_exact_motion() -> None:
 
 
 @pytest.mark.slow
-def test_of_two_masses_no_response_around_is_larger() -> None:
-    """Brute force: responses over the frequency; the friction is constant, so that the joint does not change."""
-    model, settings = scene("two_masses"), SolverSettings(harmonics=5, samples=128)
-    history = march_wear(model, "peak", 20.0, 0.5, 0.0, [0.0, 1.0], between=(0.08, 0.15), settings=settings)
-    assert history.outcome is Outcome.CONVERGED
-    found, error = history.excitation_frequency[0], history.excitation_frequency_error[0]
-    around = np.linspace(0.998, 1.002, 7) * found
-    sizes = abs(frequency_response(model, around, 20.0, 0.5, settings=settings).response[:, 0])
-    curve = np.polynomial.Polynomial.fit(around, sizes, 4)
-    expected = brentq(curve.deriv(), around[1], around[-2])
-    assert abs(found - expected) < error
-    assert abs(history.response[0, 0]) == pytest.approx(curve(expected), rel=1e-3)
+@pytest.mark.parametrize("word", ["resonance", "peak"])
+def test_the_responses_around_a_worn_state_have_the_frequency_of_the_history(word: Followed) -> None:
+    """Brute force: from the state of the history the frequency moves away, its depth and friction history kept."""
+    model = scene("sdof_slider", damping=DAMPING)
+    history = followed_states(model, FollowedFrequency(word, *BETWEEN), 10.0, WEAR, CYCLES)
+    assert [state.cycle for state in history.states] == pytest.approx(list(CYCLES))
+    for state, error in zip(history.states, history.errors, strict=True):
+        width = (4.0 if word == "resonance" else 2.0) * error
+        frequencies, (products, responses) = responses_around(history.work, state, width, 4)
+        assert len(frequencies) == 9
+        quadrature, largest = in_quadrature(frequencies, products), at_maximum(frequencies, responses)
+        here, other = (quadrature, largest) if word == "resonance" else (largest, quadrature)
+        found = state.omega / (2.0 * math.pi)
+        assert abs(found - here) < (1e-3 if word == "resonance" else 1.0) * error
+        # both differ by more than the error of phase resonance: the test tells them apart
+        assert not abs(found - other) < 0.02
 
 
 @pytest.mark.slow

@@ -86,9 +86,12 @@ def test_two_right_sides_are_solved_as_one_by_one() -> None:
     for kinds in (("3d", "normal_only"), ("3d",) * 14):
         balance, predicted = random_balance(random_model(3, kinds), SolverSettings(3, 24), 4, wear=False)
         tangent = balance.linearise(balance.evaluate(predicted))
-        first, second = np.random.default_rng(5).normal(size=(2, *predicted.shape))
-        for right, step in zip((first, second), JacobianSolver().solve_two(tangent, first, second), strict=True):
-            assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
+        first, second, noise = np.random.default_rng(5).normal(size=(3, *predicted.shape))
+        solver = JacobianSolver()
+        # a second side near the one before, equal to it, and far from it
+        for other in (second, second + 1e-2 * noise, second + 1e-2 * noise, noise):
+            for right, step in zip((first, other), solver.solve_two(tangent, first, other), strict=True):
+                assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
 
 
 def test_ritz_values_of_a_whole_space_are_the_eigenvalues() -> None:
