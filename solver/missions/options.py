@@ -9,17 +9,10 @@ from dataclasses import dataclass
 class MissionOptions:
     """Lengths and limits: for each its meaning, its unit (none: a ratio) and the evidence for its value."""
 
-    step_error_fraction: float = 0.5
-    """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of
-    rtol, as in `WearOptions`."""
-    largest_step_ratio: int = 4
-    """Largest ratio of two successive steps."""
-    smallest_step_ratio: int = 4
-    """Largest division of a step that was refused."""
-    step_safety: float = 0.85
-    """Length of a step over the length with the allowed error."""
-    first_step: int = 2
-    """Missions of the first step: the shortest that has an estimated error."""
+    step_iterations: int = 6
+    """Most missions flown for a step, whose depth is found by Newton's method. Sliders and roots need 1 to 3."""
+    depth_tolerance: float = 0.1
+    """Last correction of this depth, as worn volume, over the allowed error of the step."""
 
     # passages
     first_frequencies: int = 17

@@ -6,6 +6,7 @@ preconditioner.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -50,25 +51,24 @@ class JacobianSolver:
         step[rest] = (right - tangent.apply_roughly(step))[rest]
         return step
 
-    def solve_two(
-        self, tangent: Linearisation, first: FloatArray, second: FloatArray, rtol: float = NEWTON.forcing
-    ) -> tuple[FloatArray, FloatArray]:
-        """Steps (n_rel, m) for two right-hand sides; a small system is factorised once."""
+    def solve_all(
+        self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = NEWTON.forcing
+    ) -> list[FloatArray]:
+        """Steps (n_rel, m) for several right-hand sides; a small system is factorised once."""
         pairs = tangent.active()
         rows = tangent.joint.rows_of(pairs)
-        if not rows.size or not is_dense_cheapest(rows.size * first.shape[1], rows.size):
-            return self.solve(tangent, first, rtol), self.solve(tangent, second, rtol)
-        both = np.stack([first[rows].ravel(), second[rows].ravel()], axis=1)
-        solved = _solve_dense(tangent.dense(pairs), both)
+        if not rows.size or not is_dense_cheapest(rows.size * rights[0].shape[1], rows.size):
+            return [self.solve(tangent, right, rtol) for right in rights]
+        solved = _solve_dense(tangent.dense(pairs), np.stack([right[rows].ravel() for right in rights], axis=1))
         steps = []
-        for right, column in ((first, solved[:, 0]), (second, solved[:, 1])):
+        for right, column in zip(rights, solved.T, strict=True):
             step = np.zeros_like(right)
             step[rows] = column.reshape(rows.size, -1)
             rest = np.ones(right.shape[0], bool)
             rest[rows] = False
             step[rest] = (right - tangent.apply_roughly(step))[rest]
             steps.append(step)
-        return steps[0], steps[1]
+        return steps
 
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.

@@ -87,7 +87,7 @@ def test_two_right_sides_are_solved_as_one_by_one() -> None:
         balance, predicted = random_balance(random_model(3, kinds), SolverSettings(3, 24), 4, wear=False)
         tangent = balance.linearise(balance.evaluate(predicted))
         first, second = np.random.default_rng(5).normal(size=(2, *predicted.shape))
-        for right, step in zip((first, second), JacobianSolver().solve_two(tangent, first, second), strict=True):
+        for right, step in zip((first, second), JacobianSolver().solve_all(tangent, (first, second)), strict=True):
             assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
 
 
