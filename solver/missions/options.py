@@ -21,8 +21,6 @@ class MissionOptions:
     """Most frequencies of a passage."""
     frequency_error: float = 0.25
     """Allowed error of the wear of a passage by its frequencies, as a fraction of rtol."""
-    beside_jump: float = 1e-6
-    """Fraction of the frequency of a jump: distance of the states before and behind it."""
     largest_sweep_rate: float = 0.3
     """|df/dt| / (zeta f)^2 above which a message says that a passage is too fast for steady states."""
 

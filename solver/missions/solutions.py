@@ -17,13 +17,13 @@ from solver.missions.course import MissionCourse, MissionNode, growth_within
 from solver.missions.passage import run_passage
 from solver.missions.step import Fly, Step, take_step
 from solver.model import FloatArray
+from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable
 from solver.results.history import StartState
 from solver.wear.control import allowed_error, next_ratio
 from solver.wear.integrate import guarded
 from solver.wear.interpolation import fraction_where
-from solver.wear.options import WEAR
 from solver.wear.state import Failure
 
 
@@ -107,7 +107,7 @@ class MissionSolutions:
         if isinstance(step, Failure):
             if length == 1 or step.outcome is Outcome.TIME_LIMIT:
                 return replace(progress, course=replace(course, failure=step))
-            return replace(progress, length=max(int(WEAR.smallest_step_ratio * length), 1))
+            return replace(progress, length=max(int(COMMON.smallest_step_ratio * length), 1))
         volumes = [float(of.depth @ self.mission.area) for of in (node, step.node)]
         error = step.error / allowed(*volumes, node.mission, length)
         if error > 1.0 and length > 1:

@@ -12,6 +12,7 @@ import numpy as np
 
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import vibration_change
+from solver.options import COMMON
 from solver.settings import Scheme
 from solver.wear.bdf2 import bdf2_attempt
 from solver.wear.options import WEAR
@@ -55,7 +56,7 @@ class GivenSteps:
         planned = self.length
         if self.end == np.inf:
             slower = float(state.rates.largest[-1] / state.rates.value[-1])
-            planned = min(WEAR.largest_step_ratio * state.length, self.length * slower)
+            planned = min(COMMON.largest_step_ratio * state.length, self.length * slower)
         if self.largest_depth is not None and self.scheme == "explicit":
             planned = self.largest_depth / float(work.rate(state.point.evaluation).max())
         # no extra step for a remainder below the round-off of the count
@@ -99,7 +100,7 @@ class AdaptiveSteps:
         shortest = max(0.5 * WEAR.fold_resolution * state.cycle, WEAR.shortest_slow_step * state.first_length)
         while True:
             tried = bdf2_attempt(work, state, length)
-            shorter = WEAR.smallest_step_ratio
+            shorter = COMMON.smallest_step_ratio
             if tried is not None:
                 size = float(np.abs(tried.error) @ work.area)
                 before, after = (float(at @ work.area) for at in (state.depth, tried.end.point.evaluation.wear_depth))
@@ -124,7 +125,7 @@ def allowed_error(rtol: float, before: float, after: float, count: float, length
     count, length: count at its start, and its length, in cycles or in missions.
     """
     at_mean_rate = after * length / (count + length)
-    return max(WEAR.step_error_fraction * rtol * max(after - before, at_mean_rate), 1e-300)
+    return max(COMMON.step_error_fraction * rtol * max(after - before, at_mean_rate), 1e-300)
 
 
 def next_ratio(error: float, *, accepted: bool) -> float:
@@ -132,6 +133,6 @@ def next_ratio(error: float, *, accepted: bool) -> float:
 
     error: of the present step, over the allowed error.
     """
-    wanted = WEAR.step_safety / np.sqrt(max(error, 1e-12))
-    least, most = WEAR.refused_step_ratio, WEAR.largest_step_ratio
-    return float(np.clip(wanted, *((least, most) if accepted else (WEAR.smallest_step_ratio, least))))
+    wanted = COMMON.step_safety / np.sqrt(max(error, 1e-12))
+    least, most = COMMON.step_safety, COMMON.largest_step_ratio
+    return float(np.clip(wanted, *((least, most) if accepted else (COMMON.smallest_step_ratio, least))))

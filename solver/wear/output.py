@@ -81,7 +81,7 @@ class Course:
 
     def after(self, cycle: float, depth: FloatArray, rate: float, resolution: Resolution) -> Course:
         """The course with the end of another step."""
-        kept = slice(0, None, 2 if len(self.cycles) >= WEAR.course_steps else 1)
+        kept = slice(0, None, 2 if len(self.cycles) >= WEAR.kept_steps else 1)
         changed = not self.resolutions or self.resolutions[-1][1] != resolution
         return Course(
             ends=(*self.ends, cycle),

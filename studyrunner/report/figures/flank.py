@@ -22,6 +22,7 @@ from studyrunner.report.drawing import (
     set_from_zero,
 )
 from studyrunner.report.isolines import add_colour_bar, add_isolines
+from studyrunner.report.reading.choice import choose
 from studyrunner.report.reading.flanks import Flank, find_flanks
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
@@ -68,7 +69,7 @@ def draw_depths(result: Result) -> Drawing:
     """Wear depth per pair at the last cycle count, one series a scheme (Fig. 5)."""
     shown = result.shown_point()
     course = result.course_axis
-    choice = result.choose([course] if course else [], _MOST_SERIES)
+    choice = choose(result, [course] if course else [], _MOST_SERIES)
     pairs, last = result.dataset["contact"].values, result.last_kept(shown)
     series = [(last_depth(result, {**shown, **point}), label) for point, label in choice]
     series = [(depth, label) for depth, label in series if not np.isnan(depth).all()]

@@ -24,7 +24,7 @@ from studyrunner.report.drawing import (
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.volume_marks import draw_band, draw_bars, mark_care, mark_end, tell_error
 from studyrunner.report.isolines import add_colour_bar, add_isolines
-from studyrunner.report.reading.choice import Choice
+from studyrunner.report.reading.choice import Choice, choose
 from studyrunner.report.reading.flanks import cell_edges
 from studyrunner.report.reading.result import NO_VOLUME, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
@@ -78,7 +78,7 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
     """Worn volume over cycles at the shown point, one line a scheme (Fig. 4)."""
     course = result.course_axis
     shown = result.shown_point()
-    choice = result.choose([course] if course else [], _MOST_LINES)
+    choice = choose(result, [course] if course else [], _MOST_LINES)
     cycles = scale_for("cycles", result.cycles)
     figure = new_figure(3.4)
     panel = figure.subplots()
@@ -203,7 +203,7 @@ def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing
 
 def _read_known(result: Result, course: Course, name: str, limit: int) -> tuple[Choice, list[NDArray[np.float64]]]:
     """Combinations with a result anywhere along the course, and their values (course, cycle)."""
-    choice = result.choose([course.axis], limit)
+    choice = choose(result, [course.axis], limit)
     found = [(point, label, course.read(result, name, point)) for point, label in choice]
     # The shown point has a result: there is at least one.
     points, labels, fields = zip(*(one for one in found if not np.isnan(one[2]).all()), strict=True)
@@ -231,7 +231,7 @@ def _read_histories(result: Result, course: Course, name: str) -> tuple[Choice, 
 
 def _read_reached(result: Result, course: Course) -> list[NDArray[np.float64]]:
     """First worn volumes along the course, of combinations without a result as well: NaN where there is no state."""
-    choice = result.choose([course.axis], _MOST_LINES)
+    choice = choose(result, [course.axis], _MOST_LINES)
     return [course.read(result, "worn_volume", point)[:, 0] for point in choice.points]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from studyrunner.coordinates import COORDINATES
 from studyrunner.report.reading.endings import Ending
 from studyrunner.report.reading.known_volumes import advise_ended, describe_ended, tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, Result
@@ -15,7 +16,6 @@ from studyrunner.report.reading.units import scale_for, show_cycles, show_number
 from studyrunner.report.scatter.points import last_of, statistics_at
 from studyrunner.statistics.sentence import sentence, sentences
 from studyrunner.system.progress import count
-from studyrunner.variables import COORDINATES
 
 _MOST_VALUES = 12
 _MOST_SENTENCES = 3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import warnings
 from collections.abc import Collection, Mapping
@@ -14,13 +13,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.choice import Choice
 from studyrunner.report.reading.endings import Ending, read_endings
 from studyrunner.report.reading.opening import open_vetted
 from studyrunner.report.reading.sample_statistics import SAMPLE, statistics_of
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors, study_tables
 from studyrunner.report.reading.units import show_cycles, show_value
-from studyrunner.system.progress import count
 from studyrunner.user_error import UserError, show_text
 
 CONVERGED = 0
@@ -289,39 +286,6 @@ class Result:
             if name in numbers:
                 return name
         return numbers[0] if numbers else None
-
-    def choose(self, free: Collection[str], limit: int, first: tuple[str, ...] = ("scheme", "sweep")) -> Choice:
-        """At most `limit` combinations of the axes that are not `free`; the one of the shown point is among them.
-
-        Where there are more, the axes `first` are split first, then the others in the order of the file, each whole or
-        not at all; the rest stays at the shown point.
-        """
-        order = [name for name in (*first, *self.axes) if name in self.varying and name not in free]
-        order = list(dict.fromkeys(order))
-        shown = {name: index for name, index in self._shown.items() if name not in free}
-        split: list[str] = []
-        number = 1
-        for name in order:
-            size = self.dataset.sizes[name]
-            if number * size <= limit:
-                split.append(name)
-                number *= size
-        split.sort(key=self.axes.index)
-        ranges = [range(self.dataset.sizes[name]) for name in split]
-        points = tuple({**shown, **dict(zip(split, place, strict=True))} for place in itertools.product(*ranges))
-        labels = tuple(self.describe(point, split) for point in points)
-        sizes = {name: self.dataset.sizes[name] for name in order if name not in split}
-        sizes |= {name: size for name, size in self.fixed.items() if name not in free}
-        fixed = [name for name in self.axes if name in sizes]
-        if not fixed:
-            return Choice(points, labels, "")
-        others = " and ".join(
-            count(sizes[name] - 1, "other sample" if name == SAMPLE else "other value")
-            + ("" if name == SAMPLE else f" of {name.replace('_', ' ')}")
-            for name in fixed
-        )
-        sentence = f"Shown for {self.describe(shown, fixed)}; the file also holds {others}."
-        return Choice(points, labels, sentence)
 
     def describe(self, point: Point, axes: Collection[str] | None = None) -> str:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""

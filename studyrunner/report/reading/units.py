@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from studyrunner.variables import COORDINATES
+from studyrunner.coordinates import COORDINATES
 
 
 @dataclass(frozen=True)
