@@ -127,7 +127,9 @@ def draw_certificates(result: Result) -> Iterator[Drawing | Missing | Table]:
     """The table of the worst certificates that the file carries, and the estimated errors over the course."""
     summary = str(result.dataset.attrs.get("certificate_summary", ""))
     title = "Certificates: how right the states are"
-    if summary:
+    if result.blocks is not None:
+        yield Table("certificates", "Summary of the run", ("what", "found"), _split_summary(summary))
+    elif summary:
         yield Table("certificates", title, ("certificate", "worst value and where"), _split_summary(summary), _NOTE)
     else:
         yield Missing("certificates", title, "The file carries no certificate_summary: run the study anew.")

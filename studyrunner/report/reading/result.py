@@ -14,6 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.report.reading.endings import Ending, read_endings
+from studyrunner.report.reading.missions import as_history
 from studyrunner.report.reading.opening import open_vetted
 from studyrunner.report.reading.sample_statistics import SAMPLE, statistics_of
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors, study_tables
@@ -38,12 +39,14 @@ class Result:
     """A result file. A point is one combination of the axes.
 
     dataset: read lazily. A variable that was read as a whole stays in memory. fixed: axes of which this holds one value
-    of several, and how many the file has.
+    of several, and how many the file has. blocks: of a result of missions what belongs to single blocks; in `dataset`
+    missions then have the name of the cycles that they replace.
     """
 
     path: Path
     dataset: xr.Dataset
     fixed: Mapping[str, int] = field(default_factory=dict)
+    blocks: xr.Dataset | None = None
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
@@ -59,6 +62,11 @@ class Result:
     def has_modes(self) -> bool:
         """Whether the points are those of nonlinear modes, which have no slow time: `cycle` is then an axis."""
         return "modal_amplitude" in self.axes
+
+    @property
+    def counted(self) -> str:
+        """What slow time counts: "cycles", or "missions"."""
+        return "cycles" if self.blocks is None else "missions"
 
     @cached_property
     def computed(self) -> NDArray[np.bool_]:
@@ -300,7 +308,7 @@ class Result:
 
     def cycle_label(self, index: int) -> str:
         """A kept cycle count in words."""
-        return show_cycles(float(self.cycles[index]))
+        return show_cycles(float(self.cycles[index]), self.counted)
 
     def when(self, index: int, before: str = "at") -> str:
         """A kept cycle count in words, with the word `before` it: "at 5 cycles", "in the final state"."""
@@ -326,4 +334,5 @@ def open_for_report(path: Path | str) -> Result:
     """
     opened = open_vetted(path)
     with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
-        return Result(Path(path), check_dataset(opened, str(path)))
+        dataset, blocks = as_history(check_dataset(opened, str(path)))
+        return Result(Path(path), dataset, blocks=blocks)
