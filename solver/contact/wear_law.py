@@ -20,7 +20,7 @@ In each law c may differ between surfaces, and the wear rate is proportional to 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,6 +58,10 @@ class WearLaw:
     surfaces: tuple[tuple[str, float], ...] = ()
     proportional: bool = True
     worn: tuple[float, ...] = ()
+
+    def begun_at(self, depth: FloatArray) -> WearLaw:
+        """The law of a history that begins at depths (n_contact,), m; only the factors of a table depend on depths."""
+        return replace(self, worn=tuple(depth.tolist())) if self.name == "table" else self
 
 
 ARCHARD = WearLaw()

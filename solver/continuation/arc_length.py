@@ -240,7 +240,7 @@ class Arc:
             if slope is None:
                 slope = self.slope(parameter, evaluation)
             # [J slope; tangent] by blocks: the step with the parameter held, and the step per change of the parameter
-            held, moved = self.solver.solve_two(balance.linearise(evaluation), evaluation.residual, slope)
+            held, moved = self.solver.solve_all(balance.linearise(evaluation), (evaluation.residual, slope))
             held, moved = held.ravel() / self.size, moved.ravel() / self.size
             pivot = tangent[-1] - tangent[:-1] @ moved
             if pivot == 0.0 or not np.isfinite(pivot):

@@ -118,7 +118,7 @@ def solve_at_lag(
         rtol = max(NEWTON.forcing, 0.1 * tolerance / max(state.scaled_residual(), tolerance))
         tangent, by_frequency = state.balance.linearise(state.at), frequency_derivative(case, state, before)
         before = state.balance.joint
-        steps = solver.solve_two(tangent, -state.at.residual, -by_frequency.residual, rtol)
+        steps = solver.solve_with_parameter(tangent, -state.at.residual, -by_frequency.residual, rtol)
         own, with_frequency = (_product_change(tangent, step) for step in steps)
         product = excitation_product(state.balance.joint, state.at.displacement_h)
         # the equation times |F^H x|, whose derivative is linear in the motion

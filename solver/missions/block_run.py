@@ -1,4 +1,4 @@
-"""One block, flown for one mission or for many at once: its wear, and the reference solution of its wear."""
+"""One block of one mission: its wear, and the reference solution of its wear."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 
 from solver.clock import computing_time
 from solver.contact.wear_law import WearLaw
@@ -20,48 +21,46 @@ from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
+from solver.wear.rate_slope import rate_slope
 from solver.wear.solutions import Ended, Like, SlowTime, Solutions
 from solver.wear.state import Failure
+from solver.wear.wearing_joint import WearingJoint
 
 
 @packable
 @dataclass(frozen=True)
 class BlockRun:
-    """A block that was flown for a number of missions at once.
+    """A block that was flown once. Rows of the responses: begin and end.
 
-    missions (n,): ascending numbers of missions, the first 0.
-    growth (n, n_contact): wear depth since the start of the block at these numbers, m.
-    response (n, n_response): complex first harmonic, m.
-    peak (n, n_response): largest magnitude over a period, m.
-    response_error (n,): estimated relative error of both.
     failure: reason of the end; the outcome CONVERGED for a regular end.
-    start_rate (n_contact,): wear rate at the start, m per cycle.
-    start_error: estimated relative error of this rate by harmonics, samples and the way to the start state.
+    growth (n_contact,): depth worn in the block, m.
+    slope (n_contact, n_contact): derivative of the growth with respect to the depth before, 1; None if not asked for.
+    response (2, n_response): complex first harmonic, m.
+    peak (2, n_response): largest magnitude over a period, m.
+    response_error: estimated relative error of both.
+    growth_error: estimated relative error of the growth by harmonics, samples and the way to the start state.
     inaccurate: largest relative error of a state above rtol, 0 where there is none.
     held: whether the mean position of a joint that slides as a whole was held.
     cut_off: whether a pair at an edge of the modelled contact carries load or has worn.
     like: what the reference solution takes over.
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
     iterations: Newton iterations, start state included.
-    begins_alike: whether each mission begins with the first response, as a passage does.
     sweep_rate: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.passage`; 0 for steady vibration.
     """
 
-    missions: tuple[int, ...]
+    failure: Failure
     growth: FloatArray
+    slope: FloatArray | None
     response: ComplexArray
     peak: FloatArray
-    response_error: FloatArray
-    failure: Failure
-    start_rate: FloatArray
-    start_error: float = 0.0
+    response_error: float = 0.0
+    growth_error: float = 0.0
     inaccurate: float = 0.0
     held: bool = False
     cut_off: bool = False
     like: Like | None = None
     last: StartState | None = None
     iterations: int = 0
-    begins_alike: bool = False
     sweep_rate: float = 0.0
 
     @property
@@ -77,7 +76,7 @@ class BlockCase:
     mission, place: the mission, and the place of the block in it.
     depth (n_contact,): m, worn before the block.
     carried: state that the block continues; None for a block that begins anew.
-    missions: ascending numbers of missions at which the block is read, the first 0, the last the number flown.
+    with_slope: whether the slope of the growth is asked for.
     settings: with the time that is left.
     """
 
@@ -85,7 +84,7 @@ class BlockCase:
     place: int
     depth: FloatArray
     carried: StartState | None
-    missions: tuple[int, ...]
+    with_slope: bool
     settings: SolverSettings
 
     @property
@@ -94,15 +93,9 @@ class BlockCase:
         return self.mission.blocks[self.place]
 
     @property
-    def counts(self) -> FloatArray:
-        """Cycle counts (n,) of the block at which it is read."""
-        return np.array(self.missions, np.float64) * self.block.steady[1]
-
-    @property
     def law(self) -> WearLaw:
         """The wear law, whose table counts depths from the unworn joint."""
-        law = self.mission.law
-        return law if law.name != "table" else replace(law, worn=tuple(self.depth.tolist()))
+        return self.mission.law.begun_at(self.depth)
 
 
 def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
@@ -116,11 +109,11 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
     if start.state is None:
         return not_flown(case, Failure(start.outcome, start.message), start.newton_iterations)
     left = replace(case.settings, time_limit=case.settings.time_limit - (computing_time() - began))
-    model = worn(block.model, case.depth)
+    model, counts = worn(block.model, case.depth), np.array([0.0, block.steady[1]])
     asked = SlowTime(
         case.mission.wear_coefficient,
         "adaptive",
-        case.counts,
+        counts,
         law=case.law,
         ends_at_last=case.mission.continued_by(case.place),
     )
@@ -130,38 +123,47 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
         ended = solutions.history()
         output = solutions.output_of(ended)
     else:
-        ended = solutions.follow(like, case.counts)
+        ended = solutions.follow(like, counts)
         output = solutions.output_of_reference(ended)
-    iterations = start.newton_iterations + ended.iterations
     if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
-        return not_flown(case, ended.failure, iterations)
-    return _read(case, ended, output.read(case.counts), start, iterations)
+        return not_flown(case, ended.failure, start.newton_iterations + ended.iterations)
+    flown = _read(case, ended, output.read(counts), start)
+    if case.with_slope:
+        work = WearingJoint.of(of_block, start.state, asked.wear_coefficient, asked.law)
+        flown = replace(flown, slope=_slope(work, ended, case, flown.growth))
+    # as read from a file: an interrupted mission goes on with equal bits
+    return in_rows(flown)
 
 
-def _read(case: BlockCase, ended: Ended, values: dict[str, Any], start: StartState, iterations: int) -> BlockRun:
+def _slope(work: WearingJoint, ended: Ended, case: BlockCase, growth: FloatArray) -> FloatArray:
+    """Derivative of the growth over the block: the flow of the linearised wear rate."""
+    assert ended.state is not None
+    at = ended.state.point.evaluation
+    pairs = case.depth + growth > 0.0
+    slope = rate_slope(work.at(ended.state), at, work.gain(1.0), work.wearing, pairs, work.solver)
+    return np.asarray(scipy.linalg.expm(case.block.steady[1] * slope) - np.eye(len(slope)))
+
+
+def _read(case: BlockCase, ended: Ended, values: dict[str, Any], start: StartState) -> BlockRun:
     """The result of a block that was flown to its end."""
-    state, course = ended.state, ended.output.course
+    state, course, end = ended.state, ended.output.course, case.block.steady[1]
     assert state is not None
-    contact, end = case.block.model.contact, float(case.counts[-1])
-    cut = first_cut_off(contact, case.counts, values["mean_pressure"], values["wear_depth"])
-    found = BlockRun(
-        missions=case.missions,
-        growth=values["wear_depth"],
+    cut = first_cut_off(case.block.model.contact, np.array([0.0, end]), values["mean_pressure"], values["wear_depth"])
+    return BlockRun(
+        failure=ended.failure,
+        growth=values["wear_depth"][-1],
+        slope=None,
         response=values["response"],
         peak=values["response_peak"],
-        response_error=values["response_error"],
-        failure=ended.failure,
-        start_rate=values["depth_rate"][0],
-        start_error=float(values["wear_rate_error"][0]),
+        response_error=float(np.fmax.reduce(values["response_error"])),
+        growth_error=float(values["wear_rate_error"][0]),
         inaccurate=state.worst.largest if state.inaccurate_from <= end else 0.0,
         held=state.held_from <= end,
         cut_off=not math.isnan(cut),
         like=Like(course.resolutions, state.step_limit, ended.iterations),
         last=_last(case, ended, start) if case.mission.continued_by(case.place) else None,
-        iterations=iterations,
+        iterations=start.newton_iterations + ended.iterations,
     )
-    # as read from a file: an interrupted mission goes on with equal bits
-    return in_rows(found)
 
 
 def _last(case: BlockCase, ended: Ended, start: StartState) -> StartState:
@@ -190,9 +192,6 @@ def _last(case: BlockCase, ended: Ended, start: StartState) -> StartState:
 
 def not_flown(case: BlockCase, failure: Failure, iterations: int) -> BlockRun:
     """A block that was not flown to its end."""
-    unknown = np.full((len(case.missions), case.depth.size), np.nan)
-    response = np.full((len(case.missions), len(case.block.model.response_names)), np.nan)
-    return BlockRun(
-        case.missions, unknown, response.astype(complex), response, response[:, 0], failure, unknown[0],
-        iterations=iterations,
-    )  # fmt: skip
+    nothing = np.full((2, len(case.block.model.response_names)), np.nan)
+    unknown = np.full_like(case.depth, np.nan)
+    return BlockRun(failure, unknown, None, nothing.astype(complex), nothing, iterations=iterations)

@@ -106,10 +106,9 @@ class Mission:
         """Frequencies (n_block, 2) at begin and end of the blocks, Hz."""
         return np.array([block.ends for block in self.blocks])
 
-    @property
-    def reversible(self) -> bool:
-        """Whether the blocks can be flown in reverse order: all of them continue another one, or none does."""
-        return len({block.begin == "continue" for block in self.blocks}) == 1
+    def called(self, place: int) -> str:
+        """Name of a block in messages."""
+        return self.blocks[place].name or f"block {place + 1}"
 
     def continued_by(self, place: int) -> bool:
         """Whether the block behind a block begins from its last state."""

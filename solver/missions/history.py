@@ -8,20 +8,24 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from solver.accuracy.history_error import Met
+from solver.accuracy.history_error import HistoryError, Met, history_error
 from solver.accuracy.options import ACCURACY
 from solver.missions.blocks import Mission
-from solver.missions.course import MissionCourse
+from solver.missions.course import RESPONSES, MissionCourse
 from solver.missions.one_block import integrate_one_block, is_one_history
 from solver.missions.options import MISSIONS
 from solver.missions.result import MissionHistory
-from solver.missions.solutions import ENDS_ALL, MissionSolutions
+from solver.missions.solutions import MissionSolutions
 from solver.model import FloatArray
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, unpack
 from solver.results.cut_off import describe_cut_off
 from solver.wear.state import Failure
+
+ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
+"""Outcomes of a reference solution that are those of the history."""
 
 
 def integrate_missions(
@@ -50,7 +54,7 @@ def integrate_missions(
     fine = solutions.history()
     reference = None
     if len(fine.nodes) > 1 and (fine.failure is None or fine.failure.outcome not in ENDS_ALL):
-        reference = solutions.reference()
+        reference = solutions.reference(fine)
         if reference.failure is not None and reference.failure.outcome in ENDS_ALL:
             fine = replace(fine, failure=reference.failure)
     history = _assembled(solutions, fine, reference)
@@ -64,134 +68,86 @@ def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: Miss
     """The result, from both solutions."""
     mission, counts = solutions.mission, np.array(solutions.mission.missions, np.float64)
     area, growth = mission.area, fine.growth_at(counts)
-    depth, volumes = growth.sum(axis=1), growth @ area
+    depth, values = growth.sum(axis=1), _values(mission, fine, counts)
+    whole, *blocks = _errors(mission, counts, fine, reference)
     other = np.full_like(depth, np.nan) if reference is None else reference.growth_at(counts).sum(axis=1)
-    relative, of_pairs = _errors(counts, fine, reference, (depth, other), area)
-    reached = np.flatnonzero(np.isfinite(relative))
+    reached = np.flatnonzero(np.isfinite(whole.worn_volume))
     failure = fine.failure or Failure(Outcome.CONVERGED)
-    history = MissionHistory(
-        **_responses(mission, counts, fine, reference),
+    target = solutions.missions_to_target(fine)
+    return MissionHistory(
+        **{name: values[name] for name in RESPONSES},
+        response_error=np.array([each.response for each in blocks]).T,
+        excitation_frequency=mission.frequencies,
         outcome=failure.outcome,
         message=failure.message,
         missions=counts,
         worn_volume=depth @ area,
-        worn_volume_error=relative,
+        worn_volume_error=whole.worn_volume,
         wear_depth=depth,
-        wear_depth_error=of_pairs,
-        block_volume=volumes,
-        block_volume_error=_block_errors(counts, fine, reference, area),
-        excitation_frequency=mission.frequencies,
+        wear_depth_error=whole.wear_depth,
+        block_volume=growth @ area,
+        block_volume_error=np.array([each.worn_volume for each in blocks]).T,
         reference_volume=other @ area,
         sweep_rate=fine.sweep_rate,
-        error_estimate=float(relative[reached[-1]]) if reached.size else math.nan,
+        error_estimate=float(whole.worn_volume[reached[-1]]) if reached.size else math.nan,
         last_mission=float(fine.ends[-1]),
         steps=np.diff(fine.ends),
-        missions_to_target=math.nan,
-        missions_to_target_error=math.nan,
+        missions_to_target=math.nan if math.isinf(target) else target,
+        missions_to_target_error=math.nan if math.isinf(target) else _target_error(solutions, fine, reference),
         newton_iterations=fine.iterations + (0 if reference is None else reference.iterations),
         run_time=solutions.spent,
-    )
-    target = solutions.missions_to_target(fine)
-    if math.isinf(target):
-        return history
-    return replace(
-        history, missions_to_target=target, missions_to_target_error=_target_error(solutions, fine, reference)
     )
 
 
 def _errors(
-    counts: FloatArray,
-    fine: MissionCourse,
-    reference: MissionCourse | None,
-    depths: tuple[FloatArray, FloatArray],
-    area: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Estimated errors of the volume (n_output,), relative, and of the depths (n_output, n_contact), m.
-
-    counts (n_output,): missions.
-    depths: of history and reference solution at the counts, (n_output, n_contact) each, m.
-    """
-    depth, other = depths
-    volume = depth @ area
-    difference = np.fmax(ACCURACY.history_safety * np.abs(depth - other), _order_errors(counts, fine))
-    ends = fine.ends
-    own = fine.growth_at(ends).sum(axis=1)
-    at_ends = np.full_like(own, np.nan) if reference is None else reference.growth_at(ends).sum(axis=1)
-    met = Met(ends, np.abs(own - at_ends) @ area)
-    error = np.fmax(difference @ area, ACCURACY.history_safety * met.largest_before(counts))
-    # the error of the start states remains, even where later states agree by chance
-    of_blocks, at_start = fine.growth_at(counts) @ area, _start_errors(fine, reference, area)
-    # the error of a block that wears nothing may be unknown
-    error = np.fmax(error, np.where(of_blocks > 0.0, np.fmax(of_blocks, 1e-300) * at_start, 0.0).sum(axis=1))
-    relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
-    unknown = np.isfinite(volume) & ~np.isfinite(other).all(axis=1) & (volume > 0.0)
-    relative[unknown] = np.inf
-    relative[~np.isfinite(volume)] = np.nan
-    # the rest of the error of the volume is shared by the pairs in proportion to their depth
-    rest = relative - np.divide(difference @ area, volume, out=np.zeros_like(volume), where=volume > 0.0)
-    with np.errstate(invalid="ignore"):
-        of_pairs = difference + np.where(depth > 0.0, rest[:, None] * depth, 0.0)
-    of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
-    return relative, of_pairs
-
-
-def _block_errors(
-    counts: FloatArray, fine: MissionCourse, reference: MissionCourse | None, area: FloatArray
-) -> FloatArray:
-    """Estimated relative errors (n_output, n_block) of the worn volumes of the blocks; see `_errors`."""
-    growth = fine.growth_at(counts)
-    volume = growth @ area
-    other = np.full_like(growth, np.nan) if reference is None else reference.growth_at(counts)
-    apart = ACCURACY.history_safety * np.abs(growth - other) @ area
-    error = np.divide(apart, volume, out=np.zeros_like(volume), where=volume > 0.0)
-    error = np.where(volume > 0.0, np.fmax(error, _start_errors(fine, reference, area)), 0.0)
-    error[(volume > 0.0) & np.isnan(apart)] = np.inf
-    return np.where(np.isfinite(volume), error, np.nan)
-
-
-def _responses(
     mission: Mission, counts: FloatArray, fine: MissionCourse, reference: MissionCourse | None
-) -> dict[str, Any]:
-    """Responses of the result, with the errors of their states and their difference to the reference solution."""
-    if len(fine.nodes) < 2:
-        nothing = np.full((counts.size, len(mission.blocks), len(mission.blocks[0].model.response_names)), np.nan)
-        names = ("response_begin", "response_end", "response_peak_begin", "response_peak_end")
-        return dict.fromkeys(names, nothing) | {"response_error": nothing[:, :, 0]}
-    found = fine.responses_at(counts)
-    if reference is None or len(reference.nodes) < 2:
-        unknown = np.where(np.isnan(found["response_error"]), np.nan, np.inf)
-        return found | {"response_error": unknown}
-    other, error = reference.responses_at(counts), found["response_error"]
-    for name in found:
-        if name == "response_error":
-            continue
-        size = np.linalg.norm(found[name], axis=2)
-        apart = ACCURACY.history_safety * np.linalg.norm(found[name] - other[name], axis=2)
-        apart[np.isfinite(size) & np.isnan(apart)] = np.inf
-        error = np.fmax(error, np.divide(apart, size, out=np.zeros_like(size), where=size > 0.0))
-    return found | {"response_error": error}
-
-
-def _order_errors(counts: FloatArray, fine: MissionCourse) -> FloatArray:
-    """Error of the depths (n_output, n_contact), m, by the order of the blocks in the step that contains each count.
-
-    The next steps wear such a difference away where it is large: it does not add up. Its square, relative to the wear
-    of a step, does; the reference solution shows that.
-    """
-    place = np.clip(np.searchsorted(fine.ends, counts, "left"), 0, len(fine.nodes) - 1)
-    none = np.zeros(fine.nodes[0].growth.shape[1])
-    return np.array([none if (error := fine.nodes[at].error) is None else error for at in place])
-
-
-def _start_errors(fine: MissionCourse, reference: MissionCourse | None, area: FloatArray) -> FloatArray:
-    """Relative errors (n_block,) of the wear rates at the starts of the blocks in the first mission."""
-    errors = np.nan_to_num(fine.start_errors, nan=0.0, posinf=np.inf)
+) -> list[HistoryError]:
+    """Errors of the whole wear, and of wear and responses of each block, at the counts (n_output,), the first 0."""
+    ends, area = fine.ends, mission.area
+    solutions = [fine, MissionCourse.begun(*fine.nodes[0].growth.shape) if reference is None else reference]
+    read = [(of.growth_at(counts), _values(mission, of, counts), of.growth_at(ends)) for of in solutions]
     if reference is None:
-        return errors
-    rates = fine.start_rates @ area
-    apart = np.abs(fine.start_rates - reference.start_rates) @ area
-    difference = np.divide(apart, rates, out=np.zeros_like(rates), where=rates > 0.0)
-    return np.asarray(np.fmax(errors, difference))
+        read[1][0][:], read[1][2][:] = np.nan, np.nan
+    found = []
+    for chosen in (range(len(mission.blocks)), *([place] for place in range(len(mission.blocks)))):
+        own, other = (_of_blocks(growth, values, list(chosen), area) for growth, values, _ in read)
+        apart = read[0][2][:, chosen].sum(axis=1) - read[1][2][:, chosen].sum(axis=1)
+        found.append(history_error(counts, own, other, Met(ends, np.abs(apart) @ area), area, "adaptive"))
+    # where blocks adapt the pressures of the pairs against each other, two solutions may agree in a pair by chance
+    by_steps = np.fmax(found[0].wear_depth, read[0][1]["local"])
+    return [replace(found[0], wear_depth=by_steps), *found[1:]]
+
+
+def _values(mission: Mission, course: MissionCourse, counts: FloatArray) -> dict[str, NDArray[Any]]:
+    """Values of a course at the counts; NaN where no mission was flown."""
+    responses = len(mission.blocks), len(mission.blocks[0].model.response_names)
+    shapes = dict.fromkeys(RESPONSES, responses) | {"rate": course.nodes[0].growth.shape, "local": (mission.area.size,)}
+    shapes |= dict.fromkeys(("response_error", "growth_error"), (len(mission.blocks),))
+    unknown = {name: np.full((counts.size, *shape), np.nan) for name, shape in shapes.items()}
+    return unknown | course.values_at(counts)
+
+
+def _of_blocks(
+    growth: FloatArray, values: dict[str, NDArray[Any]], chosen: list[int], area: FloatArray
+) -> dict[str, NDArray[Any]]:
+    """Wear of some blocks together, and their responses, in the terms of a wear history."""
+    n, rates = len(growth), values["rate"][:, chosen]
+    volumes = np.nan_to_num(rates @ area)
+    errors = np.nan_to_num(values["growth_error"][:, chosen], posinf=np.inf)
+    # the error of a block that wears nothing may be unknown
+    weighted = np.where(volumes > 0.0, errors * np.fmax(volumes, 1e-300), 0.0).sum(axis=1)
+    whole, worn = volumes.sum(axis=1), growth.sum(axis=2)
+    share = np.divide(worn[:, chosen].sum(axis=1), worn.sum(axis=1), out=np.ones(n), where=worn.sum(axis=1) > 0.0)
+    return {
+        "wear_depth": growth[:, chosen].sum(axis=1),
+        "depth_rate": rates.sum(axis=1),
+        "wear_rate": rates.sum(axis=1) @ area,
+        "wear_rate_error": np.divide(weighted, whole, out=np.zeros_like(whole), where=whole > 0.0),
+        "local": share * (values["local"] @ area),
+        "response": np.concatenate([values[name][:, chosen].reshape(n, -1) for name in RESPONSES[:2]], axis=1),
+        "response_peak": np.concatenate([values[name][:, chosen].reshape(n, -1) for name in RESPONSES[2:]], axis=1),
+        "response_error": np.fmax.reduce(values["response_error"][:, chosen], axis=1),
+    }
 
 
 def _target_error(solutions: MissionSolutions, fine: MissionCourse, reference: MissionCourse | None) -> float:
@@ -199,32 +155,29 @@ def _target_error(solutions: MissionSolutions, fine: MissionCourse, reference: M
 
     At least the error of the volume there, taken at the mean rate of the last step.
     """
-    at = np.array([solutions.missions_to_target(fine)])
     if reference is None:
         return math.inf
-    other = solutions.missions_to_target(reference)
-    depths = fine.growth_at(at).sum(axis=1), reference.growth_at(at).sum(axis=1)
-    relative, _ = _errors(at, fine, reference, depths, solutions.mission.area)
+    at, other = solutions.missions_to_target(fine), solutions.missions_to_target(reference)
+    whole, *_ = _errors(solutions.mission, np.array([0.0, at]), fine, reference)
     before, end = fine.nodes[-2:]
-    worn = [solutions.worn(node.growth) for node in (before, end)]
-    per_mission = (worn[1] - worn[0]) / (end.mission - before.mission)
+    per_mission = (solutions.worn(end.growth) - solutions.worn(before.growth)) / (end.mission - before.mission)
     assert solutions.mission.until is not None
-    by_volume = float(relative[0]) * solutions.mission.until.value / per_mission
-    return max(by_volume, ACCURACY.history_safety * abs(other - float(at[0])) if math.isfinite(other) else 0.0)
+    by_volume = float(whole.worn_volume[-1]) * solutions.mission.until.value / per_mission
+    return max(by_volume, ACCURACY.history_safety * abs(other - at) if math.isfinite(other) else 0.0)
 
 
 def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> Failure:
     """The outcome of a complete history, and its sentence."""
     rtol, error = mission.settings.rtol, history.error_estimate
     remarks = []
-    if not math.isnan(fine.held):
+    if fine.held < math.inf:
         remarks.append(
             f"from mission {fine.held:.0f} on only friction holds the joint in one direction: it is held there"
         )
     for place in np.flatnonzero(fine.sweep_rate > MISSIONS.largest_sweep_rate):
         too_fast = "too fast for the steady states that it is computed from: its sweep rate over (zeta f)^2 is"
-        remarks.append(f"{_called(mission, int(place))} is {too_fast} {fine.sweep_rate[place]:.2g}")
-    if not math.isnan(fine.cut_off):
+        remarks.append(f"{mission.called(int(place))} is {too_fast} {fine.sweep_rate[place]:.2g}")
+    if fine.cut_off < math.inf:
         return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(fine.cut_off).replace("cycle", "mission"))
     if error > SENSITIVE_ERROR:
         volumes = [
@@ -235,11 +188,6 @@ def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> F
         return Failure(Outcome.SENSITIVE, "; ".join((said, *remarks)))
     worst = int(np.argmax(fine.inaccurate))
     if fine.inaccurate[worst] > 0.0:
-        said = f"in {_called(mission, worst)} the vibration {known_to(float(fine.inaccurate[worst]), rtol)}"
+        said = f"in {mission.called(worst)} the vibration {known_to(float(fine.inaccurate[worst]), rtol)}"
         return Failure(Outcome.INACCURATE, "; ".join((said, *remarks)))
     return Failure(Outcome.CONVERGED, "; ".join(remarks))
-
-
-def _called(mission: Mission, place: int) -> str:
-    """Name of a block in messages."""
-    return mission.blocks[place].name or f"block {place + 1}"

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 class MissionOptions:
     """Lengths and limits: for each its meaning, its unit (none: a ratio) and the evidence for its value."""
 
-    first_step: int = 2
-    """Missions of the first step: the shortest that has an estimated error."""
+    step_iterations: int = 6
+    """Most missions flown for a step, whose depth is found by Newton's method. Sliders and roots need 1 to 3."""
+    depth_tolerance: float = 0.1
+    """Last correction of this depth, as worn volume, over the allowed error of the step."""
 
     # passages
     first_frequencies: int = 17

@@ -6,8 +6,13 @@ m per cycle, of a sweep with its own tangential history, a passage wears
     W = integral of g(f) f / |df/dt| df
 
 by the trapezoidal rule over frequencies that are added where the integrand bends, and on both sides of a jump. The
-depth is that before the passage; its error falls with the wear of one step over missions. The reference solution has
-fewer frequencies, and the mean of the wear rates before and after its wear.
+frequencies pass one after the other: where wear at the first ones takes load off a pair, the pair wears less at the
+later ones. So the depth y since the start of the passage follows from the linearised rate,
+
+    dy/df = (g + dg/dW y) f / |df/dt|,
+
+with the implicit trapezoidal rule in the order of the passage. The square of this correction, relative to the wear, is
+a part of the error, and falls with the wear of one passage.
 
 A slow passage finds the steady states: it has to be slow against the decay of the vibration within the half-power width
 2 zeta f. The number |df/dt| / (zeta f)^2 says how slow it is.
@@ -15,6 +20,7 @@ A slow passage finds the steady states: it has to be slow against the decay of t
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,8 +40,9 @@ from solver.packing import in_rows
 from solver.results.history import StartState
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
+from solver.wear.rate_slope import rate_slope
 from solver.wear.solutions import Like
-from solver.wear.state import Failure
+from solver.wear.state import Failure, WearState
 from solver.wear.wearing_joint import WearingJoint
 
 
@@ -77,42 +84,76 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
     """Fly a passage, or its reference solution, as `block_run.run_block`."""
     passage = case.block.frequency
     assert isinstance(passage, Passage)
-    first = _swept(case, passage, case.depth, MISSIONS.frequency_error * (1.0 if like is None else RTOL_RATIO))
+    first = _swept(case, passage, MISSIONS.frequency_error * (1.0 if like is None else RTOL_RATIO))
     if isinstance(first, Failure):
         return not_flown(case, first, 0)
-    wear, iterations = first.wear, first.iterations
-    if like is not None:
-        after = _swept(case, passage, case.depth + case.missions[-1] * wear, MISSIONS.frequency_error * RTOL_RATIO)
-        if isinstance(after, Failure):
-            return not_flown(case, after, iterations)
-        wear, iterations = 0.5 * (wear + after.wear), iterations + after.iterations
     order = 1 if passage.stop > passage.start else -1
     states = first.states[::order]
     area, volume = case.mission.area, float(first.wear @ case.mission.area)
     by_states = sum(
         _part(first.states, place) @ area * state.start.wear_rate_error for place, state in enumerate(first.states)
     )
-    ends = [states[0], *(states[-1] for _ in case.missions[1:])]
+    growth, slope = in_order(states, (_slope(case, passage, state) for state in states))
+    by_depth = float(np.abs(growth - first.wear) @ area) ** 2 / volume if volume > 0.0 else 0.0
+    ends = states[0], states[-1]
     found = BlockRun(
-        missions=case.missions,
-        growth=np.array(case.missions, np.float64)[:, None] * wear,
+        failure=Failure(Outcome.CONVERGED),
+        growth=growth,
+        slope=slope if case.with_slope else None,
         response=np.array([state.response for state in ends]),
         peak=np.array([state.peak for state in ends]),
-        response_error=np.array([state.start.response_error for state in ends]),
-        failure=Failure(Outcome.CONVERGED),
-        start_rate=first.wear / passage.cycles,
-        start_error=float(by_states + first.error) / volume if volume > 0.0 else 0.0,
+        response_error=max(state.start.response_error for state in ends),
+        growth_error=float(by_states + first.error + by_depth) / volume if volume > 0.0 else 0.0,
         inaccurate=max(
             (max(state.start.response_error, state.start.wear_rate_error) for state in states if _inaccurate(state)),
             default=0.0,
         ),
-        like=Like((), float("nan"), iterations),
+        like=Like((), float("nan"), first.iterations),
         last=states[-1].start if case.mission.continued_by(case.place) else None,
-        iterations=iterations,
-        begins_alike=True,
+        iterations=first.iterations,
         sweep_rate=sweep_rate(passage, first.states),
     )
     return in_rows(found)
+
+
+def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Wear (n_contact,), m, of a passage through states in this order, and its derivative by the depth before.
+
+    slopes: derivative (n_contact, n_contact) of the density of each state with respect to the depth, 1/Hz.
+    """
+    unit = np.eye(states[0].density.size)
+    # columns: the wear, and the change of the depth behind the passage
+    grown: FloatArray = np.zeros((len(unit), len(unit) + 1))
+    last: tuple[SweptState, FloatArray, FloatArray] | None = None
+    for state, slope in zip(states, slopes, strict=True):
+        source = np.column_stack([state.density, slope])
+        if last is not None:
+            half = 0.5 * abs(state.frequency - last[0].frequency)
+            known = grown + half * (last[2] + last[1] @ grown + source)
+            grown = np.asarray(np.linalg.solve(unit - half * slope, known))
+        last = state, slope, source
+    return np.maximum(grown[:, 0], 0.0), grown[:, 1:]
+
+
+def _slope(case: BlockCase, passage: Passage, state: SweptState) -> FloatArray:
+    """Derivative (n_contact, n_contact) of the density of a state with respect to the depths, 1/Hz."""
+    pairs = state.density > 0.0
+    if not pairs.any():
+        return np.zeros((pairs.size, pairs.size))
+    work, begun = _joint(case, state.start)
+    at = begun.point.evaluation
+    slope = rate_slope(work.at(begun), at, work.gain(1.0), work.wearing, pairs | (case.depth > 0.0), work.solver)
+    return np.asarray(slope * state.frequency / abs(passage.rate))
+
+
+def _joint(case: BlockCase, start: StartState) -> tuple[WearingJoint, WearState]:
+    """The joint at the depth before the passage, and its state at a frequency."""
+    assert start.state is not None
+    model, friction = worn(case.block.model, case.depth), case.block.friction_coefficient
+    of_state = build_case(model, friction, start.penalty_omega, case.settings, start.resolution)
+    work = WearingJoint.of(of_state, start.state, case.mission.wear_coefficient, case.law)
+    # the limit of the explicit step is not asked for
+    return work, work.begin(start.state, start.resolution, NOTHING, accurate=True, step_limit=np.inf)
 
 
 def _inaccurate(state: SweptState) -> bool:
@@ -125,14 +166,14 @@ def _part(states: tuple[SweptState, ...], place: int) -> FloatArray:
     return 0.5 * (high - low) * states[place].density
 
 
-def _swept(case: BlockCase, passage: Passage, depth: FloatArray, aim: float) -> Swept | Failure:
-    """The wear of one passage at depths (n_contact,), m; aim: error by the frequencies over the volume, over rtol."""
+def _swept(case: BlockCase, passage: Passage, aim: float) -> Swept | Failure:
+    """The wear of one passage at the depth before it; aim: error by the frequencies over the volume, over rtol."""
     low, high = sorted((passage.start, passage.stop))
     wanted = list(np.linspace(low, high, MISSIONS.first_frequencies))
     states: list[SweptState] = []
     iterations, error, area = 0, np.inf, case.mission.area
     while wanted:
-        found = _states(case, passage, depth, np.array(sorted(wanted)))
+        found = _states(case, passage, np.array(sorted(wanted)))
         if isinstance(found, Failure):
             return found
         iterations += max((state.start.newton_iterations for state in found), default=0)
@@ -180,12 +221,10 @@ def interval_errors(states: list[SweptState], area: FloatArray) -> FloatArray:
     return np.asarray(errors @ area)
 
 
-def _states(
-    case: BlockCase, passage: Passage, depth: FloatArray, frequencies: FloatArray
-) -> list[SweptState] | Failure:
+def _states(case: BlockCase, passage: Passage, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
     began, block = computing_time(), case.block
-    model, sweep = worn(block.model, depth), passage.sweep
+    model, sweep = worn(block.model, case.depth), passage.sweep
     found = []
     branch = follow_branch(
         model, block.friction_coefficient, block.excitation_amplitude, frequencies, sweep, case.settings
@@ -195,10 +234,7 @@ def _states(
             return Failure(start.outcome, start.message)
         if computing_time() - began > case.settings.time_limit:
             return Failure(Outcome.TIME_LIMIT)
-        of_state = build_case(model, block.friction_coefficient, start.penalty_omega, case.settings, start.resolution)
-        work = WearingJoint.of(of_state, start.state, case.mission.wear_coefficient, case.law)
-        # the limit of the explicit step is not asked for
-        begun = work.begin(start.state, start.resolution, NOTHING, accurate=True, step_limit=np.inf)
+        work, begun = _joint(case, start)
         at = begun.point.evaluation
         frequency = float(frequencies[index])
         density = work.rate(at) * frequency / abs(passage.rate)

@@ -1,22 +1,22 @@
-"""One step over many missions: operator splitting, corrected for the order of the blocks.
+"""One step over many missions: the missions between are left out, and the wear of one mission is the rate.
 
-A mission maps the depth before to the depth after: its blocks wear one after the other. Many missions n at once are
-approximated by the same blocks, each with n times its cycles. Each block is integrated by its own stable scheme, so
-that the length of the step is limited by its accuracy only. The error against n missions one by one comes from the
-order of the blocks, which do not commute. To leading order it is a constant times n (n - 1), and with the blocks in
-reverse order the same constant times -n (n + 1) (Hairer, Lubich, Wanner, Geometric Numerical Integration, III.5). For
-one mission there is no error.
+A mission takes the depth W before it to W + R(W) after it; R is the wear of its blocks, one after the other. Over many
+missions the depth is a smooth sequence W(n). A step from n to n + H flies only the last of its missions, which begins
+at the depth Z. The parabola through the depths at n - a, n (the two nodes before) and n + H has this mission for its
+last one, p(n + H) - p(n + H - 1) = R(Z) with Z = p(n + H - 1), so that
 
-So a step is flown twice, at once in reverse order (A) and in two parts in order (B), n_1 + n_2 = n missions. Both give
+    Z = W(n) + (H - 1) H / (2H - 1 + a) (W(n) - W(n - a)) / a + (H - 1) (H - 1 + a) / (2H - 1 + a) R(Z),
+    W(n + H) = Z + R(Z).
 
-    W = W_B + (W_B - W_A) e_B / (e_A - e_B),      e_A = -n (n + 1),  e_B = n_1 (n_1 - 1) + n_2 (n_2 - 1),
+This is the backward difference formula of second order for sequences (Petzold, SIAM J. Numer. Anal. 18 (1981) 455). For
+H = 1 it is the mission itself, for large H the BDF2 of `solver.wear.bdf2`, with its stability: blocks that adapt the
+pressures against each other within few missions do not shorten a step. All factors are positive, so that wear never
+falls, and each block has its part of the sum. With the third divided difference w of the nodes, the local error is
 
-pair by pair and for each block: of second order in n, and exactly the missions one by one for n = 2. W is a mean of
-both, with weights of at least 1/3 and 1/2: no wear falls. Where the wear of a step adapts the pressures fully, W_A and
-W_B have those of the first and of the last block, and their difference shows how much they differ.
+    e = w H (H + a) (H - 1) (H - 1 + a) / (2H - 1 + a).
 
-A mission of which some blocks continue others, but not all, cannot be flown in reverse: there A is in order, too, with
-e_A = n (n - 1).
+Z is found by Newton's method. The derivative of R is the product of the flows of the linearised wear rates of the
+blocks, corrected by Broyden's method where a second iteration is needed.
 """
 
 from __future__ import annotations
@@ -28,25 +28,18 @@ import numpy as np
 
 from solver.missions.block_run import BlockRun
 from solver.missions.blocks import Mission
-from solver.missions.course import MissionNode, responses_of
+from solver.missions.course import MissionNode
+from solver.missions.options import MISSIONS
 from solver.model import FloatArray
+from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.wear.state import Failure
 
-Fly = Callable[[int, FloatArray, StartState | None, tuple[int, ...]], BlockRun]
-"""Flies a block: its place, the depth before (n_contact,), m, the state that it continues, and the missions to read."""
+Fly = Callable[[int, FloatArray, StartState | None, bool], BlockRun]
+"""Flies a block: place, depth before (n_contact,), m, state that it continues, whether the slope is asked for."""
 
-
-@dataclass(frozen=True)
-class Flight:
-    """The blocks of a mission, in order of the mission, each flown for a number of missions at once."""
-
-    runs: tuple[BlockRun, ...]
-
-    @property
-    def growth(self) -> FloatArray:
-        """Depth worn by each block (n_block, n_contact), m."""
-        return np.array([run.growth[-1] for run in self.runs])
+Allowed = Callable[[float, float, int, int], float]
+"""Allowed error of a step, m3: worn volumes at its start and end, m3, number of missions at its start, its length."""
 
 
 @dataclass(frozen=True)
@@ -54,99 +47,173 @@ class Step:
     """A step that was flown.
 
     node: its end.
-    runs: of all blocks, in order.
-    order_error: error of the step in two parts by the order of the blocks, pair by pair, over its worn volume; 0 for a
-        single mission.
+    runs: of all blocks, in order, once for each mission that was flown.
+    error: estimated local error, as worn volume, m3.
     """
 
     node: MissionNode
     runs: tuple[BlockRun, ...]
-    order_error: float
+    error: float
 
 
-def missions_read(length: int) -> tuple[int, ...]:
-    """Missions at which a block is read that is flown for `length` missions at once."""
-    return tuple(sorted({0, 1, length - 1, length}))
-
-
-def fly(mission: Mission, node: MissionNode, length: int, run: Fly, *, reverse: bool = False) -> Flight | Failure:
-    """Fly the blocks from the end of a step, each for `length` missions at once."""
-    depth, carried = node.growth.sum(axis=0), node.carried
-    runs: dict[int, BlockRun] = {}
-    for place in range(len(mission.blocks))[:: -1 if reverse else 1]:
-        found = run(place, depth, carried, missions_read(length))
+def fly(
+    mission: Mission, flown: int, depth: FloatArray, carried: StartState | None, run: Fly, *, with_slopes: bool = False
+) -> tuple[BlockRun, ...] | Failure:
+    """Fly the blocks of one mission. flown: missions before, for messages; depth (n_contact,), m: before."""
+    runs: list[BlockRun] = []
+    for place in range(len(mission.blocks)):
+        found = run(place, depth, carried, with_slopes)
         if not found.completed:
-            return found.failure
-        runs[place] = found
-        depth, carried = depth + found.growth[-1], found.last
-    return Flight(tuple(runs[place] for place in sorted(runs)))
+            said = f"in mission {flown + 1}, {mission.called(place)}"
+            return Failure(found.failure.outcome, ": ".join(filter(None, (said, found.failure.message))))
+        runs.append(found)
+        depth, carried = depth + found.growth, found.last
+    return tuple(runs)
 
 
-def after(node: MissionNode, flight: Flight) -> MissionNode:
-    """The node behind missions that were flown at once, in order."""
-    runs = flight.runs
-    likes = tuple(run.like for run in runs if run.like is not None)
-    responses = responses_of(node.mission, runs)
-    mission = node.mission + runs[0].missions[-1]
-    return MissionNode(mission, node.growth + flight.growth, None, responses, likes, carried=runs[-1].last)
-
-
-def take_step(mission: Mission, node: MissionNode, parts: tuple[int, ...], run: Fly) -> Step | Failure:
-    """A step over one mission, or over missions in two parts.
+def take_step(
+    mission: Mission, nodes: tuple[MissionNode, ...], length: int, run: Fly, allowed: Allowed
+) -> Step | Failure:
+    """A step over missions; over more than one from the third mission on.
 
     Parameters
     ----------
     mission
         The blocks.
-    node
-        Start of the step.
-    parts
-        Missions of the parts: (n,) without, (n_1, n_2) with extrapolation.
+    nodes
+        Ends of all steps before.
+    length
+        H, missions.
     run
         Flies a block.
+    allowed
+        Allowed error of a step.
     """
-    n = sum(parts)
-    if len(parts) == 1:
-        flight = fly(mission, node, n, run)
-        return flight if isinstance(flight, Failure) else Step(after(node, flight), flight.runs, 0.0)
-    whole = fly(mission, node, n, run, reverse=mission.reversible)
-    if isinstance(whole, Failure):
-        return whole
-    one = fly(mission, node, parts[0], run)
-    if isinstance(one, Failure):
-        return one
-    middle = after(node, one)
-    other = fly(mission, middle, parts[1], run)
-    if isinstance(other, Failure):
-        return other
-    corrected, order_error = _corrected(mission, (node, middle, after(middle, other)), whole)
-    return Step(corrected, (*whole.runs, *one.runs, *other.runs), order_error)
+    now = nodes[-1]
+    if length == 1:
+        runs = fly(mission, now.mission, now.depth, now.carried, run)
+        return (
+            runs
+            if isinstance(runs, Failure)
+            else Step(_node(now, 1, now.growth, runs, np.zeros_like(now.depth)), runs, 0.0)
+        )
+    formula = _Formula.of(nodes, length)
+    found = _solve(mission, now, formula, run, allowed)
+    if isinstance(found, Failure):
+        return found
+    before, runs, left = found
+    rates = np.array([each.growth for each in runs[-len(mission.blocks) :]])
+    # the last correction of the depth is shared by the blocks in proportion to their wear
+    whole, wanted = rates.sum(axis=0), (before - formula.base.sum(axis=0)) / formula.factor
+    rates = rates * np.divide(wanted, whole, out=np.ones_like(whole), where=whole > 0.0)
+    growth = formula.base + formula.factor * rates
+    end = growth.sum(axis=0) + rates.sum(axis=0)
+    error = formula.error_of(end) + left
+    node = _node(now, length, growth, runs[-len(mission.blocks) :], error, rates)
+    return Step(node, runs, float(error @ mission.area))
 
 
-def _corrected(
-    mission: Mission, nodes: tuple[MissionNode, MissionNode, MissionNode], whole: Flight
-) -> tuple[MissionNode, float]:
-    """The end of a step in two parts (start, middle, end) with the step at once, and its `order_error`."""
-    start, middle, end = nodes
-    n = end.mission - start.mission
-    parts = middle.mission - start.mission, end.mission - middle.mission
-    missed = [of * (of - 1) for of in parts]
-    scale = 1.0 / ((-n * (n + 1) if mission.reversible else n * (n - 1)) - sum(missed))
-    grown = end.growth - start.growth
-    apart = grown - whole.growth
-    # in order only, a correction may be larger than the wear: it is limited, and the step is refused
-    full = np.maximum(grown + sum(missed) * scale * apart, 0.0)
-    to_half = np.clip(middle.growth - start.growth + missed[0] * scale * apart, 0.0, full)
-    # block by block: where blocks adapt the pressures against each other, their sum is the same in any order
-    order = abs(scale) * sum(of * of for of in parts) * np.abs(apart).sum(axis=0)
-    node = MissionNode(
-        end.mission,
-        start.growth + full,
-        (middle.mission, start.growth + to_half),
-        (*middle.responses, *end.responses),
-        middle.likes,
-        order if sum(missed) else None,
-        end.carried,
+@dataclass(frozen=True)
+class _Formula:
+    """The step from the nodes before: `Z = base + factor R(Z)`, by blocks (n_block, n_contact).
+
+    first: Z of the parabola through three nodes before, m.
+    ahead: its depth at the end of the step, m.
+    share: error over the difference of the end to `ahead`.
+    """
+
+    base: FloatArray
+    factor: float
+    first: FloatArray
+    ahead: FloatArray
+    share: float
+    length: int
+
+    @classmethod
+    def of(cls, nodes: tuple[MissionNode, ...], length: int) -> _Formula:
+        """The formula of a step of some missions behind at least three nodes."""
+        past, before, now = nodes[-3:]
+        h, a, b = float(length), float(now.mission - before.mission), float(before.mission - past.mission)
+        last = (now.growth - before.growth) / a
+        turn = (last - (before.growth - past.growth) / b) / (a + b)
+        first, ahead = (now.growth + at * last + at * (at + a) * turn for at in (h - 1.0, h))
+        whole = 2.0 * h - 1.0 + a
+        base = now.growth + (h - 1.0) * h / whole * last
+        share = (h - 1.0) * (h - 1.0 + a) / (whole * (h + a + b))
+        factor = (h - 1.0) * (h - 1.0 + a) / whole
+        return cls(base, factor, np.maximum(first.sum(axis=0), base.sum(axis=0)), ahead.sum(axis=0), share, length)
+
+    def error_of(self, end: FloatArray) -> FloatArray:
+        """Local error (n_contact,), m, of the depth at the end of the step."""
+        return np.abs(self.share * (end - self.ahead))
+
+
+def _solve(
+    mission: Mission, now: MissionNode, formula: _Formula, run: Fly, allowed: Allowed
+) -> tuple[FloatArray, tuple[BlockRun, ...], FloatArray] | Failure:
+    """The depth Z (n_contact,), m, all blocks that were flown, and its last correction (n_contact,), m."""
+    base, factor, depth = formula.base.sum(axis=0), formula.factor, formula.first
+    flown, slope, last = list[BlockRun](), np.zeros((base.size, base.size)), None
+    start, missions = float(now.depth @ mission.area), now.mission + formula.length - 1
+    for iteration in range(MISSIONS.step_iterations):
+        runs = fly(mission, missions, depth, now.carried, run, with_slopes=iteration == 0)
+        if isinstance(runs, Failure):
+            return runs
+        flown.extend(runs)
+        rate = np.sum([each.growth for each in runs], axis=0)
+        if last is None:
+            slope = mission_slope(runs)
+        else:
+            moved, change = depth - last[0], rate - last[1]
+            slope = slope + np.outer(change - slope @ moved, moved) / max(float(moved @ moved), 1e-300)
+        last = depth, rate
+        missing = base + factor * rate - depth
+        try:
+            depth = np.maximum(depth + np.linalg.solve(np.eye(base.size) - factor * slope, missing), base)
+        except np.linalg.LinAlgError:
+            break
+        if not np.isfinite(depth).all():
+            break
+        left = np.abs(depth - last[0])
+        end = float((depth + (depth - base) / factor) @ mission.area)
+        if left @ mission.area <= MISSIONS.depth_tolerance * allowed(start, end, now.mission, formula.length):
+            return depth, tuple(flown), left
+    said = f"the depth before mission {missions + 1}, {formula.length} missions at once, was not found"
+    return Failure(Outcome.MARCH_FAILED, said)
+
+
+def mission_slope(runs: tuple[BlockRun, ...]) -> FloatArray:
+    """Derivative (n_contact, n_contact) of the wear of a mission with respect to the depth before it."""
+    unit = np.eye(runs[0].growth.size)
+    whole = unit
+    for each in runs:
+        assert each.slope is not None
+        whole = (unit + each.slope) @ whole
+    return np.asarray(whole - unit)
+
+
+def _node(
+    now: MissionNode,
+    length: int,
+    before: FloatArray,
+    runs: tuple[BlockRun, ...],
+    error: FloatArray,
+    rates: FloatArray | None = None,
+) -> MissionNode:
+    """The end of a step, from the depths by block before its last mission, m, and the blocks of this mission."""
+    rates = np.array([run.growth for run in runs]) if rates is None else rates
+    values = {
+        f"{name}_{end}": np.array([getattr(run, of)[row] for run in runs])
+        for name, of in (("response", "response"), ("response_peak", "peak"))
+        for row, end in enumerate(("begin", "end"))
+    }
+    values |= {name: np.array([getattr(run, name) for run in runs]) for name in ("response_error", "growth_error")}
+    return MissionNode(
+        now.mission + length,
+        before + rates,
+        rates,
+        now.local + error,
+        values,
+        tuple(run.like for run in runs if run.like is not None),
+        runs[-1].last,
     )
-    volume = float(grown.sum(axis=0) @ mission.area)
-    return node, float(order @ mission.area) / volume if volume > 0.0 else 0.0

@@ -6,6 +6,7 @@ preconditioner.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -51,31 +52,39 @@ class JacobianSolver:
         step[rest] = (right - tangent.apply_roughly(step))[rest]
         return step
 
-    def solve_two(
-        self, tangent: Linearisation, first: FloatArray, second: FloatArray, rtol: float = NEWTON.forcing
+    def solve_with_parameter(
+        self, tangent: Linearisation, right: FloatArray, by_parameter: FloatArray, rtol: float = NEWTON.forcing
     ) -> tuple[FloatArray, FloatArray]:
-        """Steps (n_rel, m) for two right-hand sides; a small system is factorised once.
+        """Steps (n_rel, m) for a residual and for the derivative by a parameter.
 
-        The second one is that of a parameter. Its step changes little from solve to solve: a large system is solved for
-        the difference to the step before.
+        The second one changes little from solve to solve: a large system is solved for the difference to the step
+        before.
         """
+        if _is_dense(tangent, right.shape[1]):
+            first, second = self.solve_all(tangent, (right, by_parameter), rtol)
+            return first, second
+        step = self.solve(tangent, right, rtol)
+        self._by_parameter = self._near(self._by_parameter, tangent, by_parameter, rtol)
+        return step, self._by_parameter
+
+    def solve_all(
+        self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = NEWTON.forcing
+    ) -> list[FloatArray]:
+        """Steps (n_rel, m) for several right-hand sides; a small system is factorised once."""
+        if not _is_dense(tangent, rights[0].shape[1]):
+            return [self.solve(tangent, right, rtol) for right in rights]
         pairs = tangent.active()
         rows = tangent.joint.rows_of(pairs)
-        if not rows.size or not is_dense_cheapest(rows.size * first.shape[1], rows.size):
-            step = self.solve(tangent, first, rtol)
-            self._by_parameter = self._near(self._by_parameter, tangent, second, rtol)
-            return step, self._by_parameter
-        both = np.stack([first[rows].ravel(), second[rows].ravel()], axis=1)
-        solved = _solve_dense(tangent.dense(pairs), both)
+        solved = _solve_dense(tangent.dense(pairs), np.stack([right[rows].ravel() for right in rights], axis=1))
         steps = []
-        for right, column in ((first, solved[:, 0]), (second, solved[:, 1])):
+        for right, column in zip(rights, solved.T, strict=True):
             step = np.zeros_like(right)
             step[rows] = column.reshape(rows.size, -1)
             rest = np.ones(right.shape[0], bool)
             rest[rows] = False
             step[rest] = (right - tangent.apply_roughly(step))[rest]
             steps.append(step)
-        return steps[0], steps[1]
+        return steps
 
     def _near(self, guess: FloatArray | None, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
         """Step (n_rel, m) as from `solve`, from a guess (n_rel, m) where this is nearer than zero."""
@@ -193,6 +202,12 @@ def _settled(values: ComplexArray, residuals: FloatArray) -> bool:
     """Whether it is certain which eigenvalues are negative, from Ritz values and their residuals."""
     doubtful = ~(values.real >= NEWTON.settled)
     return bool(np.all((residuals < NEWTON.settled * np.abs(values))[doubtful]))
+
+
+def _is_dense(tangent: Linearisation, m: int) -> bool:
+    """Whether a dense factorisation of the rows of the active pairs, times m unknowns, is cheapest."""
+    rows = tangent.joint.rows_of(tangent.active()).size
+    return rows > 0 and is_dense_cheapest(rows * m, rows)
 
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:

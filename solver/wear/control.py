@@ -12,7 +12,6 @@ import numpy as np
 
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import vibration_change
-from solver.model import FloatArray
 from solver.options import COMMON
 from solver.settings import Scheme
 from solver.wear.bdf2 import bdf2_attempt
@@ -104,22 +103,36 @@ class AdaptiveSteps:
             shorter = COMMON.smallest_step_ratio
             if tried is not None:
                 size = float(np.abs(tried.error) @ work.area)
-                ratio = size / self._allowed(work, state, tried.end.point.evaluation.wear_depth, length)
-                wanted = COMMON.step_safety / np.sqrt(max(ratio, 1e-12))
+                before, after = (float(at @ work.area) for at in (state.depth, tried.end.point.evaluation.wear_depth))
+                ratio = size / allowed_error(self.rtol, before, after, state.cycle, length)
                 # at the shortest step: a corner of the wear rate, or the end of the branch if the vibration changes
                 calm = vibration_change(state.point.evaluation, tried.end.point.evaluation) < CONTINUATION.smooth_change
                 if ratio <= 1.0 or (length <= shortest and calm):
-                    ahead = length * float(np.clip(wanted, COMMON.step_safety, COMMON.largest_step_ratio))
+                    ahead = length * next_ratio(ratio, accepted=True)
                     return Step(work.accepted(state, tried.end, length).planned(ahead), size, length)
-                shorter = float(np.clip(wanted, COMMON.smallest_step_ratio, COMMON.step_safety))
+                shorter = next_ratio(ratio, accepted=False)
             if length <= shortest:
                 one_step = bounded_euler_step if self.bounded else euler_step
                 taken = one_step(work, state, length, "implicit")
                 return taken if isinstance(taken, Failure) else replace(taken, state=taken.state.planned(length))
             length = max(shorter * length, 0.999 * shortest)
 
-    def _allowed(self, work: WearingJoint, state: WearState, depth: FloatArray, length: float) -> float:
-        """Allowed error of a step, m3; depth (n_contact,): at the end of the step, m."""
-        worn, before = float(depth @ work.area), float(state.depth @ work.area)
-        at_mean_rate = worn * length / (state.cycle + length)
-        return max(COMMON.step_error_fraction * self.rtol * max(worn - before, at_mean_rate), 1e-300)
+
+def allowed_error(rtol: float, before: float, after: float, count: float, length: float) -> float:
+    """Allowed error of an adaptive step, m3.
+
+    before, after: worn volumes at its start and end, m3.
+    count, length: count at its start, and its length, in cycles or in missions.
+    """
+    at_mean_rate = after * length / (count + length)
+    return max(COMMON.step_error_fraction * rtol * max(after - before, at_mean_rate), 1e-300)
+
+
+def next_ratio(error: float, *, accepted: bool) -> float:
+    """Length of the next step of second order, or of a step that is tried again, over the length of the present one.
+
+    error: of the present step, over the allowed error.
+    """
+    wanted = COMMON.step_safety / np.sqrt(max(error, 1e-12))
+    least, most = COMMON.step_safety, COMMON.largest_step_ratio
+    return float(np.clip(wanted, *((least, most) if accepted else (COMMON.smallest_step_ratio, least))))

@@ -14,7 +14,7 @@ from studyrunner.plan.estimate import (
     ITERATIONS_AN_ADAPTIVE_STEP,
     ITERATIONS_OF_MODE,
     ITERATIONS_TO_A_FINAL_STATE,
-    MISSIONS_FLOWN_AT_ONCE,
+    MISSIONS_FLOWN,
     memory_a_rank,
     seconds_an_iteration,
 )
@@ -138,7 +138,7 @@ def _assumed(study: Study, plan: TaskPlan) -> str:
         iterations = f"{ITERATIONS_A_MODE_POINT} Newton iterations of {milliseconds:.0f} ms or less a point"
         return f"{iterations}, {ITERATIONS_OF_MODE} to the first; a first run compiles for {COMPILE_SECONDS} s more"
     if study.has_missions:
-        at_once = f"{MISSIONS_FLOWN_AT_ONCE} steps of many missions, each flies every block four times"
+        at_once = f"{MISSIONS_FLOWN} missions are flown for thousands, and again for their reference solution"
         return f"{at_once}; Newton iterations of {milliseconds:.0f} ms or less; none where nothing slips"
     said = f"{ITERATIONS_A_STEP} Newton iterations of {milliseconds:.0f} ms or less a step"
     if "final" in study.axes.scheme:

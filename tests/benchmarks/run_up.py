@@ -50,16 +50,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scene", choices=CASES, default="sdof_slider")
     parser.add_argument("--rates", type=float, nargs="+", default=[0.1, 0.3, 1.0, 3.0])
-    parser.add_argument("--steps", type=int, default=400)
+    parser.add_argument("--steps", type=int, default=500)
+    parser.add_argument("--ways", choices=["up", "down"], nargs="+", default=["up", "down"])
     given = parser.parse_args()
     changes, ends, amplitude = CASES[given.scene]
     model = build_scene(given.scene, **changes)
-    for start, stop in (ends, ends[::-1]):
+    for way in given.ways:
+        start, stop = ends if way == "up" else ends[::-1]
         slow = Passage(start, stop, 1.0)
         block = Block(model, slow, amplitude, FRICTION, begin=slow.sweep)
         history = integrate_mission((replace(block, cycles=None),), 1e-30, 1, settings=SolverSettings())
         volume, unit = float(history.worn_volume[-1]) / 1e-30, float(history.sweep_rate[0])
-        print(f"{slow.sweep}: steady states, 1 Hz/s = {unit:.3g} (zeta f)^2: {history.message}", flush=True)
+        print(
+            f"{slow.sweep}: steady states known to {history.error_estimate:.2%}, 1 Hz/s = {unit:.3g} (zeta f)^2",
+            flush=True,
+        )
         for rate in given.rates:
             began = time.process_time()
             passage = replace(slow, rate=rate / unit)

@@ -90,8 +90,10 @@ def test_two_right_sides_are_solved_as_one_by_one() -> None:
         solver = JacobianSolver()
         # a second side near the one before, equal to it, and far from it
         for other in (second, second + 1e-2 * noise, second + 1e-2 * noise, noise):
-            for right, step in zip((first, other), solver.solve_two(tangent, first, other), strict=True):
+            for right, step in zip((first, other), solver.solve_with_parameter(tangent, first, other), strict=True):
                 assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
+        for right, step in zip((first, second), solver.solve_all(tangent, (first, second)), strict=True):
+            assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
 
 
 def test_ritz_values_of_a_whole_space_are_the_eigenvalues() -> None:

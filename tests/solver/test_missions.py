@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import trapezoid
+from scipy.integrate import solve_ivp, trapezoid
+from scipy.linalg import expm
 
 from solver import Block, MissionHistory, Outcome, Passage, SolverSettings, integrate_mission, march_wear
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.missions import solutions
 from solver.missions.block_run import BlockCase, BlockRun
 from solver.missions.blocks import Begin, Mission
-from solver.missions.course import MissionNode, growth_within
+from solver.missions.course import MissionCourse, MissionNode
 from solver.missions.history import integrate_missions
 from solver.missions.options import MISSIONS
-from solver.missions.passage import SweptState, _states, interval_errors, sweep_rate
-from solver.missions.step import Step, missions_read, take_step
+from solver.missions.passage import SweptState, _states, in_order, interval_errors, sweep_rate
+from solver.missions.step import Step, take_step
 from solver.model import FloatArray, ReducedModel
 from solver.packing import Packed
 from solver.results.history import StartState
@@ -97,15 +99,15 @@ def test_gross_slip_wears_by_the_stroke_times_the_load_in_any_order(order: int) 
     model = scene("sdof_slider", normal_stiffness=0.0)
     amplitudes, cycles = ((10.0, 14.0), (3e3, 5e3))
     blocks = tuple(Block(model, 160.0, *of, "continue") for of in zip(amplitudes, (FRICTION,) * 2, cycles, strict=True))
-    history = integrate(blocks[::order], 18)
+    history = integrate(blocks[::order], 6)
     once = [march_wear(model, 160.0, load, FRICTION, WEAR, 1.0, settings=SETTINGS) for load in amplitudes]
-    exact = np.array([18.0 * n * one.wear_rate[0] for n, one in zip(cycles, once, strict=True)])[::order]
+    exact = np.array([6.0 * n * one.wear_rate[0] for n, one in zip(cycles, once, strict=True)])[::order]
     np.testing.assert_allclose(history.block_volume[-1], exact, rtol=1e-6)
     # the slip path is four amplitudes
     amplitude = float(np.abs(history.response_end[-1, 0, 0]))
-    assert exact[0] / (18.0 * cycles[::order][0]) == pytest.approx(WEAR * 10.0 * 4.0 * amplitude, rel=0.05)
+    assert exact[0] / (6.0 * cycles[::order][0]) == pytest.approx(WEAR * 10.0 * 4.0 * amplitude, rel=0.05)
     assert history.outcome is Outcome.CONVERGED
-    assert history.steps.tolist() == [2, 8, 8]
+    assert history.steps.tolist() == [1, 1, 2, 2]
 
 
 # --- many missions against missions one by one, with blocks whose wear is known exactly ---
@@ -126,26 +128,24 @@ def pairs() -> ReducedModel:
 def exact_run(case: Any, like: Any = None) -> BlockRun:
     """The wear of `dW/dn = r - L W` through a block; the reference solution wears a little more."""
     rate, loss = RATES[case.place] * (1.0 if like is None else 1.001), LOSS[case.place]
+    slope = expm(-case.block.steady[1] * loss) - np.eye(2)
+    # `r - L W` lies in the range of L but for uniform wear
     values, vectors = np.linalg.eigh(loss)
-    now, modal = vectors.T @ case.depth, vectors.T @ rate
-    growth = []
-    for n in case.counts:
-        decay = np.where(values > 1e-12, -np.expm1(-values * n) / np.where(values > 1e-12, values, 1.0), n)
-        growth.append(vectors @ (decay * (modal - values * now)))
-    response = np.array([[complex(depth.sum())] for depth in case.depth + np.array(growth)])
-    done = Failure(Outcome.CONVERGED)
-    peak, none = np.abs(response), np.zeros(len(case.missions))
-    start_rate = rate - loss @ case.depth
-    return BlockRun(case.missions, np.array(growth), response, peak, none, done, start_rate, like=Like((), 1.0, 1))
+    n = case.block.steady[1]
+    decay = np.where(values > 1e-12, -np.expm1(-values * n) / np.where(values > 1e-12, values, 1.0), n)
+    growth = vectors @ (decay * (vectors.T @ (rate - loss @ case.depth)))
+    response = np.array([[complex(depth.sum())] for depth in (case.depth, case.depth + growth)])
+    slope = slope if case.with_slope else None
+    return BlockRun(Failure(Outcome.CONVERGED), growth, slope, response, np.abs(response), like=Like((), 1.0, 1))
 
 
 @pytest.fixture
 def exact_blocks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Blocks of exactly known wear; the list has the missions of each run."""
+    """Blocks of exactly known wear; the list has an entry for each run."""
     flown: list[int] = []
 
     def run(case: Any, like: Any = None) -> BlockRun:
-        flown.append(case.missions[-1])
+        flown.append(1)
         return exact_run(case, like)
 
     monkeypatch.setattr(solutions, "run_block", run)
@@ -159,7 +159,7 @@ def exactly_known(missions: Any, cycles: float = 1.0, order: int = 1, **more: An
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("cycles", "limit"), [(0.1, 60), (0.3, 100), (3.0, 1000)])
+@pytest.mark.parametrize(("cycles", "limit"), [(0.1, 20), (3.0, 30), (30.0, 30)])
 def test_two_thousand_missions_agree_with_missions_one_by_one(
     exact_blocks: list[int], cycles: float, limit: float
 ) -> None:
@@ -171,9 +171,10 @@ def test_two_thousand_missions_agree_with_missions_one_by_one(
     assert many.outcome is once.outcome is Outcome.CONVERGED
     bars = many.wear_depth_error + once.wear_depth_error
     assert (np.abs(many.wear_depth - once.wear_depth) <= bars).all()
-    np.testing.assert_allclose(many.wear_depth[:2], once.wear_depth[:2], rtol=1e-9)
+    np.testing.assert_array_equal(many.wear_depth[:2], once.wear_depth[:2])
     assert many.error_estimate < SETTINGS.rtol
-    assert (np.abs(many.block_volume - once.block_volume) <= 2.0 * (bars @ pairs().contact.area)[:, None]).all()
+    of_blocks = many.block_volume_error * many.block_volume + once.block_volume_error * once.block_volume
+    assert (np.abs(many.block_volume - once.block_volume) <= of_blocks).all()
     # each mission is two blocks and their reference solution
     flown = (len(exact_blocks) - flown_once) / 4
     assert flown < limit
@@ -181,29 +182,32 @@ def test_two_thousand_missions_agree_with_missions_one_by_one(
     assert many.missions[-1] == many.steps.sum() == many.last_mission == 2000
 
 
-def test_a_step_is_of_second_order_and_exact_for_two_missions(exact_blocks: list[int]) -> None:
+def test_a_step_is_of_second_order_and_its_error_is_known(exact_blocks: list[int]) -> None:
+    """After exact missions 0, H and 2H: against missions one by one."""
     model = pairs()
     mission = Mission((Block(model, 1.0, 1.0, 0.5, 1.0), Block(model, 2.0, 1.0, 0.5, 2.0)), 1.0, (0, 64), SETTINGS)
-    start = MissionNode(0, np.zeros((2, 2)))
+    nodes = list(MissionCourse.begun(2, 2).nodes)
 
-    def run(place: int, depth: FloatArray, carried: Any, missions: tuple[int, ...]) -> BlockRun:
-        return exact_run(BlockCase(mission, place, depth, carried, missions, SETTINGS))
+    def run(place: int, depth: FloatArray, carried: Any, with_slope: bool) -> BlockRun:
+        return exact_run(BlockCase(mission, place, depth, carried, with_slope, SETTINGS))
 
-    def end(parts: tuple[int, ...], steps: int) -> FloatArray:
-        node = start
-        for _ in range(steps):
-            taken = take_step(mission, node, parts, run)
-            assert isinstance(taken, Step)
-            node = taken.node
-        return node.growth
+    def step(before: list[MissionNode], length: int) -> Step:
+        taken = take_step(mission, tuple(before), length, run, lambda *_: 1e-16)
+        assert isinstance(taken, Step)
+        return taken
 
-    once = end((1,), 64)
-    np.testing.assert_allclose(end((1, 1), 32), once, rtol=1e-12)
-    errors = [float(np.abs(end((n // 2, n // 2), 64 // n) - once).max()) for n in (32, 16, 8)]
-    assert 3.0 < errors[0] / errors[1] < 5.0
-    assert 3.0 < errors[1] / errors[2] < 7.0
-    # uneven parts are as good
-    assert float(np.abs(end((5, 3), 8) - once).max()) < 2.0 * errors[2]
+    while nodes[-1].mission < 48:
+        nodes.append(step(nodes, 1).node)
+    errors = []
+    for length in (1, 2, 4, 8, 16):
+        taken = step(nodes[: 2 * length + 1 : length], length)
+        apart = np.abs(taken.node.depth - nodes[3 * length].depth) @ mission.area
+        if length > 1:
+            assert apart == pytest.approx(taken.error, rel=0.15)
+            np.testing.assert_allclose(taken.node.growth, nodes[3 * length].growth, rtol=5e-3)
+        errors.append(apart)
+    assert errors[0] < 1e-12 * float(nodes[-1].depth @ mission.area)
+    assert 6.0 < errors[4] / errors[3] < 8.5
 
 
 def test_the_order_of_blocks_counts_by_less_than_a_mission(exact_blocks: list[int]) -> None:
@@ -252,40 +256,24 @@ def test_a_block_that_fails_at_once_is_flown_in_shorter_steps(monkeypatch: pytes
     """And one that fails in a single mission ends the history there, with what was computed."""
 
     def run(case: Any, like: Any = None) -> BlockRun:
-        found = exact_run(case, like)
-        lost = case.missions[-1] > 9 or case.depth.max() > limit
-        return replace(found, failure=Failure(Outcome.MARCH_FAILED, "lost")) if lost else found
+        nonlocal deepest
+        found, depth = exact_run(case, like), float(case.depth.max())
+        if depth > limit or (like is None and depth > deepest + 4e-8):
+            return replace(found, failure=Failure(Outcome.MARCH_FAILED, "lost"))
+        deepest = max(deepest, depth + float(found.growth.max()))
+        return found
 
     monkeypatch.setattr(solutions, "run_block", run)
-    limit = 1.0
+    limit, deepest = 1.0, 0.0
     history = exactly_known((0, 60), 1.0)
     assert history.outcome is Outcome.CONVERGED
-    assert history.steps.max() <= 9
-    limit = 0.5 * float(history.wear_depth[-1].max())
+    assert 4 <= history.steps.max() <= 8
+    limit, deepest = 0.5 * float(history.wear_depth[-1].max()), 0.0
     history = exactly_known((0, 60), 1.0)
     assert history.outcome is Outcome.MARCH_FAILED
-    assert history.message == "lost"
+    assert re.fullmatch(r"in mission \d+, block [12]: lost", history.message)
     assert 2 < history.last_mission < 60
     assert np.isnan(history.worn_volume[-1])
-
-
-def test_growth_within_a_step_never_falls() -> None:
-    random = np.random.default_rng(1)
-    start = MissionNode(0, random.uniform(size=(2, 3)))
-    grown = random.uniform(size=(2, 3))
-    end = MissionNode(10, start.growth + grown, (4, start.growth + random.uniform(size=(2, 3)) * grown))
-    read = np.array([growth_within(start, end, mission) for mission in np.linspace(0.0, 10.0, 101)])
-    assert (np.diff(read, axis=0) >= -1e-15).all()
-    np.testing.assert_allclose(read[[0, -1]], [start.growth, end.growth], rtol=1e-12)
-    # a parabola is met
-    half = MissionNode(10, start.growth + grown, (4, start.growth + (0.4 + 0.24 * 0.5) * grown))
-    np.testing.assert_allclose(growth_within(start, half, 7.0), start.growth + (0.7 + 0.21 * 0.5) * grown, rtol=1e-12)
-
-
-def test_missions_that_are_read() -> None:
-    assert missions_read(1) == (0, 1)
-    assert missions_read(2) == (0, 1, 2)
-    assert missions_read(9) == (0, 1, 8, 9)
 
 
 # --- with the solver ---
@@ -299,7 +287,7 @@ def test_missions_of_the_slider_agree_with_missions_one_by_one_and_go_on_to_the_
     many = integrate_missions(mission, keep=kept.append)
     once = integrate_missions(replace(mission, largest_step=1))
     assert many.outcome is once.outcome is Outcome.CONVERGED
-    assert many.steps.max() > 2
+    assert many.steps.tolist() == [1, 1, 2, 2]
     assert (np.abs(many.wear_depth - once.wear_depth) <= many.wear_depth_error + once.wear_depth_error).all()
     assert many.error_estimate < 2.0 * SETTINGS.rtol
     # missions whose responses are known
@@ -347,6 +335,30 @@ def test_the_error_of_the_trapezoidal_rule_is_known_on_both_sides_of_a_jump() ->
     np.testing.assert_allclose(errors[4:], 0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_frequencies_of_a_passage_wear_one_after_the_other(order: int) -> None:
+    """`dy/df = g(f) - L(f) y`, up and down, with a derivative by the depth before; against its integration."""
+    at = np.linspace(0.0, 1.0, 201)
+    loss = np.array([[1.0, -1.0], [-0.5, 0.5]])
+
+    def rates(f: float) -> tuple[FloatArray, FloatArray]:
+        return np.array([1.0 + f, 2.0 * (1.0 - f)]), -(1.0 + 3.0 * f) * loss
+
+    states = [replace(state(f, 0.0), density=rates(f)[0]) for f in at][::order]
+    grown, slope = in_order(states, [rates(of.frequency)[1] for of in states])
+    ends = (0.0, 1.0)[::order]
+
+    def end(before: FloatArray) -> FloatArray:
+        def rise(f: float, y: FloatArray) -> FloatArray:
+            density, derivative = rates(f)
+            return order * (density + derivative @ y)
+
+        return solve_ivp(rise, ends, before, rtol=1e-10, atol=1e-12).y[:, -1]
+
+    np.testing.assert_allclose(grown, end(np.zeros(2)), rtol=1e-4)
+    np.testing.assert_allclose(slope @ [0.1, 0.0], end(np.array([0.1, 0.0])) - end(np.zeros(2)) - [0.1, 0.0], rtol=1e-3)
+
+
 def test_the_sweep_rate_is_that_of_the_half_power_width() -> None:
     """A linear oscillator of 100 Hz and damping ratio 0.01, and no peak at the edge of the range."""
     at = np.linspace(90.0, 110.0, 401)
@@ -362,9 +374,9 @@ def test_a_passage_wears_as_a_fixed_grid_of_frequencies() -> None:
     block = Block(model, passage, 10.0, FRICTION, begin="up")
     history = integrate((block,), 1)
     mission = Mission((block,), WEAR, (0, 1), SETTINGS)
-    case = BlockCase(mission, 0, np.zeros(1), None, (0, 1), SETTINGS)
+    case = BlockCase(mission, 0, np.zeros(1), None, with_slope=False, settings=SETTINGS)
     grid = np.linspace(185.0, 215.0, 33)
-    fixed = _states(case, passage, case.depth, grid)
+    fixed = _states(case, passage, grid)
     assert isinstance(fixed, list)
     volume = trapezoid([float(of.density @ mission.area) for of in fixed], grid)
     bar = float(interval_errors(fixed, mission.area).sum()) + history.error_estimate * history.worn_volume[-1]

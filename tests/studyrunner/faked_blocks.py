@@ -62,15 +62,14 @@ class FakedBlocks:
         self.flown.append(case)
         block, contact = case.block, case.block.model.contact
         cycles = block.frequency.cycles if isinstance(block.frequency, Passage) else block.cycles
-        counts = np.array(case.missions) * cycles
         rate = case.mission.wear_coefficient * block.excitation_amplitude * load_of(block) * block.ends[1] * 1e-5
         rate = rate * (1.0 if like is None else 1.001) * (1.0 - (case.depth + contact.gap) / _DEPTH)
-        growth = counts[:, None] * rate
-        response = 1e-6 * block.excitation_amplitude * (1.0 + case.depth.sum() + counts[:, None] / counts.max())
+        response = 1e-6 * block.excitation_amplitude * (1.0 + case.depth.sum() + np.array([[0.0], [1.0]]))
         ended = Failure(self.fails.get(block.name, Outcome.CONVERGED), "")
+        slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
         return BlockRun(
-            case.missions, growth, response.astype(complex), 1.5 * response, np.full(len(counts), 1e-3), ended, rate,
-            like=Like((), 1.0, 1), iterations=7,
+            ended, cycles * rate, slope, response.astype(complex), 1.5 * response, 1e-3, like=Like((), 1.0, 1),
+            iterations=7,
         )  # fmt: skip
 
 
