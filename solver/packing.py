@@ -8,7 +8,6 @@ to the last bit therefore continues from the unpacked value itself.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, TypeVar, cast
 
@@ -74,12 +73,6 @@ def unpack(packed: Packed) -> Any:
 def attributes(part: object, state: type[T]) -> T:
     """Those attributes of an object that are keys of a TypedDict `state`."""
     return cast("T", {name: getattr(part, name) for name in state.__annotations__})
-
-
-def set_attributes(part: object, state: Mapping[str, object]) -> None:
-    """Set the attributes that a state holds."""
-    for name, value in state.items():
-        setattr(part, name, value)
 
 
 def _described(value: object, arrays: list[NDArray[np.generic]]) -> object:

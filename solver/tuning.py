@@ -1,6 +1,6 @@
 """Other limits of the solver for a hard case, inside a `with` block in Python.
 
-    with solver.tuned(history_iterations=20_000, jump_iterations=3000):
+    with solver.tuned(history_iterations=20_000, search_iterations=3000):
         history = solver.march_wear(...)
 
 `TUNABLE` has the names. The file `options.py` of each room holds the constants, with the meaning of each constant and
@@ -11,33 +11,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
+from typing import Any
 
-TUNABLE = {
-    "NEWTON": ("newton", ("iterations", "forcing", "most_directions")),
-    "CONTINUATION": ("continuation", ("arc_correctors", "load_steps", "transient_effort", "longest_transient")),
-    "ACCURACY": (
-        "accuracy",
-        ("penetration_limit", "energy_limit", "level_iterations", "refinement_work", "most_samples", "most_unknowns"),
-    ),
-    "LOADING": (
-        "loading_history",
-        ("change_limits", "shortest_sweep_step", "sweep_iterations"),
-    ),
-    "WEAR": (
-        "wear",
-        (
-            "step_error_fraction",
-            "step_iterations",
-            "history_iterations",
-            "jump_iterations",
-            "fold_resolution",
-            "largest_moved_load",
-            "steps_to_the_end",
-        ),
-    ),
-}
-"""For each options object: its room, and the constants that may be changed."""
+from solver.accuracy.options import ACCURACY
+from solver.continuation.options import CONTINUATION
+from solver.loading_history.options import LOADING
+from solver.newton.options import NEWTON
+from solver.options import COMMON
+from solver.wear.options import WEAR
+
+_NAMES: tuple[tuple[Any, tuple[str, ...]], ...] = (
+    (COMMON, ("step_error_fraction",)),
+    (NEWTON, ("iterations", "forcing", "most_directions")),
+    (CONTINUATION, ("near_iterations", "search_iterations", "arc_correctors", "load_steps")),
+    (ACCURACY, ("penetration_limit", "energy_limit", "refinement_work", "most_samples", "most_unknowns")),
+    (LOADING, ("change_limits", "shortest_sweep_step", "sweep_iterations")),
+    (WEAR, ("history_iterations", "fold_resolution", "largest_moved_load", "steps_to_the_end")),
+)
+TUNABLE: dict[str, Any] = {name: options for options, names in _NAMES for name in names}
+"""For each constant that may be changed, the options to which it belongs."""
 
 
 @contextmanager
@@ -54,17 +46,14 @@ def tuned(**values: float | tuple[float, ...]) -> Iterator[None]:
     ValueError
         No constant has this name, or the value is of another type.
     """
-    of_name = {name: (room, options) for options, (room, names) in TUNABLE.items() for name in names}
     before = []
     for name, value in values.items():
-        if name not in of_name:
-            raise ValueError(f"{name}: give one of {', '.join(sorted(of_name))}")
-        room, options = of_name[name]
-        constants = getattr(import_module(f"solver.{room}.options"), options)
-        old = getattr(constants, name)
+        if name not in TUNABLE:
+            raise ValueError(f"{name}: give one of {', '.join(sorted(TUNABLE))}")
+        old = getattr(TUNABLE[name], name)
         if isinstance(old, tuple) != isinstance(value, tuple) or isinstance(value, str | bool):
             raise ValueError(f"{name}: give a value like {old!r} instead of {value!r}")
-        before.append((constants, name, old))
+        before.append((TUNABLE[name], name, old))
     try:
         for constants, name, _ in before:
             # the options are frozen: only this function changes them

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from solver.accuracy.refinement import refine
 from solver.balance_functions import HarmonicBalance, balance_at_start, functions_of, start_of
+from solver.continuation.arc_length import Arc
 from solver.continuation.options import CONTINUATION
 from solver.continuation.whole_curve import Branch, follow_branch_whole
 from solver.forced_response import check_case, check_number, check_numbers, worn_model
@@ -137,8 +138,9 @@ def response_curve(
     begin = PathPoint(float(first), at, balance.history)
     # a branch may turn back behind its start before it comes to the last value
     back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
-    span = abs(last - first) / (CONTINUATION.longest_arc * _FEWEST_STEPS)
-    branch = follow_branch_whole(balance_at, begin, last, back, span, settings.tolerance, Budget(), most)
+    span = abs(last - first) / (CONTINUATION.smooth_change * _FEWEST_STEPS)
+    arc = Arc(balance_at, begin, span, JacobianSolver(), settings.tolerance, Budget())
+    branch = follow_branch_whole(arc, last, back, most)
     return _reported(case, branch, balance_at, over_frequency, errors, _end(branch, most, over_frequency))
 
 

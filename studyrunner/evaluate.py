@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Generic, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.missions.result import MissionHistory
 from solver.model import ReducedModel
 from solver.outcome import Outcome, describe_error
 from solver.packing import Packed, pack, unpack
@@ -18,9 +19,10 @@ from solver.results.history import StartState, WearHistory
 from solver.results.mode_values import ModeValues, without_state
 from solver.settings import Resolution, ToTheEnd
 from studyrunner.history_result import build_result
+from studyrunner.mission_result import build_mission_result, missions_read
 from studyrunner.mpi.shared_memory import Address, open_shared
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
-from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.plan.tasks import BranchTask, Joint, MarchTask
 from studyrunner.system.machine_faults import (
     MachineFaultError,
     guard_kernel_cache,
@@ -32,37 +34,37 @@ _ROUND_OFF = 1e-10
 
 
 MODELS_A_RANK = 2
-"""Models that a rank holds where a study has several scenes."""
+"""Models, or sets of models of the blocks of a mission, that a rank holds where a study has several scenes."""
 
-Model = TypeVar("Model")
+Models = TypeVar("Models")
 
 
-class ModelCache(Generic[Model]):
-    """The models of the scenes that a rank has computed with last, by number of the scene.
+class ModelCache(Generic[Models]):
+    """The models that a rank has computed with last, by the numbers of the scenes that a task needs.
 
     Rank 0 keeps such a list for each rank, without models, and so knows which models the rank has.
     """
 
     def __init__(self) -> None:
-        self._models: OrderedDict[int, Model] = OrderedDict()
+        self._models: OrderedDict[tuple[int, ...], Models] = OrderedDict()
 
-    def use(self, number: int) -> bool:
-        """Whether the model is there; the model is then the last to be removed."""
-        if number in self._models:
-            self._models.move_to_end(number)
-        return number in self._models
+    def use(self, scenes: tuple[int, ...]) -> bool:
+        """Whether the models are there; they are then the last to be removed."""
+        if scenes in self._models:
+            self._models.move_to_end(scenes)
+        return scenes in self._models
 
-    def add(self, number: int, model: Model) -> None:
-        """Adds a model; removes the model that was not used for longest where there are too many."""
-        self._models[number] = model
+    def add(self, scenes: tuple[int, ...], models: Models) -> None:
+        """Adds models; removes those that were not used for longest where there are too many."""
+        self._models[scenes] = models
         if len(self._models) > MODELS_A_RANK:
             self._models.popitem(last=False)
 
-    def __iter__(self) -> Iterator[int]:
+    def __iter__(self) -> Iterator[tuple[int, ...]]:
         return iter(self._models)
 
-    def __getitem__(self, number: int) -> Model:
-        return self._models[number]
+    def __getitem__(self, scenes: tuple[int, ...]) -> Models:
+        return self._models[scenes]
 
 
 def build_evaluator(model: ReducedModel | None) -> Evaluate:
@@ -70,28 +72,36 @@ def build_evaluator(model: ReducedModel | None) -> Evaluate:
 
     model: of the only scene; None where there are several scenes, whose models come with tasks.
     """
-    models: ModelCache[ReducedModel] = ModelCache()
+    models: ModelCache[tuple[ReducedModel, ...]] = ModelCache()
     if model is not None:
-        models.add(0, model)
+        models.add((0,), (model,))
 
     def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
-        number = task.joint.scene
-        # first of all: rank 0 sends the model once, also where the task breaks off
-        if task.model is not None:
-            models.add(number, _open_model(task.model))
-        elif not models.use(number):
-            raise RuntimeError(f"no model of scene {number} for {task}")
+        # first of all: rank 0 sends the models once, also where the task breaks off
+        if task.models:
+            models.add(task.scenes, tuple(map(_open_model, task.models)))
+        elif not models.use(task.scenes):
+            raise RuntimeError(f"no model of scene {task.scenes} for {task}")
         guard_kernel_cache()
-        of_task, own = replace(task, model=None), models[number]
-        if task.joint.contact:
-            drawn: dict[str, Any] = {name: np.array(values) for name, values in task.joint.contact}
-            own = replace(own, contact=replace(own.contact, **drawn))
+        of_task, own = replace(task, models=()), dict(zip(task.scenes, models[task.scenes], strict=True))
+        if isinstance(of_task, MarchTask) and of_task.blocks:
+            yield fly(own, of_task, keep)
+            return
+        joint = _with_contact(own[task.joint.scene], task.joint)
         if isinstance(of_task, BranchTask):
-            yield from (follow if of_task.mode is None else follow_amplitudes)(own, of_task, keep)
+            yield from (follow if of_task.mode is None else follow_amplitudes)(joint, of_task, keep)
         else:
-            yield from integrate(own, of_task, keep)
+            yield from integrate(joint, of_task, keep)
 
     return evaluate
+
+
+def _with_contact(model: ReducedModel, joint: Joint) -> ReducedModel:
+    """The model of a scene with what is drawn for its pairs."""
+    if not joint.contact:
+        return model
+    drawn: dict[str, Any] = {name: np.array(values) for name, values in joint.contact}
+    return replace(model, contact=replace(model.contact, **drawn))
 
 
 def _open_model(given: ReducedModel | Address) -> ReducedModel:
@@ -192,6 +202,47 @@ def integrate(model: ReducedModel, task: MarchTask, keep: Keep) -> Iterator[Marc
             yield replace(build_result(alone, _solve(model, alone)), place=place)
 
 
+def fly(models: Mapping[int, ReducedModel], task: MarchTask, keep: Keep) -> MarchResult:
+    """The mission history of a task. models: by number of the scene."""
+    from solver.missions.blocks import Block, Mission, Passage
+    from solver.missions.history import integrate_missions
+
+    of_joints = {block.joint: _with_contact(models[block.joint.scene], block.joint) for block in task.blocks}
+    blocks = tuple(
+        Block(
+            model=of_joints[block.joint],
+            frequency=block.frequency if block.passage is None else Passage(block.frequency, *block.passage),
+            excitation_amplitude=block.excitation_amplitude,
+            friction_coefficient=block.joint.friction_coefficient,
+            cycles=block.cycles if block.passage is None else None,
+            begin=cast("Literal['ramp', 'up', 'down', 'continue']", block.begin),
+            name=block.name,
+        )
+        for block in task.blocks
+    )
+    reached = task.resume
+
+    def note(progress: Packed) -> None:
+        nonlocal reached
+        reached = progress
+        keep(progress)
+
+    mission = Mission(
+        blocks,
+        task.wear_coefficient,
+        missions_read(task.cycles),
+        task.settings,
+        task.law,
+        task.until,
+        cast("Literal['up', 'down', 'ramp']", task.sweep),
+    )
+    history = integrate_missions(mission, note, task.resume)
+    _raise_fault(history)
+    # with more time it goes on from there
+    left = reached if history.outcome is Outcome.TIME_LIMIT else None
+    return replace(build_mission_result(task, history), progress=left)
+
+
 def _solve(model: ReducedModel, task: MarchTask, keep: Keep | None = None) -> WearHistory:
     """The march of a task from its start state, at all counts at which one of its histories is read."""
     from solver.wear.final_state.find import find_final_state
@@ -225,7 +276,7 @@ def _solve(model: ReducedModel, task: MarchTask, keep: Keep | None = None) -> We
     return history
 
 
-def _raise_fault(ended: StartState | ModeValues | WearHistory) -> None:
+def _raise_fault(ended: StartState | ModeValues | WearHistory | MissionHistory) -> None:
     """The solver takes whatever breaks it off for an end: raises MachineFaultError where that was not its own."""
     if ended.outcome is Outcome.EXCEPTION and tells_of_machine(ended.message):
         raise MachineFaultError(ended.message)

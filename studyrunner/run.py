@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from solver.clock import n_compiled
 from solver.outcome import COMPLETE, Outcome
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
 from studyrunner.checkpoint.database import StoreInUseError
 from studyrunner.checkpoint.records import layout_of, record_type
 from studyrunner.checkpoint.store import Store
 from studyrunner.crashed_tasks import crash_notes, take_crashes, tried_again
-from studyrunner.evaluate import build_evaluator, failed_results
 from studyrunner.mpi.crashes import (
-    count_crashes,
     forget_crashes,
-    note_tasks,
-    read_tally,
 )
 from studyrunner.mpi.ranks import Ranks, wait_for_message
-from studyrunner.mpi.schedule import Handlers, serve_tasks, work_on_tasks
+from studyrunner.mpi.schedule import work_on_tasks
 from studyrunner.netcdf.creation_date import describe_date
 from studyrunner.netcdf.existing_result import Label, Target
 from studyrunner.netcdf.output import crash_folder, older_folder, progress_file, remove_leftovers
@@ -32,17 +27,16 @@ from studyrunner.netcdf.sample_coordinates import sample_coordinates, worn_coord
 from studyrunner.netcdf.software import describe_software
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
+from studyrunner.plan.tasks import TaskPlan
 from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import PairArrays, merge_facts, pair_arrays
 from studyrunner.scene_building import Scenes
 from studyrunner.study.study import Study
 from studyrunner.summary.plausibility import doubts_of_study
-from studyrunner.system.endings import begin_ending, is_ending, raise_ending
+from studyrunner.system.endings import begin_ending, is_ending
 from studyrunner.system.progress import ProgressDisplay, count
-from studyrunner.task_progress import TaskProgress, fault_of
+from studyrunner.task_runs import evaluator, run_tasks
 from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
@@ -56,16 +50,6 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, summary: RunSummary) -> None:
         super().__init__(summary)
         self.summary = summary
-
-
-@dataclass(frozen=True)
-class Job:
-    """What every rank needs for its tasks beside models.
-
-    crashes: folder of the notes on crashes; not every rank needs to see it.
-    """
-
-    crashes: Path
 
 
 @dataclass(frozen=True)
@@ -217,10 +201,9 @@ def serve_study(
         try:
             if scenes.model is not None:
                 scenes.broadcast.send()
-            job = Job(crashes)
             for rank in range(1, ranks.size):
-                ranks.send(job, rank)
-            with _evaluator(scenes.model, job, rank=0) as evaluate:
+                ranks.send(crashes, rank)
+            with evaluator(scenes.model, crashes, rank=0) as evaluate:
                 run_tasks(ranks, completion, crashes, evaluate, progress, scenes)
             progress.say("writing the result")
             summary = writer.write(completion, n_found, progress)
@@ -310,98 +293,11 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: 
 
 def work_on_job(ranks: Ranks, model: ReducedModel | None) -> None:
     """Any other rank after it has received the model, if there is only one: does tasks until there are none."""
-    job = wait_for_message(ranks)
-    if job is None:
+    crashes = wait_for_message(ranks)
+    if crashes is None:
         # nothing has to be computed
         return
-    if not isinstance(job, Job):
-        raise TypeError(f"rank 0 sent {job!r} instead of a job")
-    with _evaluator(model, job, ranks.rank) as evaluate:
+    if not isinstance(crashes, Path):
+        raise TypeError(f"rank 0 sent {crashes!r} instead of the folder of the notes on crashes")
+    with evaluator(model, crashes, ranks.rank) as evaluate:
         work_on_tasks(ranks, evaluate)
-
-
-def _evaluator(model: ReducedModel | None, job: Job, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
-    """The function that does tasks on a rank. A task that breaks off gives failed results; the other tasks go on."""
-    compute = build_evaluator(model)
-
-    def compute_all(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
-        given: set[int] = set()
-        for result in compute(task, keep):
-            if isinstance(result, StartResult):
-                given.add(result.position)
-            yield result
-        if isinstance(task, BranchTask) and len(given) < task.n_results and task.resume is not None:
-            # The earlier run had passed states that are damaged, or that it did not need.
-            yield from compute(replace(task, known=task.known | given, resume=None), keep)
-
-    def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
-        n_given = 0
-        try:
-            for result in compute_all(task, keep):
-                n_given += 1
-                yield result
-        except Exception as error:
-            # An exception from a signal is no failure of the task.
-            raise_ending()
-            yield from failed_results(task, n_given, error)
-
-    return note_tasks(evaluate, job.crashes, rank)
-
-
-def run_tasks(
-    ranks: Ranks,
-    completion: CompletionIndex,
-    folder: Path,
-    evaluate: Evaluate,
-    progress: ProgressDisplay,
-    scenes: Scenes,
-) -> None:
-    """Rank 0: has the remaining tasks done and their results saved. folder: of the notes on crashes."""
-    tally = read_tally(folder)
-    tasks = TaskProgress(completion, {key: len(crashes) for key, crashes in tally.items()})
-
-    def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
-        new = tasks.take(task, result)
-        if isinstance(task, BranchTask) and task.mode is None and tasks.n_starts_left == 0:
-            progress.say("marching through the remaining wear histories")
-        return new
-
-    said: set[tuple[int, str]] = set()
-
-    def is_sick(rank: int, result: StartResult | MarchResult) -> bool:
-        fault = fault_of(result)
-        if fault and (rank, fault) not in said:
-            said.add((rank, fault))
-            progress.note(
-                f"rank {rank}: {fault}: a fault of the machine; the task is tried once more, by another rank where"
-                " there is one"
-            )
-        return bool(fault)
-
-    def take_back(rank: int, lost: Sequence[tuple[BranchTask | MarchTask, int]]) -> list[BranchTask | MarchTask]:
-        had = f", which had {count(len(lost), 'task')}" if lost else ""
-        progress.note(f"rank {rank} is lost{had}: the others go on without it")
-        crashes = {crash.key: crash for crash in count_crashes(folder, rank)}
-        return tasks.take_back(lost, crashes)
-
-    known: int | None = n_compiled()
-
-    def tick(running: Callable[[], Sequence[tuple[BranchTask | MarchTask, int, float]]]) -> None:
-        nonlocal known
-        if known is not None and n_compiled() > known:
-            known = None
-            progress.note("the solver is compiled for this machine, once after an installation")
-        completion.store.tick()
-        progress.tick(lambda: tasks.look(running()))
-
-    if tasks.branches and tasks.branches[0].mode is not None:
-        n_points = count(tasks.n_starts_left, "point")
-        progress.say(f"following {count(len(tasks.branches), 'nonlinear mode')} through {n_points}")
-    elif tasks.branches:
-        n_branches = count(len(tasks.branches), "branch", "branches")
-        n_starts = count(tasks.n_starts_left, "start state")
-        progress.say(f"following {n_branches} through {n_starts}, marching through wear histories")
-    progress.begin_tasks()
-    handlers = Handlers(take, tick, tasks.keep, take_back, is_sick, scenes.with_model)
-    serve_tasks(ranks, tasks.begin(), evaluate, handlers, tasks.costs)
-    completion.store.flush()

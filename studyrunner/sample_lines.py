@@ -18,7 +18,7 @@ def describe_samples(path: Path) -> list[str]:
         if "worn_volume" not in dataset:
             return []
         statistics = worn_volume_statistics(dataset)
-        if "excitation_frequency" in dataset:
+        if "excitation_frequency" in dataset and "mission" not in dataset.dims:
             # the coordinate is the middle of the range of a frequency that is followed
             statistics = statistics.squeeze("frequency", drop=True)
         lines = sentences(statistics)

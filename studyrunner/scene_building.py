@@ -142,14 +142,15 @@ def build_scenes(
     """
     scenes = find_scenes(study)
     if len(scenes.studies) == 1:
+        one = scenes.studies[0] if study.has_missions else study
         with keys_as_given(study.scene_axes):
-            model = build_study_scene(study, say, store)
+            model = build_study_scene(one, say, store)
         if "natural_frequency" in study.scene_variables:
             say("finding the natural frequencies of the scene")
-        variables = (*build_scene_variables(study, model, store), *exact_answers(study))
+        variables = (*build_scene_variables(one, model, store), *exact_answers(study))
         facts = replace(describe_scene(model), static_response=static_response(model))
         broadcast: Broadcast[ReducedModel | SeveralScenes] = Broadcast(ranks, machines, model)
-        return Scenes(scenes, (facts,), variables, scene_to_keep(study, model), (), broadcast, store)
+        return Scenes(scenes, (facts,), variables, scene_to_keep(one, model), (), broadcast, store)
     several: Broadcast[ReducedModel | SeveralScenes] = Broadcast(ranks, machines, SeveralScenes())
     several.send()
     built = _build_all(ranks, scenes, store, say)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from studyrunner.evaluate import ModelCache
 from studyrunner.mpi.broadcast import share
-from studyrunner.mpi.shared_memory import SharedObject
+from studyrunner.mpi.shared_memory import Address, SharedObject
 from studyrunner.plan.tasks import BranchTask, MarchTask
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 class SceneModels:
     """Rank 0: which rank has which models, and the models in shared memory.
 
-    A rank holds two models at most (`ModelCache`) and two tasks at most (`Dispatcher`). So a rank that loses a model
-    here, by two later tasks with other models, has done the task that brought this one.
+    A rank holds the models of two tasks at most (`ModelCache`) and two tasks at most (`Dispatcher`). So a rank that
+    loses models here, by two later tasks with other models, has done the task that brought these.
     """
 
     def __init__(self, read: Callable[[int], ReducedModel], sharing: Collection[int]) -> None:
@@ -34,23 +34,28 @@ class SceneModels:
         self._shared: dict[int, SharedObject[ReducedModel]] = {}
 
     def with_model(self, rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
-        """The task as a rank gets it: with the model where the rank does not have the model."""
-        held, number = self._held.setdefault(rank, ModelCache()), task.joint.scene
-        if held.use(number):
+        """The task as a rank gets it: with the models that the rank does not have."""
+        held = self._held.setdefault(rank, ModelCache())
+        if held.use(task.scenes):
             return task
-        held.add(number, None)
+        held.add(task.scenes, None)
         self._close_unused()
+        return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
+
+    def _hand(self, rank: int, number: int) -> ReducedModel | Address:
+        """The model of a scene as a rank gets it."""
         if rank not in self._sharing:
-            return replace(task, model=self._read(number))
+            return self._read(number)
         if number not in self._shared:
             model = self._read(number)
             shared = share(model)
             if shared is None:
-                return replace(task, model=model)
+                return model
             self._shared[number] = shared
-        return replace(task, model=self._shared[number].address)
+        return self._shared[number].address
 
     def _close_unused(self) -> None:
-        used = {number for rank, held in self._held.items() if rank in self._sharing for number in held}
+        held_here = (held for rank, held in self._held.items() if rank in self._sharing)
+        used = {number for held in held_here for scenes in held for number in scenes}
         for number in self._shared.keys() - used:
             self._shared.pop(number).close()

@@ -56,6 +56,7 @@ class TaskProgress:
         for branch in self._completion.plan.branches:
             for result in self._completion.known_starts(branch):
                 yield from self._start(branch, result)
+        yield from self._completion.marches_without_start()
 
     def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         """Takes a result; returns tasks that the result makes possible, or that have to be done again."""
@@ -181,7 +182,9 @@ class TaskProgress:
             how = "ramp" if task.sweep == "ramp" else f"sweep {task.sweep}"
             what = f"{how} to {task.frequencies[place]:.6g} Hz"
             return f"{what} ({self._words[task.key]})" if task.key in self._words else what
-        return f"{self._completion.plan.branches[task.branch].frequencies[task.position]:.6g} Hz {task.scheme}"
+        if task.blocks:
+            return f"mission history {task.number + 1}"
+        return f"{self._completion.plan.frequency_of(task):.6g} Hz {task.scheme}"
 
 
 def _is_first(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> bool:

@@ -1,4 +1,4 @@
-"""The variables and coordinates of a result file: names, dimensions after the axes, units, meaning."""
+"""The variables of a result file: names, dimensions after the axes, units, meaning."""
 
 from __future__ import annotations
 
@@ -26,10 +26,6 @@ class Variable:
         """Whether the values are texts."""
         return self.dtype.startswith("U")
 
-
-_AUXILIARY, _REFERENCE = "auxiliaryInformation", "referenceInformation"
-_UNPLACED = "NaN where the scene does not say."
-_NO_FORM = "NaN where no closed form holds."
 
 ASKED = {
     "worn_volume": Variable(
@@ -134,14 +130,14 @@ ASKED = {
     "response_error": Variable(
         ("cycle",),
         "1",
-        "estimated relative truncation error of the response",
-        comment="Of the first harmonic, by solving again with more of both; NaN where it was not estimated.",
+        "estimated relative error of the response",
+        comment="Of first harmonic and peak, by harmonics, samples, steps and start state; NaN where it was not estimated.",
     ),
     "wear_rate_error": Variable(
         ("cycle",),
         "1",
-        "estimated relative truncation error of the wear rate",
-        comment="By solving again with more harmonics and samples; NaN where it was not estimated.",
+        "estimated relative error of the wear rate",
+        comment="By harmonics, samples, steps and start state; NaN where it was not estimated.",
     ),
     "worn_volume_error": Variable(
         ("cycle",),
@@ -189,43 +185,6 @@ USUAL = tuple(
     if not name.startswith(("wear_depth_max", "wear_depth_last")) and name not in FOLLOWED_FREQUENCY
 )
 """Those of other studies that name none."""
-
-SCENE: dict[str, dict[str, Variable]] = {
-    "mesh": {
-        **{
-            f"mesh_{axis}": Variable(("mesh_node",), "m", f"position of the node, {axis}", content=_AUXILIARY)
-            for axis in "xyz"
-        },
-        "mesh_quad": Variable(
-            ("mesh_quad_index", "mesh_corner"),
-            "1",
-            "nodes of the outer face, anticlockwise from outside",
-            "int32",
-            content=_AUXILIARY,
-            comment="Indices along mesh_node.",
-        ),
-        "mesh_part": Variable(("mesh_quad_index",), "1", "part that the face belongs to", "str", content=_AUXILIARY),
-    },
-    "natural_frequency": {
-        "natural_frequency": Variable(
-            ("nodal_diameter", "mode"),
-            "Hz",
-            "natural frequency with the joint stuck, without damping",
-            comment="NaN where there are fewer modes.",
-        ),
-    },
-    "exact": {
-        "exact_worn_volume": Variable(("cycle",), "m3", "exact worn volume", content=_REFERENCE, comment=_NO_FORM),
-        "exact_response_amplitude": Variable(
-            ("cycle", "response"),
-            "m",
-            "exact amplitude of the first harmonic of the response",
-            content=_REFERENCE,
-            comment=_NO_FORM,
-        ),
-    },
-}
-"""What `outputs.variables` asks of the scene under one name; the exact answers alone have the axes of the study."""
 
 LOOPS = {
     name: Variable(
@@ -357,70 +316,3 @@ KEPT = {
     ),
 }
 """Those that every result holds."""
-
-COORDINATES = {
-    "frequency": Variable(
-        (),
-        "Hz",
-        "excitation frequency",
-        comment="Where the frequency follows the resonance: the middle of loading.between, which stands for the range;"
-        " excitation_frequency holds the frequency at each count.",
-    ),
-    "wear_coefficient": Variable(
-        (),
-        "1/Pa",
-        "wear coefficient",
-        comment="Worn volume over normal force times sliding distance, Archard's law, Eq. (2) of the reference; over"
-        " dissipated energy with the law energy; the attribute study says which law, under [wear].",
-    ),
-    "excitation_amplitude": Variable((), "N", "excitation amplitude, factor of the unit harmonic load"),
-    "step": Variable((), "1", "step of the slow time scale, cycles", comment="Not used by the adaptive scheme."),
-    "scheme": Variable((), "1", "integration scheme of the wear"),
-    "sweep": Variable(
-        (),
-        "1",
-        "how the unworn state is reached",
-        comment="up: from low to high frequencies; down: from high to low ones; ramp: at this frequency, by raising the"
-        " excitation from nothing.",
-    ),
-    "harmonics": Variable((), "1", "harmonics above the static one"),
-    "samples": Variable((), "1", "time samples in a period"),
-    "tolerance": Variable((), "1", "largest accepted scaled residual"),
-    "rtol": Variable((), "1", "relative error that automatic settings and adaptive steps aim at"),
-    "modal_amplitude": Variable(
-        (),
-        "m kg^0.5",
-        "modal amplitude",
-        comment="sqrt(x^H M x) with the first harmonic x of all displacements and the mass matrix M.",
-    ),
-    "sample": Variable((), "1", "number of the sample", comment="What it draws is in the coordinates sample_..."),
-    "cycle": Variable((), "1", "number of vibration cycles", comment="Slow time."),
-    "contact": Variable((), "1", "index of the contact pair"),
-    "response": Variable((), "1", "name of the response"),
-    "phase": Variable(
-        (),
-        "rad",
-        "phase of the excitation",
-        comment="omega t, 0 where the excitation of a real harmonic load has its maximum.",
-    ),
-    "component": Variable((), "1", "component of relative displacement and contact force in the frame of the pair"),
-    "nodal_diameter": Variable((), "1", "nodal diameter"),
-    "mode": Variable((), "1", "number of the mode, by frequency"),
-    **{
-        f"contact_{axis}": Variable(("contact",), "m", f"position of the contact pair, {axis}", comment=_UNPLACED)
-        for axis in "xyz"
-    },
-    "contact_area": Variable(
-        ("contact",), "m2", "area of the contact pair", comment="Weight alpha of the pair, Eq. (7) of the reference."
-    ),
-    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair"),
-    "contact_exists": Variable(
-        ("contact",),
-        "1",
-        "whether the scene has the contact pair",
-        "int8",
-        ("missing", "present"),
-        comment="Scenes of the study differ in their pairs. Values of a missing pair are NaN.",
-    ),
-}
-"""Coordinates, the axes first."""

@@ -19,7 +19,7 @@ import studyrunner
 from solver import FrequencyResponse, Outcome, SolverSettings, build_model, frequency_response, march_wear
 from studies import SceneError, build_scene, read_scene
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
-from studyrunner import Study, UserError, open_result, read_study, run, run_study
+from studyrunner import Study, UserError, open_result, read_study, run_study, task_runs
 from studyrunner.cli import main
 from studyrunner.evaluate import build_evaluator
 
@@ -182,13 +182,13 @@ def test_a_run_that_is_interrupted_goes_on(tmp_path: Path, monkeypatch: pytest.M
 
         return evaluate
 
-    monkeypatch.setattr(run, "build_evaluator", interrupted)
+    monkeypatch.setattr(task_runs, "build_evaluator", interrupted)
     with pytest.raises(KeyboardInterrupt, match=r"1 of 2 points are kept, .*out.nc holds them, the same call goes on"):
         run_study("sdof_slider", path, overrides=SMALL, progress=False)
     with open_result(path) as partly:
         assert sorted(partly.outcome.values.ravel()) == [Outcome.CONVERGED, Outcome.NOT_COMPUTED]
     n_before = len(done)
-    monkeypatch.setattr(run, "build_evaluator", build_evaluator)
+    monkeypatch.setattr(task_runs, "build_evaluator", build_evaluator)
     with run_study("sdof_slider", path, overrides=SMALL, progress=False) as again:
         xr.testing.assert_equal(again.drop_vars("run_time"), result.drop_vars("run_time"))
     assert n_before == 3

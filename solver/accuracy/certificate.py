@@ -45,6 +45,7 @@ from solver.contact.alternating_frequency_time import friction_work
 from solver.contact.coulomb import friction_limit
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
+from solver.options import COMMON
 from solver.packing import packable
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Joint
@@ -78,7 +79,7 @@ class Certificate:
     def failures(self, tolerance: float) -> dict[str, tuple[float, float]]:
         """Value and limit of each violation above its limit; NaN counts as such. tolerance: of the scaled residual."""
         # twice the tolerance: a state evaluated again from its harmonics has lost some digits to round-off
-        limits = {"residual": 2.0 * max(tolerance, ACCURACY.residual_round_off)} | ACCURACY.violation_limits
+        limits = {"residual": 2.0 * max(tolerance, COMMON.round_off)} | ACCURACY.violation_limits
         return {
             name: (getattr(self, name), limit) for name, limit in limits.items() if not getattr(self, name) <= limit
         }
@@ -141,13 +142,13 @@ def _relative(violation: float, size: float) -> float:
 
 
 def _series(joint: Joint, values_h: FloatArray) -> FloatArray:
-    """Values (..., n N) of a series (..., m) at n times as many points as there are samples."""
-    finer = build_basis(joint.basis.orders, ACCURACY.points_per_sample * joint.basis.n_samples)
+    """Values (..., 4 N) of a series (..., m): at the samples alone its violations are too small."""
+    finer = build_basis(joint.basis.orders, 4 * joint.basis.n_samples)
     return np.asarray(values_h @ finer.synthesis)
 
 
 def _fejer_mean(joint: Joint, force_h: FloatArray) -> FloatArray:
-    """Mean (n_contact, 3, n N), N, of the truncations of the force series."""
+    """Mean (n_contact, 3, 4 N), N, of the truncations of the force series."""
     orders = np.array(joint.basis.orders)
     weighted = force_h.copy()
     if orders.size:
@@ -185,7 +186,7 @@ def _penetration(joint: Joint, evaluation: Evaluation) -> float:
     moved = np.linalg.norm(_series(joint, _vibrating(evaluation.displacement_h)), axis=1)
     flexed = _flexed(joint, evaluation.force_h)
     elastic = np.linalg.norm(_series(joint, _vibrating(flexed)), axis=1)
-    still = ACCURACY.round_off_vibration * np.abs(flexed[..., 0])  # as in `_amplitude`
+    still = COMMON.negligible * np.abs(flexed[..., 0])  # as in `_amplitude`
     size = max(float(part.max(initial=0.0)) for part in (moved, elastic, still))
     return _relative(float(depth.max(initial=0.0)), size)
 
@@ -198,7 +199,7 @@ def _work(joint: Joint, force: FloatArray, motion: FloatArray) -> float:
 
 def _amplitude(values_h: FloatArray) -> FloatArray:
     """Size (...) of the vibration in a series (..., m), at least a small fraction of its mean."""
-    round_off = ACCURACY.round_off_vibration * np.abs(values_h[..., 0])
+    round_off = COMMON.negligible * np.abs(values_h[..., 0])
     return np.asarray(np.maximum(np.linalg.norm(values_h[..., 1:], axis=-1), round_off))
 
 
@@ -213,7 +214,7 @@ def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
     elastic = np.pi * float((_amplitude(evaluation.force_h) * _amplitude(flexed)).sum())
     # largest possible work of the excitation: away from a resonance its actual work is almost zero
     apparent = np.pi * float((_amplitude(joint.structure.force_h()) * _amplitude(motion)).sum())
-    factor = ACCURACY.noticed_loss_factor
+    factor = ACCURACY.small_work
     size = max(abs(excitation), abs(damping), abs(contact), dissipation, factor * elastic, factor * apparent)
     return _relative(abs(excitation - damping - dissipation), size)
 

@@ -67,7 +67,7 @@ def levels_to_see(resolution: Resolution, contact: float, fewest: int) -> int:
     few more harmonics then change almost nothing, however large the error is.
     """
     above = [highest for highest in ACCURACY.harmonic_levels if highest > resolution.highest]
-    blind = sum(highest * contact < ACCURACY.periods_in_contact for highest in above)
+    blind = sum(highest * contact < 0.5 for highest in above)
     return max(fewest, min(blind + 1, len(above)))
 
 
@@ -77,7 +77,7 @@ def levels_to_reach(resolution: Resolution, highest: int, fewest: int) -> int:
 
 
 def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
-    """Whether |1 - E G| is below `stiffness_mismatch` for all pairs and for all harmonics above `highest`.
+    """Whether |1 - E G| is below `stiffness_mismatch` for all pairs and for all harmonics of the list above `highest`.
 
     G is evaluated at real rates (growth instead of vibration), where the structure has no resonances.
     omega: rad/s.
@@ -87,8 +87,8 @@ def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
     pair, tangent = component_index // 3, component_index % 3 > 0
     held = np.where(tangent, penalty.tangential[pair], penalty.normal[pair])
     marched = tangent & penalty.inertial[pair]
-    for octaves in np.arange(0.0, ACCURACY.octaves_beyond + 0.5, 0.5):
-        rate = (highest + 1) * omega * 2.0**octaves
+    half_octaves = np.arange(0.0, 2.0 * np.log2(ACCURACY.harmonic_levels[-1] / (highest + 1)) + 1.0)
+    for rate in (highest + 1) * omega * 2.0 ** (0.5 * half_octaves):
         acts = np.where(marched, penalty.mass[pair] * rate**2, held)
         if np.abs(1.0 - acts * compliance_at(model, rate)).max(initial=0.0) > ACCURACY.stiffness_mismatch:
             return False

@@ -156,7 +156,7 @@ class _Search:
         """Error by missing harmonics, and the state with more harmonics that gave it."""
         error, richer = here.harmonics_error(self.budget, known)
         above = shifted(here.case.resolution, 1)
-        cheap = here.unknowns(above) <= ACCURACY.dear_unknowns and self._allowed(here, above)
+        cheap = here.unknowns(above) <= NEWTON.dear_unknowns and self._allowed(here, above)
         if richer is None and self.settings.harmonics == "auto" and cheap:
             # impacts: Newton's method diverges from a warm start with more harmonics, although the state exists
             richer = here.by_homotopy(above, self.budget)
@@ -164,12 +164,13 @@ class _Search:
         return error, richer
 
     def _wanted(self, here: ResolvedState, by_samples: float, by_harmonics: float, *, holds: bool) -> Resolution:
-        """The next resolution, chosen by the errors of samples and of harmonics."""
+        """The next resolution: samples and harmonics whose error alone is more than half of rtol are refined."""
         resolution, above = here.case.resolution, shifted(here.case.resolution, 1)
         wanted = resolution
-        if self.settings.harmonics == "auto" and (not holds or by_harmonics > by_samples / ACCURACY.error_ratio):
+        half = 0.5 * self.settings.rtol
+        if self.settings.harmonics == "auto" and (not holds or by_harmonics > half):
             wanted = above if self.settings.samples == "auto" else Resolution(above.orders, resolution.samples)
-        if self.settings.samples == "auto" and by_samples > by_harmonics / ACCURACY.error_ratio:
+        if self.settings.samples == "auto" and by_samples > half:
             wanted = Resolution(wanted.orders, 2 * resolution.samples)
         return wanted
 
@@ -204,12 +205,12 @@ class _Search:
         if here.unknowns(resolution) * resolution.samples > room:
             return False
         small = n_rel <= NEWTON.small_joint_displacements
-        most = room_for(min(self.most, ACCURACY.few_pairs_unknowns) if small else self.most, n_rel)
+        most = room_for(min(self.most, ACCURACY.node_unknowns) if small else self.most, n_rel)
         if resolution.highest > ACCURACY.most_mixed_harmonics:
             # more harmonics for friction without impacts only, whose harmonics are odd
             if not all(order % 2 for order in resolution.orders):
                 return False
-            most = min(most, ACCURACY.dear_unknowns)
+            most = min(most, NEWTON.dear_unknowns)
         # the two highest resolutions serve for a comparison only
         in_levels = resolution.highest <= ACCURACY.harmonic_levels[-3]
         return resolution.samples <= ACCURACY.most_samples and in_levels and here.unknowns(resolution) <= most

@@ -23,8 +23,10 @@ from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.model import ComplexArray, FloatArray
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, solve_balance
-from solver.settings import Resolution, all_orders
+from solver.options import COMMON
+from solver.settings import RESOLUTION, Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
@@ -96,8 +98,7 @@ class ResolvedState:
     def _solved(
         self, case: Case, joint: Joint, balance: Balance, start: FloatArray, budget: Budget
     ) -> ResolvedState | None:
-        most = ACCURACY.level_iterations
-        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, budget, most)
+        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, budget)
         if not result.converged:
             return None
         point = PathPoint(self.point.parameter, result.evaluation, final_history(balance, result.evaluation))
@@ -119,13 +120,13 @@ class ResolvedState:
         It is the larger one of `usual_work` and a fraction of the work of the excitation.
         """
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
-        return max(ACCURACY.small_slip_work * abs(self.joint.structure.input_work(motion)), self.usual_work)
+        return max(ACCURACY.small_work * abs(self.joint.structure.input_work(motion)), self.usual_work)
 
     def without_even(self, budget: Budget) -> ResolvedState | None:
         """The state solved with odd harmonics only; None where it needs even harmonics or holds none already."""
         orders = self.case.resolution.orders
         odd = tuple(order for order in orders if order % 2)
-        if odd == orders or not half_wave_symmetric(self.point.evaluation, ACCURACY.round_off_change):
+        if odd == orders or not half_wave_symmetric(self.point.evaluation, COMMON.round_off):
             return None
         return self.solve_at(Resolution(odd, self.case.resolution.samples), budget)
 
@@ -141,7 +142,7 @@ class ResolvedState:
         none. Without an event the harmonics are exact, so that one solve with the finest samples is enough.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        finest = self.solve_at(Resolution(orders, max(ACCURACY.event_samples, 2 * samples)), budget)
+        finest = self.solve_at(Resolution(orders, max(RESOLUTION.fine_samples, 2 * samples)), budget)
         if finest is None or nothing_happens(finest.point.evaluation):
             return None
         while (samples := 2 * samples) < finest.case.resolution.samples:
@@ -162,7 +163,7 @@ class ResolvedState:
           as large.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        few = self.unknowns(self.case.resolution) <= ACCURACY.dear_unknowns
+        few = self.unknowns(self.case.resolution) <= NEWTON.dear_unknowns
         finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), budget)
         if finer is not None:
             safety = ACCURACY.triple_samples_safety if few else ACCURACY.two_levels_safety
@@ -238,7 +239,7 @@ class ResolvedState:
         estimate: errors of the present state.
         """
         here, enough = self, ACCURACY.kept_fraction * self.case.settings.rtol
-        while estimate.largest <= ACCURACY.spare_fraction * enough:
+        while estimate.largest <= ACCURACY.kept_fraction * enough:
             lower = fewer(here.case.resolution, here.case.settings)
             level = here.solve_at(lower, budget) if lower != here.case.resolution else None
             if level is None:
@@ -266,7 +267,7 @@ class ResolvedState:
         structure = self.joint.structure
         moved = structure.harmonic_force / self.joint.relative_penalty
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
-        return max(ACCURACY.small_response * float(np.linalg.norm(response)), 1e-300)
+        return max(COMMON.negligible * float(np.linalg.norm(response)), 1e-300)
 
     def holds(self) -> bool:
         """Whether all violations of the certificate are below their limits."""
@@ -282,8 +283,8 @@ class ResolvedState:
         response = max(first, float((np.abs(mine_peak - its_peak) / size).max(initial=0.0)))
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
         work = max(self.least_work(), better.least_work())
-        if max(its_slip, mine_slip) <= ACCURACY.small_slip_work * work:
+        if max(its_slip, mine_slip) <= ACCURACY.small_work * work:
             return Estimate(response, 0.0)
         # the wear rate cannot be more accurate than the motion that causes it
-        slip = max(its_slip, ACCURACY.small_slip_work * work)
+        slip = max(its_slip, ACCURACY.small_work * work)
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))

@@ -16,6 +16,7 @@ from solver.contact.period_march import integrate_slip_work, march_period
 from solver.contact.rigid_slider import march_masses
 from solver.contact.tangent import march_tangent, mass_tangent
 from solver.model import FloatArray, IntArray
+from solver.options import COMMON
 from solver.structure.joint import Joint
 
 
@@ -57,7 +58,8 @@ def march_law(joint: Joint, predicted_h: FloatArray, history: FloatArray) -> Mar
     predicted_t = predicted_h @ basis.synthesis
     start = history * joint.penalty.tangential[:, None]
     limit = friction_limit(friction, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
-    periodicity = CONTACT.periodicity * float(limit.max(initial=0.0))
+    # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
+    periodicity = 0.1 * COMMON.round_off * float(limit.max(initial=0.0))
     inertial = np.flatnonzero(joint.penalty.inertial)
     if inertial.size == 0:
         force_t, state_t, status_t, periods, error = march_period(

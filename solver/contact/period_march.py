@@ -15,9 +15,10 @@ from numba import njit
 from solver.contact import archard
 from solver.contact.coulomb import STICK, advance_monodromy, contact_sample
 from solver.model import FloatArray, IntArray
+from solver.options import COMMON
 
 PLAIN_PERIODS = 4  # periods before Newton's method is used on the periodicity; most pairs repeat within two
-SMALLEST_DETERMINANT = 1e-9  # of 1 - monodromy: below it a part of the state does not fade, and the plain march goes on
+SMALLEST_DETERMINANT = COMMON.round_off  # of 1 - monodromy: below it a part of the state does not fade
 
 slip_work_rate = njit()(archard.slip_work_rate)
 slip_work_slopes = njit()(archard.slip_work_slopes)

@@ -25,11 +25,12 @@ from numba import njit
 
 from solver.contact import archard
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, across_slip, friction_force, friction_limit, slip_direction
+from solver.contact.options import CONTACT
 from solver.model import FloatArray, IntArray
 
 PARTS = 8  # parts of a step of a pair with two tangents
 SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
-MOST_MASS_PERIODS = 500  # far more than needed: the drag halves the change in each period
+MOST_MASS_PERIODS = CONTACT.most_periods  # far more than needed: the drag halves the change in each period
 
 slip_work_rate = njit()(archard.slip_work_rate)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from solver.continuation.arc_length import follow_arc
+from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import relax_to_periodic
@@ -56,16 +56,15 @@ def states_after_fold(
     def balance_at(omega: float, history: FloatArray) -> Balance:
         return Balance.frozen(case.joint(omega, joint.excitation_amplitude), history, before)
 
-    def stays(point: PathPoint) -> bool:
+    def accepted(point: PathPoint) -> bool:
         return is_stable(balance_at(point.parameter, point.history).linearise(point.evaluation), solver)
 
-    tolerance = case.settings.tolerance
     # the target is the frequency of the last state
     start = PathPoint(joint.omega, last.evaluation, last.evaluation.history)
-    span = CONTINUATION.fold_search_length * joint.omega
+    arc = Arc(balance_at, start, CONTINUATION.arc_span * joint.omega, solver, case.settings.tolerance, budget)
     for toward in (-1.0, 1.0):
-        arc = follow_arc(balance_at, start, joint.omega, span, solver, tolerance, budget, stays, toward)
-        if arc.point is not None and arc.folds:
-            yield arc.point
+        found = follow_arc(arc, joint.omega, accepted, toward)
+        if found.point is not None and found.folds:
+            yield found.point
     outcome, other = solve_first_state(case, joint.omega, joint.excitation_amplitude, worn, solver, budget)
     yield outcome if other is None else other

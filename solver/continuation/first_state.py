@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.continuation.arc_length import follow_arc
+from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.homotopy import solve_from_less_friction
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
@@ -15,7 +15,7 @@ from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
-from solver.stability.hill import stays
+from solver.stability.hill import is_stable_at
 from solver.structure.fourier import change_orders, from_complex
 from solver.structure.joint import Case, Joint, static_joint
 
@@ -122,7 +122,7 @@ def solve_first_state(
     def accepted(point: PathPoint) -> bool:
         nonlocal unstable
         at = point.evaluation
-        stable = stays(balance_at(1.0, at.history), at, solver, budget)
+        stable = is_stable_at(balance_at(1.0, at.history), at, solver, budget)
         unstable = unstable or not stable
         return stable
 
@@ -150,9 +150,9 @@ def solve_first_state(
         return Outcome.CONVERGED, PathPoint(1.0, relaxed.evaluation, relaxed.history)
     if not arrived:
         # the last way, within a budget of its own: where the joint has no grip arc length does not come to an end
-        limit, budget.limit = budget.limit, min(budget.limit, budget.iterations + CONTINUATION.transient_effort)
-        span = CONTINUATION.load_length
-        reached = follow_arc(balance_at, point, 1.0, span, solver, tolerance, budget, accepted).point
+        limit, budget.limit = budget.limit, min(budget.limit, budget.iterations + CONTINUATION.search_iterations)
+        arc = Arc(balance_at, point, CONTINUATION.arc_span, solver, tolerance, budget)
+        reached = follow_arc(arc, 1.0, accepted).point
         budget.limit = limit
         if reached is not None:
             return Outcome.CONVERGED, reached

@@ -31,6 +31,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.prolongation import carried_history
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.settings import Resolution
 from solver.structure.fourier import build_basis, change_orders, to_complex
@@ -68,7 +69,7 @@ def solve_from_less_friction(
         return replace(balance, joint=replace(balance.joint, friction_coefficient=friction))
 
     friction = min(largest, CONTINUATION.moderate_friction)
-    least = CONTINUATION.shortest_fraction * friction
+    least = NEWTON.shortest_step * friction
     while True:
         logarithm = float(np.log(friction / largest)) if friction < largest else 0.0
         less = balance_at(logarithm, balance.history)

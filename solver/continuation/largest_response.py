@@ -15,10 +15,12 @@ import numpy as np
 
 from solver.continuation.options import CONTINUATION
 from solver.continuation.phase_lag import LaggingState, excitation_product, frequency_derivative, solve_at_lag
-from solver.harmonic_balance.dlft import Balance, Linearisation
+from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget
+from solver.options import COMMON
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case
 
@@ -39,7 +41,7 @@ def solve_at_peak(
     """
     below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
     before: tuple[float, float] | None = None
-    for _ in range(CONTINUATION.peak_solves):
+    for _ in range(CONTINUATION.attempts):
         found = solve_at_lag(case, balance, start, lag, solver, case.settings.tolerance, budget, most)
         if found is None:
             return None
@@ -54,7 +56,7 @@ def solve_at_peak(
         # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
         slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
         largest = CONTINUATION.largest_lag_step
-        step = float(np.clip(-rise / min(slope, -CONTINUATION.least_peak_slope), -largest, largest))
+        step = float(np.clip(-rise / min(slope, -COMMON.negligible), -largest, largest))
         before = lag, rise
         lag = lag + step if below < lag + step < above else 0.5 * (below + above)
         balance, start = found.balance, found.at.predicted_h
@@ -63,7 +65,7 @@ def solve_at_peak(
 
 def accepted_rise(rtol: float) -> float:
     """Rise of the logarithm of an amplitude with the phase lag, 1/rad, at which the amplitude counts as the largest."""
-    return min(CONTINUATION.peak_rise * rtol, CONTINUATION.largest_peak_rise)
+    return CONTINUATION.peak_rise * rtol
 
 
 def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) -> tuple[float, float]:
@@ -79,7 +81,8 @@ def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) ->
     held = Balance.frozen(state.balance.joint, state.at.history, state.at.wear_depth)
     state = replace(state, balance=held)
     by_frequency, tangent, joint = frequency_derivative(case, state), held.linearise(state.at), held.joint
-    step = _accurately(tangent, -by_frequency.residual, solver)
+    # the rise is a small difference: two more digits than a Newton direction
+    step = solver.solve(tangent, -by_frequency.residual, NEWTON.forcing**2)
     moved = state.at.displacement_h + by_frequency.length * tangent.transmit(step)[0]
     if joint.penalty.inertial.any():
         ahead = replace(held, joint=by_frequency.ahead).evaluate(state.at.predicted_h)
@@ -91,14 +94,3 @@ def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) ->
     (response, product), (response_ahead, product_ahead) = values
     rise = math.log(abs(response_ahead) / abs(response)) / by_frequency.length
     return rise, -cmath.phase(product_ahead / product) / by_frequency.length
-
-
-def _accurately(tangent: Linearisation, right: FloatArray, solver: JacobianSolver) -> FloatArray:
-    """Step (n_rel, m) with Jacobian times step = right (n_rel, m): more accurate than a Newton direction."""
-    step, left = np.zeros_like(right), right
-    for _ in range(CONTINUATION.derivative_solves):
-        step = step + solver.solve(tangent, left)
-        left = right - tangent.apply(step)
-        if np.linalg.norm(left) <= CONTINUATION.derivative_error * np.linalg.norm(right):
-            break
-    return step

@@ -50,7 +50,7 @@ def follow_naturally(
         Step length, in the unit of the parameter. A longer step is accepted only if the vibration changes little over
         the step: where each step leaves a history to the next step, the state at the target depends on the steps.
     shortest : float, optional
-        Shortest step as a fraction of the range; by default `CONTINUATION.shortest_fraction`, or a quarter of `fine`
+        Shortest step as a fraction of the range; by default `NEWTON.shortest_step`, or a quarter of `fine`
         if that is shorter.
 
     Returns
@@ -62,7 +62,7 @@ def follow_naturally(
     """
     point = start
     whole = target - start.parameter
-    shortest = CONTINUATION.shortest_fraction if shortest is None else shortest
+    shortest = NEWTON.shortest_step if shortest is None else shortest
     if np.isfinite(fine) and whole != 0.0:
         shortest = min(shortest, 0.25 * fine / abs(whole))
     # fractions of two: sums of them are exact, so that the last step ends at the target
@@ -81,7 +81,7 @@ def follow_naturally(
         else:
             fraction *= 0.5
             failures += not result.converged
-            if fraction < shortest or failures > CONTINUATION.natural_failures or budget.exhausted:
+            if fraction < shortest or failures > CONTINUATION.attempts or budget.exhausted:
                 return point, False
     return point, True
 

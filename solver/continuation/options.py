@@ -15,28 +15,27 @@ class ContinuationOptions:
     """
 
     # shared
+    attempts: int = 25
+    """Most attempts of a search that comes closer with each of them: natural steps that fail (a branch with more
+    corners is left to arc length; with half the number no static state of the dovetail is found at a friction
+    coefficient of 1000), solves for the phase lag of the largest amplitude (a step takes one or two), shakedown of
+    sliding masses, pairs that are opened."""
     near_iterations: int = 10
     """Newton iterations from a near state, where a shorter step is the alternative. Of 1400 such converged solves
     (impacts, sliders, random scenes, dovetail) eight needed all ten."""
     smooth_change: float = 0.2
     """Largest change over a smooth step of a branch. A step with a larger change is divided. A fold with a larger
     change is a jump, with a smaller change a corner. Half the value takes up to 50 % more iterations; twice the
-    value leads to equal states. A relaxation in time seeks a periodic state below a tenth of this change."""
-    shortest_fraction: float = 1.0 / 64.0
-    """Shortest natural step over the range to the target; shortest relaxation step in periods; least friction of a
-    homotopy over the moderate one. Where a shorter natural step is needed, the branch is assumed to fold."""
-
-    # natural steps
-    natural_failures: int = 25
-    """Steps that may fail to converge; a branch with more corners is left to arc length. With half the number no static
-    state of the dovetail is found at a friction coefficient of 1000."""
+    value leads to equal states. A relaxation in time seeks a periodic state below a tenth of this change. Largest
+    length of an arc-length step; the first one has a tenth (with the whole length seven branches with folds take 1.5 %
+    more iterations)."""
 
     # arc length, in unknowns divided by the norm of the first predicted force
+    arc_span: float = 0.05
+    """Natural length of a frequency over the frequency, and of a load factor. Distance from the end of a sweep to the
+    next attempt to begin it again, over the frequency."""
     arc_correctors: int = 300
     """Correctors of one continuation, converged or not."""
-    longest_arc: float = 0.2
-    """Largest length of a step. The first step has a tenth; with the whole length seven branches with folds take 1.5 %
-    more iterations."""
     corner_arc: float = 1e-3
     """Length of the step behind a corner, and least length after a step. Where no step of a tenth of this length
     converges, the branch has a corner. Without such a least length the same branches
@@ -45,12 +44,8 @@ class ContinuationOptions:
     """Distance of a corrector from its start over the length of the step, above which the corrector is given up.
     Without it the branch of `tests/solver/test_arc_length.py` is left for another one. Four times the length takes 1 %
     more iterations."""
-    backward_cosine: float = 0.99
-    """Cosine to the backward tangent above which a point lies on the branch before the corner."""
     farthest: float = 10.0
     """Natural lengths of the parameter from start and target at which the search ends."""
-    fold_points: int = 3
-    """Points added around a fold. One moves a fold of vibro-impact by 1e-3, six move it by 2e-4."""
 
     # first state
     load_steps: int = 20
@@ -58,19 +53,15 @@ class ContinuationOptions:
     relief: tuple[float, ...] = (0.1, 0.4)
     """Fractions of the static friction forces that are removed where the excitation cannot be raised with the full
     forces. Other fractions lead to other states that friction allows: 5 % for a mass that ratchets."""
-    load_length: float = 0.2
-    """Natural length of the load factor of the excitation."""
     moderate_friction: float = 1.0
     """Friction coefficient up to which one static state was found for all joints, from any start. With 0.5 the states
     of the dovetail are unchanged; with 2 they take 60 iterations more."""
 
     # relaxation in time; a change is the norm of the change of the amplitudes over the larger norm of two motions
-    transient_effort: int = 800
-    """Budget of Newton iterations of one relaxation, including the iterations for the periodic state. A jump at a fold
-    of vibro-impact takes 400 to 500. A motion that does not settle (a blade whose 16 pairs all slip and lift) would
-    take thousands."""
-    longest_transient: float = 1e9
-    """Periods: longest step. It is practically infinite: the step is the harmonic balance itself."""
+    search_iterations: int = 800
+    """Most Newton iterations of one search behind the end of a branch: of a relaxation with its periodic state, of the
+    last way to a first state, of a jump while the joint wears. A jump at a fold of vibro-impact takes 400 to 500. A
+    motion that does not settle (a blade whose 16 pairs all slip and lift) would take thousands."""
     transient_cut: float = 0.35
     """Factor of the length of a step that fails, or whose change is twice `smooth_change`. Half the value takes 2.5
     times the iterations of a jump at a fold. With 0.5 a random scene (`THROWN_OFF` in `tests/solver/test_homotopy.py`)
@@ -78,20 +69,9 @@ class ContinuationOptions:
     runaway: float = 1e3
     """Mean relative displacement over the largest displacement of vibration and start; above it parts run away."""
 
-    # states after a fold
-    fold_search_length: float = 0.01
-    """Natural length of the frequency in the search behind a fold, over the frequency."""
-
     # states at a given phase lag
-    frequency_difference: float = 1e-7
-    """Difference of two frequencies over the frequency, for derivatives. They agree to 1e-5 with central differences a
-    hundred times as long (`tests/solver/test_phase_lag.py`)."""
     largest_frequency_change: float = 0.02
     """Largest change of the frequency in an iteration, over the frequency."""
-    derivative_solves: int = 4
-    """Most solves for a derivative of the motion, each of which gains the digits of a Newton direction."""
-    derivative_error: float = 1e-5
-    """Relative residual of a derivative of the motion."""
 
     # largest amplitudes over the frequency
     peak_rise: float = 2.0
@@ -99,12 +79,6 @@ class ContinuationOptions:
     as the largest one: its frequency is then within 2 rtol of half the width of the resonance, and the amplitude within
     2 rtol^2. The states of single samples change with the frequency, so that the rise is rough: by 0.005 for the
     dovetail with rtol 0.01, which would take five solves a step with 1e-4."""
-    largest_peak_rise: float = 0.02
-    """Upper limit of this rise, 1/rad."""
-    peak_solves: int = 20
-    """Most solves for the phase lag of the largest amplitude; a step takes one or two."""
-    least_peak_slope: float = 0.1
-    """Smallest fall of this rise with the lag, 1/rad2, in a secant step; it is 1 for one degree of freedom."""
     largest_lag_step: float = 0.2
     """Largest change of the phase lag between two solves, rad."""
 

@@ -27,6 +27,7 @@ from solver.newton.iteration import solve_newton
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget
+from solver.options import COMMON
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
@@ -146,7 +147,7 @@ class FrequencyDerivative:
 def frequency_derivative(case: Case, state: LaggingState) -> FrequencyDerivative:
     """Derivatives at a state, by differences; the motion of masses on rigid ground depends on the frequency, too."""
     joint, at = state.balance.joint, state.at
-    length = CONTINUATION.frequency_difference * joint.omega
+    length = COMMON.difference * joint.omega
     ahead = case.joint(joint.omega + length, joint.excitation_amplitude)
     moved = at.displacement_h
     if joint.penalty.inertial.any():

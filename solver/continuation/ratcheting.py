@@ -19,11 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.continuation.natural import follow_naturally
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget
 from solver.structure.joint import Joint
 
@@ -59,7 +59,7 @@ def shake_down(joint: Joint, point: PathPoint, fraction: float, tolerance: float
     """
     solver = JacobianSolver()
     worn = point.evaluation.wear_depth
-    for _ in range(NEWTON.iterations):
+    for _ in range(CONTINUATION.attempts):
         if not ratchets(joint, point.evaluation, fraction):
             break
         homotopy = _MeanShift(joint, worn, point.evaluation.history, _mean_shift(joint, point))

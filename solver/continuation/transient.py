@@ -35,8 +35,9 @@ from solver.model import ComplexArray, FloatArray, Matrix
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, solve_balance
+from solver.options import COMMON
 from solver.outcome import Outcome
-from solver.stability.hill import stays
+from solver.stability.hill import is_stable_at
 from solver.structure.condensation import CondensedStructure, condense, relative_indices
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -182,7 +183,7 @@ def relax_to_periodic(
         - ADRIFT: the mean positions run away. All pairs slip, and only friction holds the parts: there is no periodic
           state.
         - UNSTABLE: the motion is an unstable periodic state and does not leave this state.
-        - UNSETTLED: the motion does not settle within `CONTINUATION.transient_effort` Newton iterations.
+        - UNSETTLED: the motion does not settle within `CONTINUATION.search_iterations` Newton iterations.
     point : PathPoint or None
         The state; its parameter is NaN. None where the outcome is not CONVERGED.
     """
@@ -191,13 +192,14 @@ def relax_to_periodic(
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
     predicted = start.predicted_h
     period = 2.0 * np.pi / joint.omega
-    length, tried = 1.0, np.inf
+    # the longest step, in periods, is practically infinite: the step is the harmonic balance itself
+    length, longest, tried = 1.0, 1.0 / COMMON.round_off, np.inf
     size = float(np.abs(start.displacement_h).max())
     tolerance, most = case.settings.tolerance, CONTINUATION.near_iterations
-    left = CONTINUATION.transient_effort
+    left = CONTINUATION.search_iterations
     # whether an unstable state has been found, which the motion leaves
     grows = False
-    while left > 0 and length >= CONTINUATION.shortest_fraction and not budget.exhausted:
+    while left > 0 and length >= NEWTON.shortest_step and not budget.exhausted:
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
         result = solve_balance(balance, predicted, solver, tolerance, budget, most)
@@ -206,7 +208,7 @@ def relax_to_periodic(
         change = _change(motion, ahead)
         too_far = change > 2.0 * CONTINUATION.smooth_change and length > 1.0
         # a step over more than the time in which a motion grows would damp this motion
-        damped = grows and result.converged and not stays(balance, result.evaluation, solver, budget)
+        damped = grows and result.converged and not is_stable_at(balance, result.evaluation, solver, budget)
         if damped and result.iterations == 0:
             return Outcome.UNSTABLE, None
         if not result.converged or too_far or damped:
@@ -219,7 +221,7 @@ def relax_to_periodic(
         if moved[:, :, 0].max() > CONTINUATION.runaway * size:
             return Outcome.ADRIFT, None
         # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
-        renewed = change < 0.5 * tried or length >= CONTINUATION.longest_transient
+        renewed = change < 0.5 * tried or length >= longest
         if change < CONTINUATION.relaxed_change and renewed:
             tried = change
             begun = budget.iterations
@@ -234,7 +236,7 @@ def relax_to_periodic(
             tried = np.inf
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
         growth = float(np.clip(CONTINUATION.smooth_change / max(change, 1e-300), 0.5, 2.0))
-        length = min(max(length * growth, 1.0), CONTINUATION.longest_transient)
+        length = min(max(length * growth, 1.0), longest)
     return Outcome.UNSETTLED, None
 
 
@@ -254,7 +256,7 @@ def _periodic(
     if not result.converged:
         return None, False
     found = PathPoint(float("nan"), result.evaluation, final_history(balance, result.evaluation))
-    return found, stays(balance, result.evaluation, solver, budget)
+    return found, is_stable_at(balance, result.evaluation, solver, budget)
 
 
 def _change(before: Motion, after: Motion) -> float:

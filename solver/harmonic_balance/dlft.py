@@ -25,6 +25,7 @@ from numba import njit
 from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
 from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
 from solver.model import BoolArray, FloatArray, IntArray
+from solver.options import COMMON
 from solver.packing import packable
 from solver.structure.joint import Joint
 from solver.structure.rough_forms import SingleArray
@@ -32,10 +33,6 @@ from solver.structure.rough_forms import SingleArray
 # Largest difference between the tangent of a passive pair and the identity: a hundred times the round-off of an entry.
 # A passive pair transmits its predicted force and is left out of the coupled system.
 _PASSIVE = 1e-14
-
-# Smallest scale of the vibrating residual over the static force: at the usual tolerance of 1e-8 a vibration below this
-# fraction of the preload is lost in the round-off of the static force.
-_LEAST_VIBRATION = 1e-6
 
 
 @dataclass(frozen=True)
@@ -146,7 +143,8 @@ def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tup
     static = max(float(np.linalg.norm(reduced_force[:, 0])), float(np.linalg.norm(contact_force[:, 0])), moving)
     if static == 0.0:
         return 1.0, 1.0
-    return static, max(moving, _LEAST_VIBRATION * static)
+    # a smaller vibration is lost in the round-off of the static force
+    return static, max(moving, COMMON.negligible * static)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from __future__ import annotations
 import numpy as np
 
 from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.options import BALANCE
 from solver.model import FloatArray
 from solver.settings import RESOLUTION
 from solver.structure.condensation import build_structure
@@ -24,10 +23,12 @@ from solver.structure.joint import Joint, step_mean_factor
 def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:
     """Largest magnitudes over a period of the responses (n_response,), m, the static ones included."""
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
-    response_t = response_h @ build_basis(joint.basis.orders, BALANCE.peak_points).synthesis
+    response_t = response_h @ build_basis(joint.basis.orders, RESOLUTION.fine_samples).synthesis
     orders = tail_orders(joint)
     if orders:
-        response_t = response_t + tail_h(joint, evaluation, orders) @ build_basis(orders, BALANCE.peak_points).synthesis
+        response_t = (
+            response_t + tail_h(joint, evaluation, orders) @ build_basis(orders, RESOLUTION.fine_samples).synthesis
+        )
     return np.asarray(np.abs(response_t).max(axis=1))
 
 
@@ -42,7 +43,7 @@ def tail_orders(joint: Joint) -> tuple[int, ...]:
     stride = 2 if orders[-1] > 1 and all(order % 2 for order in orders) else 1
     # three times the highest harmonic: what the usual samples of a harmonic still resolve
     resolved = (RESOLUTION.samples_per_harmonic // 2 - 1) * orders[-1]
-    last = min(resolved, joint.basis.n_samples // 2 - orders[-1], BALANCE.peak_points // 4)
+    last = min(resolved, joint.basis.n_samples // 2 - orders[-1], RESOLUTION.fine_samples // 4)
     return tuple(order for order in range(orders[-1] + stride, last + 1, stride) if joint.model.holds(order))
 
 

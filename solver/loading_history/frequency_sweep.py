@@ -13,6 +13,7 @@ from solver.accuracy.certificate import certify
 from solver.accuracy.error_estimate import UNKNOWN
 from solver.accuracy.refinement import Refined, refine, state_difference
 from solver.continuation.first_state import solve_first_state
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint
 from solver.loading_history.options import LOADING
 from solver.loading_history.path_step import Step
@@ -21,6 +22,7 @@ from solver.loading_history.sweep_start import Origin, Sweep, find_origin
 from solver.model import FloatArray, ReducedModel
 from solver.newton.journal import Journal, Results
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, move_point
 from solver.outcome import Outcome
 from solver.results.history import PeriodicState
@@ -44,7 +46,7 @@ class Found:
         self.outcome = outcome
         self.branch, self.fold = branch, fold
         self.state: PeriodicState | None = None
-        self.coarse: PeriodicState | None = None
+        self.reference: PeriodicState | None = None
         self.resolution: Resolution | None = None
         self.estimate = UNKNOWN
         self.message = ""
@@ -192,7 +194,7 @@ class FrequencySweep:
         nodes, target = self._begun_sweep(origin, self._sweep_to(origin, omega)), 1.0 if ramp else omega
         self.advance_nodes(nodes, target)
         try:
-            reached, coarse = nodes.state_at(target, self.budget)
+            reached, reference = nodes.state_at(target, self.budget)
             case = nodes.case
             if reached is None:
                 self.budget.limit = self.budget.iterations + LOADING.first_iterations
@@ -203,14 +205,16 @@ class FrequencySweep:
                 lost.message = self._where_lost(nodes)
                 return lost
             refined = refine(case, omega, self.excitation_amplitude, reached.point, self.budget)
-            if not refined.accurate and self.model.contact.n_contact <= LOADING.few_pairs:
+            # with impacts a small joint has many other states
+            small = nodes.case.joint(omega, 0.0).component_index.size <= NEWTON.small_joint_displacements
+            if not refined.accurate and small:
                 refined = self._restarted_from_static(omega) or refined
         except np.linalg.LinAlgError:
             return Found(Outcome.SINGULAR)
         # folds of a ramp are load factors
         fold = float("nan") if ramp else (nodes.state.fold, *reached.folds)[-1]
         found = Found(Outcome.CONVERGED, nodes.state.branch + len(reached.folds), fold)
-        return self._judge(refined, omega, found, nodes.reference_path.case, coarse)
+        return self._judge(refined, omega, found, nodes.reference_path.case, reference)
 
     def sweep_in_cell(self, frequency: float) -> NodeSweep:
         """The sweep that passes all frequencies in the quarter octave of a frequency, Hz, at its present node."""
@@ -227,21 +231,21 @@ class FrequencySweep:
         return nodes
 
     def _judge(
-        self, refined: Refined, omega: float, found: Found, coarse_case: Case, coarse: PathPoint | None
+        self, refined: Refined, omega: float, found: Found, reference_case: Case, reference: PathPoint | None
     ) -> Found:
         """The outcome of a refined state, with its error and the state of the reference sweep."""
         joint = refined.case.joint(omega, self.excitation_amplitude)
         found.state, found.resolution = periodic_state(joint, refined.point), refined.case.resolution
         found.estimate = refined.estimate
-        if coarse is not None:
-            moved = move_point(coarse_case, refined.case, joint, coarse, self.budget)
+        if reference is not None:
+            moved = move_point(reference_case, refined.case, joint, reference, self.budget)
             if moved is not None:
-                found.coarse = periodic_state(joint, moved)
+                found.reference = periodic_state(joint, moved)
                 found.estimate = found.estimate + state_difference(refined.case, joint, refined.point, moved)
         if not certify(joint, refined.point.evaluation).holds(self.settings.tolerance):
-            found.outcome, found.state, found.coarse = Outcome.CERTIFICATE_FAILED, None, None
+            found.outcome, found.state, found.reference = Outcome.CERTIFICATE_FAILED, None, None
         elif unstable := find_instability(refined.case, joint, refined.point.evaluation, self.budget):
-            found.outcome, found.state, found.coarse = unstable.outcome, None, None
+            found.outcome, found.state, found.reference = unstable.outcome, None, None
             found.message = unstable.sentence
         elif not refined.accurate:
             found.outcome = Outcome.INACCURATE
@@ -275,7 +279,7 @@ class FrequencySweep:
                 nodes.lose()
             if nodes.here is not None or nodes.path.omega is not None or np.isnan(nodes.state.lost_at):
                 return
-            behind = nodes.state.lost_at * (1.0 + LOADING.search_distance * nodes.direction)
+            behind = nodes.state.lost_at * (1.0 + CONTINUATION.arc_span * nodes.direction)
             if (behind - target) * nodes.direction >= 0.0:
                 return
             # budget of all attempts: where every pair slips, all of them fail

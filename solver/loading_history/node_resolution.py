@@ -13,7 +13,7 @@ from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.prolongation import transfer
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, move_point, solve_linearised
-from solver.settings import Resolution, allowed, first_resolution
+from solver.settings import RESOLUTION, Resolution, allowed, first_resolution
 from solver.structure.joint import Case, Joint
 
 
@@ -27,7 +27,7 @@ def resolution_holds(case: Case, joint: Joint, point: PathPoint, at_limit: bool,
     resolution, evaluation = case.resolution, point.evaluation
     fewest = resolution == first_resolution(case.settings)
     if nothing_happens(evaluation):
-        looked = Resolution(resolution.orders, max(ACCURACY.event_samples, 2 * resolution.samples))
+        looked = Resolution(resolution.orders, max(RESOLUTION.fine_samples, 2 * resolution.samples))
         # an event that only more samples show is left to `refine`
         return fewest and nothing_happens(_moved(case, joint, point, looked, budget, 0).point.evaluation)
     above = shifted(resolution, 2)
@@ -37,7 +37,7 @@ def resolution_holds(case: Case, joint: Joint, point: PathPoint, at_limit: bool,
     better = _moved(case, joint, point, above, budget, 1)
     error = ResolvedState(case, joint, point).difference(better).times(ACCURACY.two_levels_safety).largest
     settings = case.settings
-    least = 0.0 if fewest else ACCURACY.spare_fraction * ACCURACY.kept_fraction * settings.rtol
+    least = 0.0 if fewest else ACCURACY.kept_fraction**2 * settings.rtol
     return bool(error >= least and (at_limit or error <= settings.rtol))
 
 
@@ -58,8 +58,8 @@ def _moved(
 
 def choose_resolution(case: Case, joint: Joint, point: PathPoint, budget: Budget) -> Refined:
     """A node with the harmonics and samples that it needs, at least the first ones of automatic settings."""
-    # `coarse_unknowns` limits the harmonics: their error shows in the difference to the reference sweep
-    refined = refine(case, joint.omega, joint.excitation_amplitude, point, budget, ACCURACY.coarse_unknowns)
+    # `node_unknowns` limits the harmonics: their error shows in the difference to the reference sweep
+    refined = refine(case, joint.omega, joint.excitation_amplitude, point, budget, ACCURACY.node_unknowns)
     fewest = first_resolution(case.settings)
     if refined.case.resolution.highest >= fewest.highest:
         return refined

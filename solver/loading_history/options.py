@@ -26,10 +26,9 @@ class LoadingOptions:
     # one step
     free_step: float = 1e-3
     """Fraction of the parameter: length of the steps with continuation through folds, or settling in time, where a
-    branch ends. The load factor at which a ramp begins."""
-    search_distance: float = 0.05
-    """Fraction of the parameter: natural length of arc-length steps, and distance from the end of a sweep to the next
-    attempt to begin it again."""
+    branch ends. The load factor at which a ramp begins; the amplitude at which a nonlinear mode begins, as vibrating
+    contact forces over the friction limits (with ten times the value and with a tenth the nodes lie elsewhere: the
+    damping of the dovetail changes by 7e-5 and 1e-3); its smallest growth from node to node."""
 
     # steps of a sweep: dovetail of 48 pairs, compared with steps twenty times as short. Errors of the motion at 211,
     # 211.5, 212 and 212.5 Hz: 0.25, 0.05, 0.18 and 0.8 % with a largest change of 0.2 (48 nodes in all), 0.06, 0.04,
@@ -44,35 +43,18 @@ class LoadingOptions:
     of the motion at 211 Hz is three times as large, with 0 there are a few nodes more."""
     aimed_change: float = 0.75
     """Expected change of the vibration in the next step, as a fraction of the largest change. Few steps are refused."""
-    lengthening: tuple[float, float] = (0.1, 2.0)
-    """Limits of the ratio of the lengths of two steps of a sweep."""
     longest_sweep_step: float = 0.1
     """Longest step, as a fraction of the parameter."""
     shortest_sweep_step: float = 2e-5
     """Shortest step, as a fraction of the parameter, whatever the change of the vibration is. An undamped slider passes
     its resonance in such steps."""
-    node_residual: float = 1e-3
-    """Scaled residual of a node, as a fraction of rtol. With a tenth and with ten times this value the motion of the
-    dovetail is equal to 1e-4. With the tolerance of a result, nodes take 1.4 times the iterations."""
     sweep_iterations: int = 8000
     """Most Newton iterations of a sweep: more in jumps and searches are in vain (the dovetail takes 300). Parts of the
     sweep may take the shares `node_iterations` and `first_iterations`."""
-    results_per_save: int = 10
-    """Results of the journal (solves, determinants) after which a sweep is saved at the next node and its
-    factorisation dropped, so that a resumed sweep is identical. The cost is one more factorisation in about four nodes.
-    Where one node takes longer, the journal has save points of its own."""
 
     # where the first attempt fails
     other_starts: tuple[tuple[int, int], ...] = ((1, 64), (3, 256), (15, 256))
     """Harmonics and samples of further attempts to find a first state."""
-    few_pairs: int = 12
-    """Most pairs of a joint whose inaccurate state is sought again from the static state: with impacts there are many
-    other states."""
-
-    # resonance between two nodes
-    resonance_accuracy: float = 1e-8
-    """Accuracy of the frequency of a resonance on the way of a sweep, over the frequency. The start of a history is
-    solved to the tolerance of a state."""
 
     @property
     def node_iterations(self) -> int:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from solver.contact.coulomb import STICK
-from solver.continuation.arc_length import follow_arc
+from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import relax_to_periodic
@@ -25,7 +25,7 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.stability.hill import stays
+from solver.stability.hill import is_stable_at
 from solver.structure.joint import Case, Joint
 
 
@@ -101,7 +101,7 @@ class LoadingPath:
             begin = begin + ratio * (begin - nodes[0].evaluation.predicted_h)
         limit = self.case.settings.tolerance if tolerance is None else tolerance
         result = solve_balance(balance, begin, solver, limit, budget, CONTINUATION.near_iterations)
-        if not result.converged or not stays(balance, result.evaluation, solver, budget):
+        if not result.converged or not is_stable_at(balance, result.evaluation, solver, budget):
             return None
         return PathPoint(target, result.evaluation, final_history(balance, result.evaluation))
 
@@ -126,7 +126,7 @@ class LoadingPath:
 
         def accepted(point: PathPoint) -> bool:
             balance = self.balance_at(point.parameter, point.evaluation.history)
-            return stays(balance, point.evaluation, solver, budget)
+            return is_stable_at(balance, point.evaluation, solver, budget)
 
         while not budget.exhausted:
             point, arrived = follow_naturally(
@@ -136,14 +136,14 @@ class LoadingPath:
                 return Step(point, tuple(folds))
             # natural steps may have passed the unknown start of an unstable part: then the search begins before them
             end = start if arrived else point
-            span = LOADING.search_distance * scale
-            arc = follow_arc(self.balance_at, end, target, span, solver, tolerance, budget, accepted, beyond=False)
-            if arc.point is not None:
-                return Step(arc.point, (*folds, *arc.jumps))
-            if arrived and not arc.folds and abs(target - end.parameter) > LOADING.free_step * scale:
+            arc = Arc(self.balance_at, end, CONTINUATION.arc_span * scale, solver, tolerance, budget)
+            found = follow_arc(arc, target, accepted, beyond=False)
+            if found.point is not None:
+                return Step(found.point, (*folds, *found.jumps))
+            if arrived and not found.folds and abs(target - end.parameter) > LOADING.free_step * scale:
                 # a shorter step comes closer to the loss of stability without a fold
                 return Outcome.UNSTABLE
-            landed = self._settled(end, target, arc.folds, solver, budget)
+            landed = self._settled(end, target, found.folds, solver, budget)
             if isinstance(landed, Outcome):
                 return landed
             folds.extend(landed.folds)

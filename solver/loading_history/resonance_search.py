@@ -119,7 +119,7 @@ def _between(excess: Callable[[float], float], one: float, other: float, nodes: 
     if excess(one) <= 0.0:
         # zero but for round-off
         return one
-    found = float(brentq(excess, one, other, xtol=LOADING.resonance_accuracy * one, rtol=1e-12))
+    found = float(brentq(excess, one, other, xtol=nodes.case.settings.tolerance * one, rtol=1e-12))
     assert nodes.ahead is not None
     for fold in nodes.ahead.folds:
         if abs(found - fold) <= LOADING.free_step * fold:

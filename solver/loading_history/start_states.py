@@ -101,7 +101,7 @@ def follow_branch(
             StartState(
                 outcome=found.outcome,
                 state=found.state,
-                coarse=found.coarse,
+                reference=found.reference,
                 penalty_omega=line.penalty_omega,
                 resolution=found.resolution or line.resolution,
                 response_error=found.estimate.response,

@@ -27,9 +27,11 @@ from solver.harmonic_balance.converged import PathPoint, vibration_change, vibra
 from solver.loading_history.node_resolution import choose_resolution, resolution_holds
 from solver.loading_history.options import LOADING
 from solver.loading_history.path_step import LoadingPath, Step, in_rows
-from solver.newton.journal import Journal, Results
+from solver.newton.journal import RESULTS_PER_SAVE, Journal, Results
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, move_point
+from solver.options import COMMON
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import packable
 from solver.settings import Resolution
@@ -219,12 +221,13 @@ class NodeSweep:
             if point is not None:
                 change = self._change(here, point)
                 if change <= 1.0 or length <= shortest:
-                    ratio = float(np.clip(LOADING.aimed_change / max(change, 1e-12), *LOADING.lengthening))
+                    ratio = min(LOADING.aimed_change / max(change, 1e-12), COMMON.largest_step_ratio)
                     self.state = replace(self.state, length=length * ratio)
                     return Step(point)
-                shorter = float(np.clip(LOADING.aimed_change / change, LOADING.lengthening[0], LOADING.aimed_change))
+                # the change need not be proportional to the length
+                shorter = max(LOADING.aimed_change / change, 0.1)
             elif length > free:
-                shorter = max(0.25, free / length)
+                shorter = max(COMMON.smallest_step_ratio, free / length)
             else:
                 step = self.path.step(here, target, self.solver, self.budget)
                 if isinstance(step, Step):
@@ -233,14 +236,14 @@ class NodeSweep:
                 self.state = replace(self.state, failure=step)
                 if length <= shortest or step in _FINAL:
                     return None
-                shorter = 0.25
+                shorter = COMMON.smallest_step_ratio
             length = max(shorter * length, shortest)
         return None
 
     def _node_tolerance(self) -> float:
         """Tolerance of the scaled residual of a node; reported states are solved to the tolerance of the settings."""
         settings = self.case.settings
-        return max(settings.tolerance, LOADING.node_residual * settings.rtol)
+        return max(settings.tolerance, NEWTON.forcing * settings.rtol)
 
     def _change(self, before: PathPoint, after: PathPoint) -> float:
         """Change of the vibration in a step over the largest change allowed."""
@@ -278,7 +281,7 @@ class NodeSweep:
                 self.state = replace(self.state, checked=step.point)
             else:
                 self._choose_resolution()
-        if len(self.journal) >= LOADING.results_per_save:
+        if len(self.journal) >= RESULTS_PER_SAVE:
             self.save()
 
     def _advance_reference(self, target: float) -> None:

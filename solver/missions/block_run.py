@@ -184,7 +184,7 @@ def _last(case: BlockCase, ended: Ended, start: StartState) -> StartState:
         response_error=choice.estimate.response,
         wear_rate_error=choice.estimate.wear_rate,
         message="",
-        coarse=None,
+        reference=None,
     )
 
 

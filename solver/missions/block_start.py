@@ -53,7 +53,7 @@ def begin_block(
 
 def _continued(block: Block, depth: FloatArray, carried: StartState, settings: SolverSettings) -> StartState:
     """The state of a block that keeps the tangential history of the block before."""
-    began, lost = computing_time(), replace(carried, state=None, coarse=None, newton_iterations=0)
+    began, lost = computing_time(), replace(carried, state=None, reference=None, newton_iterations=0)
     try:
         found = _Continuation(block, depth, settings, carried).state()
     except OutOfTimeError:
@@ -147,5 +147,5 @@ class _Continuation:
             branch=start.branch + found.branch,
             fold_frequency=found.fold / (2.0 * np.pi),
             message=found.message,
-            coarse=found.coarse,
+            reference=found.reference,
         )

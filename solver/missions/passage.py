@@ -28,6 +28,7 @@ from solver.missions.block_run import BlockCase, BlockRun, not_flown
 from solver.missions.blocks import Passage, worn
 from solver.missions.options import MISSIONS
 from solver.model import ComplexArray, FloatArray
+from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.packing import in_rows
 from solver.results.history import StartState
@@ -151,7 +152,7 @@ def _swept(case: BlockCase, passage: Passage, depth: FloatArray, aim: float) -> 
 def _between(one: SweptState, other: SweptState) -> list[float]:
     """Further frequencies between two, Hz: both sides of a jump, or the middle."""
     low, high = one.frequency, other.frequency
-    near = MISSIONS.beside_jump * low
+    near = COMMON.negligible * low
     folds = {
         state.start.fold_frequency for state in (one, other) if low + near < state.start.fold_frequency < high - near
     }

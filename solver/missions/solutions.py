@@ -17,6 +17,7 @@ from solver.missions.options import MISSIONS
 from solver.missions.passage import run_passage
 from solver.missions.step import Fly, Step, take_step
 from solver.model import FloatArray
+from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable
 from solver.results.history import StartState
@@ -158,13 +159,13 @@ class MissionSolutions:
             if length == 1 or step.outcome is Outcome.TIME_LIMIT:
                 self.progress = replace(self.progress, fine=replace(course, failure=step))
             else:
-                self._shorten(length, length / MISSIONS.smallest_step_ratio)
+                self._shorten(length, COMMON.smallest_step_ratio * length)
             return
         wanted = self._wanted(course.nodes[-1], step, length)
-        if length > MISSIONS.first_step and wanted < MISSIONS.step_safety * length:
+        if length > MISSIONS.first_step and wanted < COMMON.step_safety * length:
             self._shorten(length, wanted)
             return
-        longest = MISSIONS.first_step if length == 1 else MISSIONS.largest_step_ratio * length
+        longest = MISSIONS.first_step if length == 1 else length / COMMON.smallest_step_ratio
         ahead = int(np.clip(wanted, MISSIONS.first_step, longest))
         self.progress = replace(self.progress, fine=_longer(course, step), length=ahead, runs=())
 
@@ -172,7 +173,7 @@ class MissionSolutions:
         """Try a step again with fewer missions."""
         # steps of two missions are missions one by one, whatever their error says
         least = MISSIONS.first_step if length > MISSIONS.first_step else 1
-        shorter = int(np.clip(wanted, length / MISSIONS.smallest_step_ratio, length - 1))
+        shorter = int(np.clip(wanted, COMMON.smallest_step_ratio * length, length - 1))
         self.progress = replace(self.progress, length=max(shorter, least), runs=())
 
     def _wanted(self, node: MissionNode, step: Step, length: int) -> float:
@@ -181,7 +182,7 @@ class MissionSolutions:
         The square of the error by the order of the blocks adds up. This error itself may be seen at the end of a step,
         over all wear so far.
         """
-        area, aim = self.mission.area, MISSIONS.step_error_fraction * self.mission.settings.rtol
+        area, aim = self.mission.area, COMMON.step_error_fraction * self.mission.settings.rtol
         if step.order_error == 0.0:
             return math.inf
         grown = float((step.node.growth - node.growth).sum(axis=0) @ area)
@@ -189,7 +190,7 @@ class MissionSolutions:
         squared = math.sqrt(aim * max(1.0, whole * length / (step.node.mission * grown))) / step.order_error
         # the wear of a step grows with its length, too
         itself = math.sqrt(aim * whole / (step.order_error * grown))
-        return MISSIONS.step_safety * length * min(squared, itself)
+        return COMMON.step_safety * length * min(squared, itself)
 
 
 def halves(length: int) -> tuple[int, ...]:

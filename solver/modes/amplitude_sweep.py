@@ -20,9 +20,9 @@ from solver.loading_history.node_resolution import choose_resolution
 from solver.loading_history.options import LOADING
 from solver.model import FloatArray
 from solver.modes.mode_balance import ModeProblem, ModeState
-from solver.modes.options import MODES
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
+from solver.options import COMMON
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class AmplitudeSweep:
         self.direction, self.budget = direction, budget
         self.ahead: ModeState | None = None
         self.lost = False
-        self._ratio, self._n_nodes = MODES.longest_ratio, 0
+        self._ratio, self._n_nodes = COMMON.largest_step_ratio, 0
         self._solver = JacobianSolver()
         self._checked = nodes.here
         self._choose_resolution()
@@ -123,20 +123,21 @@ class AmplitudeSweep:
         ratio = self._ratio
         while True:
             found = self.nodes.reach(here.amplitude * ratio**self.direction, self._solver, self.budget)
-            shortest = ratio <= MODES.shortest_ratio
+            # where a smaller ratio is needed the mode is lost; with a tenth of the step modes are equal
+            shortest = ratio <= 1.0 + LOADING.free_step
             change = 1.0
             if found is not None:
                 sticks = all((at.point.evaluation.status_t == STICK).all() for at in (here, found))
                 limit = float(np.clip(LOADING.change_per_rtol * settings.rtol, *LOADING.change_limits))
                 change = shape_change(here, found) / (CONTINUATION.linear_change if sticks else limit)
                 if change <= 1.0 or shortest:
-                    wider = float(np.clip(LOADING.aimed_change / max(change, 1e-12), *LOADING.lengthening))
-                    self._ratio = float(np.clip(ratio**wider, MODES.shortest_ratio, MODES.longest_ratio))
+                    wider = min(LOADING.aimed_change / max(change, 1e-12), COMMON.largest_step_ratio)
+                    self._ratio = float(np.clip(ratio**wider, 1.0 + LOADING.free_step, COMMON.largest_step_ratio))
                     return found
             if shortest:
                 return None
-            shorter = 0.25 if found is None else float(np.clip(LOADING.aimed_change / change, 0.1, 0.75))
-            ratio = max(ratio**shorter, MODES.shortest_ratio)
+            wanted = 0.0 if found is None else LOADING.aimed_change / change
+            ratio = max(ratio ** max(wanted, COMMON.smallest_step_ratio), 1.0 + LOADING.free_step)
 
     def _take(self, following: ModeState) -> None:
         """Make the next node the current one."""

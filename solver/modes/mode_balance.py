@@ -25,6 +25,7 @@ from solver.modes.options import MODES
 from solver.newton.iteration import solve_newton
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
+from solver.options import COMMON
 from solver.settings import Resolution
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
@@ -168,7 +169,8 @@ class ModeProblem:
         budget.iterations += end.iterations
         found = end.evaluation
         omega, damping_ratio, drive = map(float, found.values)
-        if not end.converged or abs(damping_ratio) > MODES.most_damping:
+        # zeta goes to infinity where friction stops a mass for good: with few harmonics there are further states
+        if not end.converged or abs(damping_ratio) > 1.0:
             return None
         point = PathPoint(amplitude, found.at, final_history(found.balance, found.at))
         return ModeState(amplitude, omega, damping_ratio, drive, point, found.shape)
@@ -177,7 +179,7 @@ class ModeProblem:
         """Newton step of all unknowns."""
         tangent, joint = here.balance.linearise(here.at), here.balance.joint
         values = here.values
-        lengths = MODES.difference * np.array([values[0], 1.0, amplitude])
+        lengths = COMMON.difference * np.array([values[0], 1.0, amplitude])
         steps, errors = [solver.solve(tangent, -here.at.residual)], [np.zeros(3)]
         for place, length in enumerate(lengths):
             moved = values.copy()

@@ -22,6 +22,7 @@ from solver.modes.modal_model import natural_frequencies
 from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.modes.options import MODES
 from solver.newton.solve_balance import Budget
+from solver.options import COMMON
 from solver.outcome import Outcome, known_to
 from solver.settings import Resolution
 
@@ -97,7 +98,7 @@ def judge_point(
     by_friction = float(friction_work(joint, found.point.evaluation).sum()) / (
         2.0 * np.pi * (found.omega * found.amplitude) ** 2
     )
-    damping = max(by_friction, abs(found.damping_ratio), MODES.least_damping)
+    damping = max(by_friction, abs(found.damping_ratio), COMMON.round_off)
     known = [float(errors[0]) / found.omega, float(errors[1]) / damping]
     if accurate and max(known) <= rtol:
         return ModePoint(Outcome.CONVERGED, "", problem, found, errors)

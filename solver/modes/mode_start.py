@@ -11,6 +11,7 @@ from solver.continuation.first_state import relieved_history, solve_static_state
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
+from solver.loading_history.options import LOADING
 from solver.model import FloatArray, ReducedModel
 from solver.modes.amplitude_sweep import Nodes
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
@@ -94,7 +95,7 @@ def first_amplitude(rest: Rest) -> float:
     limit = np.linalg.norm(friction_limit(problem.case.friction_coefficient, at.force_h[:, 0, 0]))
     unit = problem.case.joint(problem.mode.omega, 1.0).structure.force_h()[:, 1:]
     force = np.linalg.norm(unit)
-    return float(MODES.first_load * limit / force) if limit > 0.0 and force > 0.0 else MODES.first_amplitude
+    return float(LOADING.free_step * limit / force) if limit > 0.0 and force > 0.0 else MODES.first_amplitude
 
 
 def first_node(rest: Rest, amplitude: float, budget: Budget) -> Nodes | None:
@@ -123,16 +124,12 @@ def sliding_node(rest: Rest, amplitude: float, budget: Budget) -> Nodes | None:
     tolerance = problem.case.settings.tolerance
     _, folded = problem.model.harmonic_structure(1)
     dofs = problem.model.contact.dofs
-    for attempt in range(MODES.sliding_starts):
-        size = amplitude * MODES.top_base**attempt
-        joint = problem.case.joint(mode.omega, size)
-        shape = size * (mode.shape.conj() if folded else mode.shape)
-        amplitudes = np.zeros((dofs.size, joint.basis.n_harmonics), complex)
-        amplitudes[:, 0] = np.where(dofs.ravel() >= 0, shape[dofs.ravel()], 0.0)
-        motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
-        start = rest.point.evaluation.predicted_h + joint.to_relative(joint.force_correction(motion))
-        values = np.array([mode.omega, mode.damping_ratio, size])
-        found = problem.solve(size, start, values, rest.point.history, JacobianSolver(), tolerance, budget)
-        if found is not None:
-            return Nodes(problem, (found,))
-    return None
+    joint = problem.case.joint(mode.omega, amplitude)
+    shape = amplitude * (mode.shape.conj() if folded else mode.shape)
+    amplitudes = np.zeros((dofs.size, joint.basis.n_harmonics), complex)
+    amplitudes[:, 0] = np.where(dofs.ravel() >= 0, shape[dofs.ravel()], 0.0)
+    motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
+    start = rest.point.evaluation.predicted_h + joint.to_relative(joint.force_correction(motion))
+    values = np.array([mode.omega, mode.damping_ratio, amplitude])
+    found = problem.solve(amplitude, start, values, rest.point.history, JacobianSolver(), tolerance, budget)
+    return None if found is None else Nodes(problem, (found,))

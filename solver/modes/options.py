@@ -9,40 +9,14 @@ from dataclasses import dataclass
 class ModeOptions:
     """Lengths and limits: for each its meaning, its unit (none: a ratio) and the evidence for its value."""
 
-    rigid: float = 1e-6
-    """Square of a natural frequency over the shift of the eigenvalue problem, below which a motion is rigid: that is
-    1e-12 of the ratio of the traces of stiffness and mass, of the order of round-off."""
-    shift: float = 1e-6
-    """Shift of the eigenvalue problem over the ratio of the traces of stiffness and mass. With a hundred times
-    the value the modes of dovetail and foot (`tests/solver/test_modes.py`) are equal to 1e-8."""
-
-    first_load: float = 1e-3
-    """Vibrating contact forces at the first amplitude, over the friction limits under the static load. With ten times
-    the value and with a tenth the nodes lie elsewhere: the damping of the dovetail changes by 7e-5 and 1e-3."""
     first_amplitude: float = 1e-6
     """First amplitude of a joint without static normal forces, m sqrt(kg)."""
-    longest_ratio: float = 2.0
-    """Largest ratio of the amplitudes of two nodes. With 1.4 the damping of the dovetail changes by 5e-6."""
-    shortest_ratio: float = 1.001
-    """Smallest ratio of the amplitudes of two nodes; where a smaller one is needed, the mode is lost. With 1.0001 the
-    modes of dovetail and foot are equal."""
     top_base: float = 4.0
     """Amplitudes are lowered from a power of this number, at least twice the amplitude of the point. All points with
     one such power have one way. With 8 the mode of the foot is equal to 1e-8."""
-    sliding_starts: int = 4
-    """Attempts to find a mode of a sliding joint, each at an amplitude higher by `top_base`. The slider needs one."""
-    difference: float = 1e-7
-    """Relative step of the derivatives by frequency, damping ratio and drive: their error does not change the mode,
-    whose residual is exact. With ten and a hundred times the value modes are equal to 1e-9 and take up to 15 %
-    longer."""
     largest_change: float = 0.3
     """Largest change of the frequency (relative) and of the damping ratio in one iteration. With 0.1 and with 1
     the modes of dovetail and foot are equal."""
-    most_damping: float = 1.0
-    """Largest magnitude of a damping ratio. Where friction stops a mass on a rigid slider for good, zeta goes to
-    infinity; balances of few harmonics have further states there, which do not exist."""
-    least_damping: float = 1e-8
-    """Damping ratio to which the error of a smaller one is relative: round-off of a joint without damping."""
 
     # message of a lost mode
     near_resonance: float = 0.02

@@ -22,7 +22,7 @@ Results = tuple[tuple[object, ...], ...]
 
 RESULTS_PER_SAVE = 12
 """Results from one save point to the next: 0.2 s of the dovetail with 48 pairs, 4 s with 336. In any case a new
-factorisation is built about once in two results."""
+factorisation is built about once in two results. After as many results a sweep is saved at its next node."""
 
 
 class KeepsFactor(Protocol):

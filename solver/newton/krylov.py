@@ -15,6 +15,7 @@ from numba import njit
 
 from solver.model import ComplexArray, FloatArray
 from solver.newton.options import NEWTON
+from solver.options import COMMON
 
 ROUND_OFF = 1e-11
 """Fraction of a vector, or of a slipping pair: less is no new direction. Double precision has 2e-16."""
@@ -45,7 +46,8 @@ class Recycled:
     def learn(self, basis: FloatArray, triangle: FloatArray, rotations: FloatArray) -> None:
         """Add the correction of a GMRES cycle with A E: basis (k + 1, n), triangle (k, k), Givens rotations (k, 2)."""
         size = np.abs(np.diag(triangle))
-        if not size.min() > NEWTON.null_space * size.max():
+        # a cycle with a smaller pivot is not recycled
+        if not size.min() > COMMON.negligible * size.max():
             return
         turned = np.eye(len(basis), len(triangle))
         for place in range(len(triangle) - 1, -1, -1):
@@ -116,7 +118,7 @@ def solve_gmres(
             break
         first = first or cycle
         # without convergence, directions of the null space would only make the solution large
-        least = 0.0 if norms[-1] <= rtol * size else NEWTON.null_space
+        least = 0.0 if norms[-1] <= rtol * size else COMMON.negligible
         weights = np.linalg.lstsq(cycle.triangle, cycle.projected, rcond=least)[0]
         solution = solution + kept.apply(weights @ cycle.basis[:n_columns])
         cycles -= norms[-1] > rtol * size

@@ -21,15 +21,16 @@ class NewtonOptions:
     three the dovetail gets another static state at a friction coefficient of 1000."""
     shortest_step: float = 1.0 / 128.0
     """Shortest step as a fraction of the full step: seven halvings. With six a random scene (`THROWN_OFF` in
-    `tests/solver/test_homotopy.py`) gets no accurate state."""
+    `tests/solver/test_homotopy.py`) gets no accurate state. Also the shortest natural step over the range to the target
+    (where a shorter one is needed, the branch is assumed to fold), the shortest relaxation step in periods, and the
+    least friction of a homotopy over the moderate one."""
 
     # GMRES and Arnoldi's method
     forcing: float = 1e-3
     """Relative residual of a Newton direction: an iteration gains up to three digits. With half and twice this value
-    the states of the dovetail are equal to 1e-6."""
-    null_space: float = 1e-5
-    """Ratio to the largest singular value: smaller directions are left out of a solution that does not converge.
-    Ratio to the largest pivot: a cycle with a smaller one is not recycled."""
+    the states of the dovetail are equal to 1e-6. Also the residual of a node of a sweep as a fraction of rtol: with a
+    tenth and with ten times this value the motion of the dovetail is equal to 1e-4; with the tolerance of a result,
+    nodes take 1.4 times the iterations."""
     recycled_directions: int = 30
     """Directions kept from solve to solve with a factorisation. Products a solve for 48 pairs: 12.4 with 0, 9.0 with
     30, 8.3 with 60 in an equal time."""
@@ -49,6 +50,9 @@ class NewtonOptions:
     of a march five."""
     usual_products: int = 8
     """Products of a solve with a kept factorisation: 7.6 in the default study."""
+    dear_unknowns: int = 1000
+    """Unknowns of an expensive dense solve: above, no odd harmonics above 79, no homotopy in the harmonics, no 3 N + 2
+    samples to compare, and no eigenvalues of Hill's matrix (255 unknowns take 0.15 s, 800 take 3 s)."""
     small_joint_displacements: int = 40
     """Relative displacements up to which a joint is small: impacts couple most harmonics and directions, and products
     with any other factorisation are in vain (three pairs with 115 harmonics, `tests/solver/test_refinement.py`)."""

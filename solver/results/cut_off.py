@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
 from solver.model import ContactInterface, FloatArray
-from solver.outcome import Outcome
-from solver.results.history import WearHistory
-from solver.results.options import RESULTS
+from solver.options import COMMON
 
 
 def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: FloatArray, depth: FloatArray) -> float:
@@ -27,17 +24,10 @@ def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: Float
     """
     if contact.edge is None or not contact.edge.any():
         return math.nan
-    least = RESULTS.edge_load
+    least = COMMON.negligible
     reached = [values[:, contact.edge].max(axis=1) > least * values.max(axis=1) for values in (pressure, depth)]
     found = np.flatnonzero(np.logical_or(*reached))
     return float(cycles[found[0]]) if found.size else math.nan
-
-
-def judge_cut_off(history: WearHistory) -> WearHistory:
-    """The history, with the outcome CONTACT_CUT_OFF where it is complete but its contact is cut off."""
-    if math.isnan(history.cut_off_cycle) or not history.outcome.complete:
-        return history
-    return replace(history, outcome=Outcome.CONTACT_CUT_OFF, message=describe_cut_off(history.cut_off_cycle))
 
 
 def describe_cut_off(cycle: float) -> str:

@@ -50,7 +50,7 @@ class StartState:
     branch: number of folds that the sweep has jumped over since its start; 0 on its first branch.
     fold_frequency: Hz, frequency of the last such fold; NaN if none. NaN for a ramp, whose folds are load factors.
     message: sentence of an unexpected error (`Outcome.EXCEPTION`), or how far a sweep came.
-    coarse: state of the reference sweep, solved with the resolution of the state; None where there is none.
+    reference: state of the reference sweep, solved with the resolution of the state; None where there is none.
     """
 
     outcome: Outcome
@@ -64,7 +64,7 @@ class StartState:
     branch: int = 0
     fold_frequency: float = float("nan")
     message: str = ""
-    coarse: PeriodicState | None = None
+    reference: PeriodicState | None = None
 
 
 @dataclass(frozen=True)

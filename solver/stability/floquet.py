@@ -30,15 +30,13 @@ from solver.model import BoolArray, ComplexArray, LinearModel, Matrix
 from solver.newton.krylov import ritz_values
 from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, move_point
+from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.settings import Resolution, all_orders, samples_for
 from solver.stability.monodromy import Monodromy, build_monodromy, switching_pairs
 from solver.stability.options import STABILITY
 from solver.structure.identity import Identity
 from solver.structure.joint import Case, Joint
-
-# negative eigenvalue over the largest diagonal entry that counts as round-off: an estimate, 1e6 roundings of a number
-_ROUND_OFF = 1e-10
 
 
 @dataclass(frozen=True)
@@ -221,7 +219,7 @@ def _is_passive(of: Identity) -> bool:
 def _is_semidefinite(matrix: Matrix) -> bool:
     size = float(np.abs(np.diag(matrix)).max(initial=0.0))
     try:
-        np.linalg.cholesky(matrix + _ROUND_OFF * size * np.eye(len(matrix)))
+        np.linalg.cholesky(matrix + COMMON.round_off * size * np.eye(len(matrix)))
     except np.linalg.LinAlgError:
         return size == 0.0 and not matrix.any()
     return True

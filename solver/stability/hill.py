@@ -32,6 +32,6 @@ def is_stable(tangent: Linearisation, solver: JacobianSolver) -> bool:
     return bool(solver.determinant_sign(tangent) >= 0.0)
 
 
-def stays(balance: Balance, at: Evaluation, solver: JacobianSolver, budget: Budget) -> bool:
+def is_stable_at(balance: Balance, at: Evaluation, solver: JacobianSolver, budget: Budget) -> bool:
     """`is_stable` for a state of a balance, from the journal of the budget where the journal has this result."""
     return budget.once(solver, lambda: is_stable(balance.linearise(at), solver), lambda known: isinstance(known, bool))

@@ -77,12 +77,12 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, budget: Budget) -
         if finer is None or _first(finer[1], at) > STABILITY.other_branch:
             return NOT_KNOWN
         joint, at = finer
-        if opens_and_closes(at) and hill_size(joint) <= STABILITY.hill_unknowns and not joint.penalty.inertial.any():
+        if opens_and_closes(at) and hill_size(joint) <= NEWTON.dear_unknowns and not joint.penalty.inertial.any():
             return Multipliers(_sorted(hill_multipliers(joint, at)), 0.0)
     n_samples = march_samples(joint, linear, (stuck, stuck | switching), small) // 2
     found = _sorted(multipliers_of(build_monodromy(joint, linear, at, n_samples), small))
     error = np.inf
-    while found.size and error > STABILITY.settled_multiplier and n_samples < 8 * STABILITY.small_samples:
+    while found.size and error > case.settings.rtol and n_samples < 8 * STABILITY.small_samples:
         if abs(abs(found[0]) - 1.0) > 2.0 * error:
             break
         n_samples, coarse = 2 * n_samples, found

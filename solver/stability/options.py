@@ -21,12 +21,10 @@ class StabilityOptions:
     """Smallest number of harmonics for a small joint that opens and closes: with fewer the impacts are too soft (9
     harmonics: multiplier 0.95 in place of 2.8)."""
     other_branch: float = 0.05
-    """Relative difference of means and first harmonics above which a state with `opening_harmonics` belongs to another
-    branch. On the branches of a mass at a wall more than 9 harmonics change them by up to 3 %."""
-    settled_multiplier: float = 0.01
-    """Change of the first multiplier with twice as many samples at which no more samples are taken."""
-    hill_unknowns: int = 800
-    """Largest eigenvalue problem of Hill's method: 255 unknowns take 0.15 s, 800 take 3 s."""
+    """Relative difference of the vibration above which two states belong to different branches: a state with
+    `opening_harmonics` (on the branches of a mass at a wall more than 9 harmonics change means and first harmonics by
+    up to 3 %), or a state behind the end of a branch. Corners at which a branch folds back a little are no jumps, and
+    there may be many of them."""
     most_rows: int = 600
     """Largest number of displacements of switching pairs: 200 such pairs take 0.4 GB and 10 s."""
     smallest_growth: float = 1e-3

@@ -13,6 +13,7 @@ from solver.accuracy.period_events import lacks_even, left_out
 from solver.accuracy.refinement import refine
 from solver.harmonic_balance.dlft import worn_by
 from solver.newton.solve_balance import move_point
+from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.results.state_report import StateReport, report_state
 from solver.settings import Resolution
@@ -130,10 +131,10 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
         return _vibrates_otherwise(state)
     if error == 0.0:
         # the last choice was for a joint without slip and separation
-        return now > ACCURACY.round_off_vibration
+        return now > COMMON.negligible
     if now > WEAR.left_out_grown * choice.left_out:
         return error * now > settings.rtol * choice.left_out
-    return now < WEAR.left_out_fallen * choice.left_out
+    return now < ACCURACY.kept_fraction**2 * choice.left_out
 
 
 def _vibrates_otherwise(state: WearState) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import vibration_change
 from solver.model import FloatArray
+from solver.options import COMMON
 from solver.settings import Scheme
 from solver.wear.bdf2 import bdf2_attempt
 from solver.wear.options import WEAR
@@ -56,7 +57,7 @@ class GivenSteps:
         planned = self.length
         if self.end == np.inf:
             slower = float(state.rates.largest[-1] / state.rates.value[-1])
-            planned = min(WEAR.largest_step_ratio * state.length, self.length * slower)
+            planned = min(COMMON.largest_step_ratio * state.length, self.length * slower)
         if self.largest_depth is not None and self.scheme == "explicit":
             planned = self.largest_depth / float(work.rate(state.point.evaluation).max())
         # no extra step for a remainder below the round-off of the count
@@ -100,17 +101,17 @@ class AdaptiveSteps:
         shortest = max(0.5 * WEAR.fold_resolution * state.cycle, WEAR.shortest_slow_step * state.first_length)
         while True:
             tried = bdf2_attempt(work, state, length)
-            shorter = WEAR.smallest_step_ratio
+            shorter = COMMON.smallest_step_ratio
             if tried is not None:
                 size = float(np.abs(tried.error) @ work.area)
                 ratio = size / self._allowed(work, state, tried.end.point.evaluation.wear_depth, length)
-                wanted = WEAR.step_safety / np.sqrt(max(ratio, 1e-12))
+                wanted = COMMON.step_safety / np.sqrt(max(ratio, 1e-12))
                 # at the shortest step: a corner of the wear rate, or the end of the branch if the vibration changes
                 calm = vibration_change(state.point.evaluation, tried.end.point.evaluation) < CONTINUATION.smooth_change
                 if ratio <= 1.0 or (length <= shortest and calm):
-                    ahead = length * float(np.clip(wanted, WEAR.refused_step_ratio, WEAR.largest_step_ratio))
+                    ahead = length * float(np.clip(wanted, COMMON.step_safety, COMMON.largest_step_ratio))
                     return Step(work.accepted(state, tried.end, length).planned(ahead), size, length)
-                shorter = float(np.clip(wanted, WEAR.smallest_step_ratio, WEAR.refused_step_ratio))
+                shorter = float(np.clip(wanted, COMMON.smallest_step_ratio, COMMON.step_safety))
             if length <= shortest:
                 one_step = bounded_euler_step if self.bounded else euler_step
                 taken = one_step(work, state, length, "implicit")
@@ -121,4 +122,4 @@ class AdaptiveSteps:
         """Allowed error of a step, m3; depth (n_contact,): at the end of the step, m."""
         worn, before = float(depth @ work.area), float(state.depth @ work.area)
         at_mean_rate = worn * length / (state.cycle + length)
-        return max(WEAR.step_error_fraction * self.rtol * max(worn - before, at_mean_rate), 1e-300)
+        return max(COMMON.step_error_fraction * self.rtol * max(worn - before, at_mean_rate), 1e-300)

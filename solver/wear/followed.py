@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from solver.continuation.largest_response import accepted_rise, rise_of_response, solve_at_peak
+from solver.continuation.options import CONTINUATION
 from solver.continuation.phase_lag import LaggingState, solve_at_lag
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
@@ -19,7 +20,6 @@ from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.settings import FollowedFrequency
 from solver.structure.joint import Case
-from solver.wear.options import WEAR
 from solver.wear.state import Failure, Reached, WearState
 
 
@@ -31,7 +31,7 @@ def end_at_resonance(
     follow: FollowedFrequency,
     solver: JacobianSolver,
     budget: Budget,
-    most: int = WEAR.step_iterations,
+    most: int = CONTINUATION.near_iterations,
 ) -> Reached | None:
     """The state of a balance at the frequency that is followed; None where it is not found.
 

@@ -24,12 +24,13 @@ from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
+from solver.options import COMMON
 from solver.results.options import RESULTS
+from solver.stability.options import STABILITY
 from solver.structure.joint import Case, Hold, Joint
 from solver.structure.options import STRUCTURE
 from solver.wear.branch_loss import is_stable_when_held
 from solver.wear.euler import held_wear
-from solver.wear.options import WEAR
 
 
 def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
@@ -41,10 +42,10 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
         return None
     stiffness, directions = np.linalg.eigh(joint.structure.static_stiffness)
     # spin softening may give small negative eigenvalues
-    free = np.abs(stiffness) < WEAR.round_off * stiffness[-1]
+    free = np.abs(stiffness) < COMMON.round_off * stiffness[-1]
     along = directions[:, int(np.argmin(np.abs(stiffness)))]
     closes = np.abs(along[joint.component_index % 3 == 0]).max(initial=0.0)
-    if np.count_nonzero(free) != 1 or closes > WEAR.free_closing:
+    if np.count_nonzero(free) != 1 or closes > COMMON.negligible:
         return None
     motion = joint.to_relative(at.displacement_h)[:, 0]
     return Hold(along, STRUCTURE.mean_stiffness_fraction * float(stiffness[-1]), float(along @ motion))
@@ -70,7 +71,7 @@ def held_on(
     other = held.joint(joint.omega, joint.excitation_amplitude)
     balance_at = held_wear(other, last.evaluation.wear_depth, worn)
     found, arrived = follow_naturally(balance_at, last, 1.0, solver, case.settings.tolerance, budget, keep_history=True)
-    changed = vibration_change(last.evaluation, found.evaluation) > WEAR.jump_change
+    changed = vibration_change(last.evaluation, found.evaluation) > STABILITY.other_branch
     if (
         not arrived
         or changed

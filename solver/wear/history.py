@@ -12,6 +12,7 @@ import numpy as np
 from solver.accuracy.history_error import Both, history_error
 from solver.accuracy.options import ACCURACY
 from solver.model import FloatArray, ReducedModel
+from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.packing import Packed, unpack
 from solver.results.cut_off import first_cut_off
@@ -19,7 +20,6 @@ from solver.results.history import StartState, WearHistory
 from solver.results.verdict import judge
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
-from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput, no_output
 from solver.wear.solutions import Ended, SlowTime, Solutions
 
@@ -120,7 +120,7 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
         cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
         step_limit=state.step_limit if state.step_limit > 0.0 else math.inf,
         # other schemes are stable: only small corners of the wear rate alternate there
-        oscillates=asked.scheme == "explicit" and state.rates.oscillate(WEAR.round_off * state.most_rate),
+        oscillates=asked.scheme == "explicit" and state.rates.oscillate(COMMON.round_off * state.most_rate),
         inaccurate_from=state.inaccurate_from,
         inaccurate_in="wear rate" if worst.wear_rate >= worst.response else "response",
         inaccurate_error=worst.largest,

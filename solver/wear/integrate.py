@@ -9,6 +9,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
+from solver.continuation.options import CONTINUATION
 from solver.newton.solve_balance import OutOfTimeError
 from solver.outcome import Outcome, describe_error
 from solver.packing import in_rows, packable
@@ -66,7 +67,7 @@ class Integration:
     stop: ends the integration.
     output: stores the states.
     save: called from time to time with the progress.
-    most_iterations: most Newton iterations, in addition to `step_iterations` for each step.
+    most_iterations: most Newton iterations, in addition to `near_iterations` for each step.
     bounded: whether a jump that moves many times the normal forces is refused.
     """
 
@@ -92,7 +93,7 @@ class Integration:
         state, n_steps, saved = progress.state, progress.n_steps, work.budget.iterations
         while (ended := self.stop(work, state, self.output)) is None:
             n_steps += 1
-            if work.budget.iterations > self.most_iterations + WEAR.step_iterations * n_steps:
+            if work.budget.iterations > self.most_iterations + CONTINUATION.near_iterations * n_steps:
                 return state, Failure(Outcome.MARCH_FAILED)
             after = guarded(partial(self._one, work, state))
             if isinstance(after, Failure):

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, vibration_change
 from solver.model import FloatArray
 from solver.outcome import Outcome
+from solver.stability.options import STABILITY
 from solver.wear.branch_loss import state_after_fold
 from solver.wear.free_slide import held_on
-from solver.wear.options import WEAR
 from solver.wear.state import Failure, WearState
 from solver.wear.step import Step
 from solver.wear.step_limit import too_long
@@ -32,7 +33,7 @@ def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failur
     worn = state.depth + beyond * work.rate(at)
     if bounded and (said := too_long(joint, at, worn, state.cycle, beyond)) is not None:
         return Failure(Outcome.STEP_TOO_LONG, said)
-    work.budget.limit = work.budget.iterations + WEAR.jump_iterations
+    work.budget.limit = work.budget.iterations + CONTINUATION.search_iterations
     landed = _held(work, state, worn) or _on_another_branch(work, state, worn)
     work.budget.limit = float("inf")
     if isinstance(landed, Failure):
@@ -56,7 +57,7 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
     landed = state_after_fold(work.case, work.at(state), state.point, worn, work.solver, work.budget)
     if not isinstance(landed, PathPoint):
         return Failure(landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED)
-    if vibration_change(state.point.evaluation, landed.evaluation) <= WEAR.jump_change:
+    if vibration_change(state.point.evaluation, landed.evaluation) <= STABILITY.other_branch:
         # a small fold of the branch at a corner is no jump, and there may be many corners
         return replace(state, point=landed)
     first = state.cycle if np.isnan(state.jump_cycle) else state.jump_cycle

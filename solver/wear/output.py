@@ -84,7 +84,7 @@ class Course:
 
     def after(self, cycle: float, report: StateReport, rate: float) -> Course:
         """The course with the end of another step; rate: wear rate of the joint, m3 per cycle."""
-        kept = slice(0, None, 2 if len(self.cycles) >= WEAR.course_steps else 1)
+        kept = slice(0, None, 2 if len(self.cycles) >= WEAR.kept_steps else 1)
         changed = not self.resolutions or self.resolutions[-1][1] != report.resolution
         return Course(
             ends=(*self.ends, cycle),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.accuracy.options import ACCURACY
 from solver.model import FloatArray, IntArray
 from solver.packing import packable
 from solver.wear.options import WEAR
@@ -44,7 +45,7 @@ class WearRates:
         """The rates after another step. rates (n,): of the new state."""
         increment = rates - self.value
         size = np.abs(increment)
-        alternates = (self.increment * increment < 0.0) & (size >= WEAR.calming * np.abs(self.increment))
+        alternates = (self.increment * increment < 0.0) & (size >= np.abs(self.increment))
         n_alternating = np.where(alternates, self.n_alternating + 1, 0)
         last = np.vstack([self.last[1:], size])
         weakest = np.where(n_alternating >= WEAR.alternations - 1, last.min(axis=0), 0.0)
@@ -63,4 +64,4 @@ class WearRates:
         The tiny rate of a pair at the edge of the slip zone alternates with steps of any length. So the increments must
         be larger than `least`, m3 per cycle, and larger than a fraction of the wear rate of the whole joint.
         """
-        return bool(self.strongest.max(initial=0.0) > max(WEAR.noticeable_oscillation * self.largest[-1], least))
+        return bool(self.strongest.max(initial=0.0) > max(ACCURACY.small_work * self.largest[-1], least))

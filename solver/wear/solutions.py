@@ -12,6 +12,7 @@ from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.accuracy.reference import RTOL_RATIO, coarser
 from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
@@ -275,15 +276,17 @@ def begin_reference(work: WearingJoint, start: StartState, step_limit: float) ->
     (dovetail, 212.5 Hz: the worn volume is 0.082 or 0.106 mm3; both sweeps lead to 0.082, twice their difference to
     0.097). Where this state is not found, the state of the reference sweep is taken.
     """
-    fine, coarse = start.state, start.coarse
+    fine, reference = start.state, start.reference
     assert fine is not None
-    begun = work.begin(coarse or fine, start.resolution, NOTHING, accurate=True, step_limit=step_limit)
-    if coarse is None:
+    begun = work.begin(reference or fine, start.resolution, NOTHING, accurate=True, step_limit=step_limit)
+    if reference is None:
         return begun
-    history = fine.start_history + 2.0 * (coarse.start_history - fine.start_history)
+    history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
     balance = Balance.frozen(work.at(begun), history, begun.depth)
     first = begun.point.evaluation.predicted_h
-    found = solve_balance(balance, first, work.solver, work.case.settings.tolerance, work.budget, WEAR.step_iterations)
+    found = solve_balance(
+        balance, first, work.solver, work.case.settings.tolerance, work.budget, CONTINUATION.near_iterations
+    )
     if not found.converged:
         return begun
     point = PathPoint(0.0, found.evaluation, final_history(balance, found.evaluation))

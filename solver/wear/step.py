@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 from solver.accuracy.error_estimate import euler_error
 from solver.continuation.natural import follow_naturally
-from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import BalanceAt, PathPoint, final_history
+from solver.newton.options import NEWTON
 from solver.outcome import Outcome
 from solver.settings import Scheme
 from solver.wear.branch_loss import is_stable_when_held
@@ -53,7 +53,7 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
             return _euler(work, state, end, length)
     # accuracy of the end of a branch: a fraction of the count, or of the step in the first step
     resolution = WEAR.fold_resolution * (state.cycle if state.cycle > 0.0 else length) / length
-    shortest = max(min(resolution, CONTINUATION.shortest_fraction), WEAR.smallest_fold_resolution)
+    shortest = min(resolution, NEWTON.shortest_step)
     if work.follow is not None:
         return _shortened(work, state, length, balance_at, shortest)
     last, arrived = follow_naturally(

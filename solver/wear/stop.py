@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput
@@ -69,16 +70,16 @@ class InSteadyState:
         """
         joint, at = work.at(state), state.point.evaluation
         normal = at.force_h[:, 0, 0]
-        pressed = normal > WEAR.round_off * float(normal.max(initial=0.0))
+        pressed = normal > COMMON.round_off * float(normal.max(initial=0.0))
         if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():
             return False
         course = output.taken.course
         volumes, rates = np.array(course.depths) @ work.area, np.array(course.rates)
-        # over the last nine tenths of the worn volume
+        # over the last nine tenths of the worn volume, to the accuracy of a rate
         first = max(int(np.searchsorted(volumes, 0.1 * volumes[-1], "right")) - 1, 0)
         if (
             volumes[first] > 0.1 * volumes[-1]
-            or (np.abs(rates[first:] - rates[-1]) > WEAR.steady_rate * rates[-1]).any()
+            or (np.abs(rates[first:] - rates[-1]) > work.case.settings.rtol * rates[-1]).any()
         ):
             return False
         rows = np.flatnonzero(joint.component_index % 3 == 0)

@@ -10,6 +10,7 @@ from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.period_events import left_out
 from solver.contact.archard import volume_rate, wear_gain, wear_rate
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import FloatArray
@@ -20,7 +21,6 @@ from solver.results.history import PeriodicState
 from solver.settings import FollowedFrequency, Resolution
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.followed import end_at_resonance, lost_resonance
-from solver.wear.options import WEAR
 from solver.wear.rates import WearRates
 from solver.wear.state import Choice, Failure, Reached, WearState
 from solver.wear.step_limit import explicit_step_limit
@@ -162,7 +162,7 @@ class WearingJoint:
 
     def solved(self, state: WearState, start: FloatArray, balance: Balance) -> Reached | None:
         """End of a step from a state, with values from `predicted`; None where it is not found."""
-        settings, most = self.case.settings, WEAR.step_iterations
+        settings, most = self.case.settings, CONTINUATION.near_iterations
         if self.follow is not None:
             return end_at_resonance(self.case, balance, start, state, self.follow, self.solver, self.budget)
         found = solve_balance(balance, start, self.solver, settings.tolerance, self.budget, most)

@@ -114,6 +114,15 @@ class CompletionIndex:
             if not self.is_finished(march)
         )
 
+    def marches_without_start(self) -> tuple[MarchTask, ...]:
+        """Unfinished tasks that begin from no start state, each with its progress: mission histories."""
+        return tuple(
+            march
+            for branch, line in zip(self.plan.branches, self.plan.marches, strict=True)
+            for place in ({task.position for task in line} if not branch.frequencies else ())
+            for march in self.marches_from(branch.number, place)
+        )
+
     def renew(self, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
         """A task that has to be done again, with the results that it has given so far."""
         self.store.flush()
@@ -244,10 +253,14 @@ class CompletionIndex:
     def _shown(self, task: BranchTask | MarchTask, place: int = 0) -> dict[str, object]:
         """Columns of the file that describe a task, or a history of the task."""
         if isinstance(task, BranchTask):
+            if not task.frequencies:
+                return {}
             position = next(iter(task.order_left), task.order[-1])
             return _case(task, position)
         branch, history = self.plan.branches[task.branch], task.histories[place]
         own = {"scheme": task.scheme, "wear_coefficient": history.wear_coefficient, "step": history.step}
+        if task.blocks:
+            return {"frequency": self.plan.frequency_of(task), **own}
         return {**_case(branch, task.position), **own}
 
 

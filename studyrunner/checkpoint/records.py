@@ -21,7 +21,7 @@ from studyrunner.variables import COUNTS, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
     """Lengths of the dimensions after the axes."""
     return {
-        **({} if study.has_modes else {"cycle": len(study.cycles_kept)}),
+        **study.sizes,
         "contact": len(facts.area),
         "response": len(facts.response_names),
         **({"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}),

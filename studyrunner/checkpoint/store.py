@@ -2,6 +2,8 @@
 
 Rank 0 alone uses the file. A thread writes, as a transaction waits for the disk; what arrives meanwhile goes into the
 next transaction. The connection is used by one thread at a time: who reads waits until the writer has ended.
+
+By hand is what goes into one transaction: all else is SQLite's.
 """
 
 from __future__ import annotations
@@ -13,14 +15,14 @@ import socket
 import sqlite3
 import time
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from solver.packing import Packed
 from studyrunner.checkpoint import database
-from studyrunner.checkpoint.contents import LARGEST, compress, decompress
+from studyrunner.checkpoint.contents import LARGEST, decompress
 from studyrunner.checkpoint.database import COMPUTED, TABLES, UNDER_WAY, DamagedError, faults_told
+from studyrunner.checkpoint.entries import Batch, Entry, Name, row_of
 from studyrunner.checkpoint.writer import Writer
 from studyrunner.system.endings import uninterrupted
 from studyrunner.system.files import NotPlainError, has_locks
@@ -33,23 +35,6 @@ MOST_BYTES_WAITING = 32e6
 """Bytes that may wait for the disk. Beyond this size a new result waits until there is room again."""
 
 _BYTES_A_TRANSACTION = 8e6
-_LEVELS = {UNDER_WAY: 1, COMPUTED: 1}  # compressed fast: what is replaced after seconds, and what is large
-_LEVEL = 6
-
-Name = tuple[str, str]
-"""Table and key of an entry."""
-
-
-@dataclass(frozen=True)
-class _Entry:
-    """A new entry. shown: columns that a person can read."""
-
-    packed: Packed
-    shown: Mapping[str, object]
-
-
-Batch = dict[Name, _Entry | None]
-"""Entries that are written in one transaction; None for one that is removed."""
 
 
 class Store:
@@ -124,7 +109,7 @@ class Store:
         """
         if packed.n_bytes > LARGEST:
             raise StorageError(self.path, ValueError(f"{packed.n_bytes:.3g} bytes in one entry"), "use a smaller model")
-        self._waiting[table, key] = _Entry(packed, shown)
+        self._waiting[table, key] = Entry(packed, shown)
         if finished:
             self._waiting[UNDER_WAY, finished] = None
         self._n_bytes += packed.n_bytes
@@ -301,7 +286,7 @@ class Store:
         """The job of the writer: one transaction with all of a batch, or nothing of it. Raises StorageError."""
         now = datetime.now(UTC).isoformat(" ", "seconds")[:19]
         with faults_told(self.path):
-            rows = [(*name, None if entry is None else _row(name, entry, now)) for name, entry in batch.items()]
+            rows = [(*name, None if entry is None else row_of(name, entry, now)) for name, entry in batch.items()]
             if self.path.stat().st_ino != self._file:
                 raise FileNotFoundError(None, "another file has taken its place")
             with self._transaction():
@@ -357,10 +342,3 @@ class Store:
                             self._keys[table].add(key)
         except (DamagedError, NotPlainError, FileNotFoundError):
             self.notes.append(f"{other.name} is not used: it is damaged, or another run writes it now")
-
-
-def _row(name: Name, entry: _Entry, now: str) -> dict[str, object]:
-    table, key = name
-    size, content = compress(entry.packed, _LEVELS.get(table, _LEVEL))
-    own = {"key": key, "written": now, "size": size, "checksum": database.checksum(key, content)}
-    return {**entry.shown, **own, "content": content}

@@ -1,4 +1,7 @@
-"""A thread that writes files, so that the thread that hands out tasks never waits for a disk."""
+"""A thread that writes files, so that the thread that hands out tasks never waits for a disk.
+
+By hand: after a signal the pools of `concurrent.futures` may lose a result, or wait for ever.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The launcher that started this process, from variables of the environment, without MPI."""
+"""The launcher that started this process, from variables of the environment, without MPI.
+
+By hand: under the launcher of another library mpi4py starts as a world of one process, and says nothing.
+"""
 
 from __future__ import annotations
 

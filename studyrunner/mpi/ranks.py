@@ -2,6 +2,8 @@
 
 Only this module imports mpi4py, and only where a launcher is at work: `run-study` alone needs no MPI library. All MPI
 calls come from the main thread, so that any MPI library works (MPI_THREAD_FUNNELED).
+
+By hand: mpi4py needs an MPI library, and leaves lost ranks and signals to its user.
 """
 
 from __future__ import annotations

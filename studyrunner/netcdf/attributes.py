@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
+from studyrunner.coordinates import COORDINATES
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import PairArrays
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, Variable
+from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
 
 
 def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, object]:
@@ -55,7 +56,11 @@ def coordinates(
 ) -> dict[str, tuple[tuple[str, ...], NDArray[np.generic]]]:
     """Coordinates of the file: name, dimensions, values."""
     along: dict[str, NDArray[np.generic]] = {name: _labels(values) for name, values in study.dimensions.items()}
-    along.setdefault("cycle", np.array(study.cycles_kept))
+    if study.has_missions:
+        along["mission"] = np.array(study.missions_kept, dtype=np.int32)
+        along["block"] = _labels([block.name for block in study.mission])
+    else:
+        along.setdefault("cycle", np.array(study.cycles_kept))
     along["contact"] = np.arange(len(facts.area), dtype=np.int32)
     along["response"] = _labels(facts.response_names)
     if study.outputs.loops:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import variable_sizes
+from studyrunner.coordinates import COORDINATES
 from studyrunner.netcdf.attributes import attributes, coordinate_entry, coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.netcdf.sample_coordinates import InputCoordinate
@@ -29,12 +30,11 @@ from studyrunner.scene.scene import KeptScene, SceneFacts
 from studyrunner.scene.scene_set import PairArrays, pair_arrays
 from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.study import Study
-from studyrunner.summary.certificates import CertificateTable
 from studyrunner.summary.findings import Findings
-from studyrunner.summary.mode_table import ModeTable
+from studyrunner.summary.table import table_of
 from studyrunner.system.files import find_fault, replacing
 from studyrunner.user_error import StorageError
-from studyrunner.variables import COORDINATES, COUNTS, LOOPS, Variable
+from studyrunner.variables import COUNTS, LOOPS, Variable
 
 _BYTES_A_SLAB = 16e6
 _BYTES_AT_ONCE = 2e6  # of records that are read: several copies of them are in memory for a moment
@@ -77,7 +77,7 @@ def gather(
     pairs: PairArrays | None = None,
     samples: Sequence[InputCoordinate] = (),
 ) -> Gathered:
-    """Writes the result of a study: axes in the order of the study, then cycle, then contact or response.
+    """Writes the result of a study: axes in the order of the study, then cycle or mission, then others.
 
     Points that are not computed yet have the outcome `not_computed`.
 
@@ -154,7 +154,7 @@ def _read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) 
         for march in itertools.chain.from_iterable(completion.plan.marches)
         for key, scaled in zip(completion.histories(march), march.histories, strict=True)
     ]
-    table = ModeTable(study) if study.has_modes else CertificateTable(study, facts)
+    table = table_of(study, facts)
     findings = Findings(study, facts)
     outcomes: Counter[int] = Counter()
     at_once = _records_at_once(completion.kind.itemsize)

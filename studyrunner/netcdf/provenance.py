@@ -21,12 +21,12 @@ _REFERENCE = (
     " balance method coupled with explicit or implicit integration schemes"
 )
 _COMMENT = (
-    "SI units. A point is one combination of the axes (the dimensions before cycle); outcome says how its computation"
-    " ended, and where that is not 0 the point holds NaN. Relative displacement is that of blade minus disk in the"
-    " frame of the contact pair (normal, tangent 1, tangent 2), its normal component positive when the pair closes;"
-    " contact forces and pressures are positive in compression. A complex amplitude X stands for"
-    " x(t) = Re(X exp(i omega t)). Slow time is counted in vibration cycles. Give this file to run-study to compute its"
-    " study again."
+    "SI units. A point is one combination of the axes (the dimensions before cycle or mission); outcome says how its"
+    " computation ended, and where that is not 0 the point holds NaN. Relative displacement is that of blade minus disk"
+    " in the frame of the contact pair (normal, tangent 1, tangent 2), its normal component positive when the pair"
+    " closes; contact forces and pressures are positive in compression. A complex amplitude X stands for"
+    " x(t) = Re(X exp(i omega t)). Slow time is counted in vibration cycles, or in missions. Give this file to"
+    " run-study to compute its study again."
 )
 
 
@@ -73,6 +73,12 @@ def _summarise(study: Study, facts: SceneFacts) -> str:
         return (
             "Nonlinear modes of a joint: natural frequency and damping over the amplitude, scene"
             f" {study.scene.model} with {pairs}{over}."
+        )
+    if study.has_missions:
+        blocks = ", ".join(block.name for block in study.mission)
+        return (
+            f"Fretting wear of a joint over {study.slow_time.missions} missions of {blocks}: scene {study.scene.model}"
+            f" with {pairs}{over}. Worn volume by block, wear depths, vibration, and the errors of each."
         )
     return (
         f"Fretting wear of a joint under vibration: wear histories of the scene {study.scene.model} with {pairs}{over}."

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studyrunner.coordinates import COORDINATES
 from studyrunner.scene.drawn_contacts import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import draw_inputs
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study
-from studyrunner.variables import COORDINATES, Variable
+from studyrunner.variables import Variable
 
 _OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "area of the contact pair")}
 

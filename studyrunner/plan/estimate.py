@@ -44,6 +44,13 @@ ITERATIONS_AN_ADAPTIVE_STEP = 7
 """Newton iterations of one adaptive step near the resonance (36 and 48 pairs: 4 to 13), with refused steps and the
 reference solution."""
 
+MISSIONS_FLOWN_AT_ONCE = 30
+"""Steps of a mission history over many missions, each of which flies every block four times, the reference solution
+included."""
+
+ITERATIONS_OF_PASSAGE = 2500
+"""Newton iterations of a passage, about 40 frequencies."""
+
 AUTOMATIC_HARMONICS = 5
 """Harmonics of a state on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
 
@@ -85,6 +92,13 @@ def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
     if cycles > 0.0 and scheme == "adaptive":
         return ITERATIONS_AN_ADAPTIVE_STEP * ADAPTIVE_STEPS
     return ITERATIONS_A_STEP * (max(1, math.ceil(cycles / step)) if cycles < math.inf else STEPS_TO_THE_END)
+
+
+def iterations_of_missions(n_blocks: int, n_passages: int, missions: int) -> int:
+    """Newton iterations of a mission history. n_passages: blocks of these whose frequency runs."""
+    steady = ITERATIONS_OF_RAMP + ITERATIONS_AN_ADAPTIVE_STEP * ADAPTIVE_STEPS
+    flown = 4 * min(missions, MISSIONS_FLOWN_AT_ONCE)
+    return flown * ((n_blocks - n_passages) * steady + n_passages * ITERATIONS_OF_PASSAGE)
 
 
 def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float) -> float:

@@ -10,12 +10,15 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, astuple
+from dataclasses import asdict, astuple, replace
 from functools import cache
 
+from solver.settings import SolverSettings
 from studyrunner.plan.sharing import ScaledHistory
-from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.plan.tasks import BranchTask, Joint, MarchTask
 from studyrunner.system.source_digest import package_digest
+
+_NO_JOINT = Joint(0, None)
 
 
 class Identities:
@@ -35,20 +38,17 @@ class Identities:
     def of_starts(self, branch: BranchTask) -> tuple[str, ...]:
         """Hashes of the start states at all frequencies of a branch, (n_frequencies,)."""
         if branch.number not in self._lines:
-            # A time limit decides whether there is a result, not the values of the result.
-            settings = [item for item in asdict(branch.settings).items() if item[0] != "time_limit"]
+            settings = _settings(branch.settings)
             follow = None if branch.follow is None else astuple(branch.follow)
             mode = () if branch.mode is None else ("mode", branch.mode)
             line = (branch.excitation_amplitude, branch.sweep, settings, follow, *mode)
-            joint = branch.joint
-            scene = (self._digests[joint.scene], joint.friction_coefficient, *joint.contact, solver_digest())
-            key = _digest("line", scene, line)
+            key = _digest("line", self._joint(branch.joint), line)
             self._lines[branch.number] = tuple(_digest("start", key, frequency) for frequency in branch.frequencies)
         return self._lines[branch.number]
 
     def of_histories(self, branch: BranchTask, march: MarchTask) -> tuple[str, ...]:
         """Hashes of the histories of a task."""
-        start = self.of_starts(branch)[march.position]
+        start = self._of_blocks(march) if march.blocks else self.of_starts(branch)[march.position]
         own = (*self._wear(march, march.histories[0]), march.scheme if not march.held else "", march.held)
         ends = [None if each is None else astuple(each) for each in (march.until, march.to_the_end)]
         kept = march.cycles, march.loops, tuple(ends)
@@ -57,6 +57,15 @@ class Identities:
         base = ("history", start, self._kept[kept], own, march.largest_depth, asdict(march.law))
         wear = (self._wear(march, scaled) for scaled in march.histories)
         return tuple(_digest(*base, place > 0, each) for place, each in enumerate(wear))
+
+    def _of_blocks(self, march: MarchTask) -> str:
+        """Hash of the blocks of a mission with their scenes."""
+        blocks = [(self._joint(block.joint), astuple(replace(block, joint=_NO_JOINT))) for block in march.blocks]
+        return _digest("mission", blocks, march.sweep, _settings(march.settings))
+
+    def _joint(self, joint: Joint) -> tuple[object, ...]:
+        """Scene and friction, and the solver."""
+        return (self._digests[joint.scene], joint.friction_coefficient, *joint.contact, solver_digest())
 
     @staticmethod
     def of_march(histories: tuple[str, ...]) -> str:
@@ -73,6 +82,11 @@ class Identities:
         of_its_own = march.held or march.scheme in ("adaptive", "final")
         of_its_own = of_its_own or (march.scheme == "explicit" and march.largest_depth is not None)
         return scaled.wear_coefficient, None if of_its_own else scaled.step
+
+
+def _settings(settings: SolverSettings) -> list[tuple[str, object]]:
+    """Settings; a time limit decides whether there is a result, not the values of the result."""
+    return [item for item in asdict(settings).items() if item[0] != "time_limit"]
 
 
 @cache

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from studyrunner.coordinates import SCENE
 from studyrunner.plan.estimate import (
     ADAPTIVE_STEPS,
     AUTOMATIC_HARMONICS,
@@ -13,17 +14,18 @@ from studyrunner.plan.estimate import (
     ITERATIONS_AN_ADAPTIVE_STEP,
     ITERATIONS_OF_MODE,
     ITERATIONS_TO_A_FINAL_STATE,
+    MISSIONS_FLOWN_AT_ONCE,
     memory_a_rank,
     seconds_an_iteration,
 )
 from studyrunner.plan.tasks import TaskPlan
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.variables import loop_numbers
+from studyrunner.study.mission import MissionBlock
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 from studyrunner.system.progress import count, format_seconds
 from studyrunner.user_error import show_text
-from studyrunner.variables import SCENE
 
 _TASKS_A_RANK = 32
 """Tasks with which a rank is busy for 95 % of a run, where their times are not known before: with 8 it is for 87 %
@@ -40,7 +42,7 @@ def format_plan(
     scenes: what there is to say of several scenes.
     """
     marches = [task for line in plan.marches for task in line]
-    n_tasks = len(plan.branches) + (0 if study.has_modes else len(marches))
+    n_tasks = sum(bool(branch.frequencies) for branch in plan.branches) + (0 if study.has_modes else len(marches))
     n_values = _result_values(study, facts, plan.n_points)
     shape = " x ".join(f"{len(values)} {name}" for name, values in study.dimensions.items() if len(values) > 1)
     contact = f"{count(len(facts.area), 'contact pair')} with {facts.n_displacements} relative displacements"
@@ -55,7 +57,7 @@ def format_plan(
         *([("scenes", scenes)] if scenes else []),
         ("points", f"{plan.n_points}" + (f" = {shape}" if shape else "")),
         *([("frequency", _followed(study))] if study.follow is not None else []),
-        *([] if study.has_modes else [("cycles", _cycles(study))]),
+        *_slow_time(study),
         ("tasks", f"{n_tasks}: {_ways(study, plan)}"),
         ("solver", _solver(study, facts)),
         ("unknowns", f"{plan.n_unknowns} at most in one task" + _if_automatic(study)),
@@ -78,6 +80,9 @@ def _ways(study: Study, plan: TaskPlan) -> str:
     """The tasks in words."""
     if study.has_modes:
         return f"{count(len(plan.branches), 'nonlinear mode')} over the amplitude"
+    if study.has_missions:
+        histories = count(len(plan.marches[0]), "mission history", "mission histories")
+        return f"{histories}, side by side; the blocks of one are flown one after the other"
     n_ramps = sum(branch.sweep == "ramp" for branch in plan.branches)
     n_along = len(plan.branches) - n_ramps
     ways = [f"{count(n_along, 'branch', 'branches')} along the frequency"] if n_along else []
@@ -91,7 +96,32 @@ def _time(study: Study, plan: TaskPlan, prepared_in: float) -> list[tuple[str, s
     about = _about(plan, prepared_in)
     if study.has_modes:
         return [("time", f"{about}, to a factor of three; a mode that is lost at a large amplitude takes longer")]
+    if study.has_missions:
+        return [("time", f"{about}, to a factor of three, if every block wears")]
     return [("time", f"{about}, to a factor of two, if every point wears;"), ("", _range(plan))]
+
+
+def _slow_time(study: Study) -> list[tuple[str, str]]:
+    """Lines on cycles or missions; none of nonlinear modes."""
+    if study.has_modes:
+        return []
+    if not study.has_missions:
+        return [("cycles", _cycles(study))]
+    kept = count(len(study.missions_kept), "number is", "numbers are")
+    lines = [("missions", f"{study.slow_time.missions}, of which {kept} kept")]
+    for block, of_block in zip(study.mission, study.block_studies, strict=True):
+        lines.append(("block", f"{block.name}: {_block(block, max(of_block.axes.frequency))}"))
+    return lines
+
+
+def _block(block: MissionBlock, frequency: float) -> str:
+    """A block in words. frequency: of steady vibration, Hz; the largest of an axis."""
+    how = {"ramp": "begins with a ramp", "sweep": "begins with a sweep", "continue": "continues the block before"}
+    cycles = f"{block.cycles_at(frequency):.4g} cycles a mission"
+    if isinstance(block.frequency, dict):
+        passed = "{start:g} to {stop:g} Hz at {rate:g} Hz/s".format(**block.frequency)
+        return f"passage from {passed}, {cycles}"
+    return f"{frequency:g} Hz, {cycles}, {how[block.begin]}"
 
 
 def _cycles(study: Study) -> str:
@@ -107,6 +137,9 @@ def _assumed(study: Study, plan: TaskPlan) -> str:
     if study.has_modes:
         iterations = f"{ITERATIONS_A_MODE_POINT} Newton iterations of {milliseconds:.0f} ms or less a point"
         return f"{iterations}, {ITERATIONS_OF_MODE} to the first; a first run compiles for {COMPILE_SECONDS} s more"
+    if study.has_missions:
+        at_once = f"{MISSIONS_FLOWN_AT_ONCE} steps of many missions, each flies every block four times"
+        return f"{at_once}; Newton iterations of {milliseconds:.0f} ms or less; none where nothing slips"
     said = f"{ITERATIONS_A_STEP} Newton iterations of {milliseconds:.0f} ms or less a step"
     if "final" in study.axes.scheme:
         said += f", final {ITERATIONS_TO_A_FINAL_STATE} in all where it needs no march"
@@ -152,15 +185,17 @@ def _about(plan: TaskPlan, prepared_in: float) -> str:
 def _ranks(plan: TaskPlan, n_tasks: int) -> str:
     """What limits the use of many ranks."""
     busy = max(1, n_tasks // _TASKS_A_RANK)
+    of = "the missions of a history are serial" if plan.marches[0][0].blocks else "a history follows its start state"
     return (
         f"up to about {busy} stay busy to the end, with {_TASKS_A_RANK} tasks each; no number takes less"
-        f" than {format_seconds(plan.longest)}, as a history follows its start state"
+        f" than {format_seconds(plan.longest)}, as " + of
     )
 
 
 def _result_values(study: Study, facts: SceneFacts, n_points: int) -> int:
     """Number of values in the result, without coordinates, natural frequencies and mesh."""
-    sizes = {"cycle": len(study.cycles_kept), "contact": len(facts.area), "response": len(facts.response_names)}
+    own = {"contact": len(facts.area), "response": len(facts.response_names)}
+    sizes = {"cycle": len(study.cycles_kept), **study.sizes, **own}
     names = study.outputs.variables
     asked = [entry for name, entry in study.variables.items() if name in names]
     asked.extend(SCENE["exact"].values() if "exact" in names else ())

@@ -7,10 +7,12 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.plan.cases import joint_of, n_unknowns_of, settings_of_line
 from studyrunner.plan.estimate import iterations_of_branch, iterations_of_march, seconds_an_iteration
+from studyrunner.plan.mission_planning import build_mission_tasks, mission_variables
 from studyrunner.plan.mode_planning import build_mode_tasks, mode_variables
 from studyrunner.plan.sharing import (
     EQUAL_POINTS,
@@ -59,7 +61,7 @@ class _Case:
 def build_tasks(
     study: Study,
     n_displacements: int | Sequence[int],
-    contacts: Sequence[ContactChange] | None = None,
+    contacts: Sequence[Any] | None = None,
     scenes: SceneSet | None = None,
 ) -> TaskPlan:
     """Tasks of a study.
@@ -68,14 +70,16 @@ def build_tasks(
     solution of their own never do. The order and the numbers of the tasks depend on the study alone.
 
     n_displacements: number of relative displacements of each scene of the study (`find_scenes`), or of all scenes.
-    contacts: what is drawn for the pairs of each part of the study (`contact_changes`); None where nothing is.
+    contacts: what is drawn for the pairs of each part of the study, as `contact_changes` gives it; None for nothing.
     scenes: of the study, where they are known already.
     """
     scenes = find_scenes(study) if scenes is None else scenes
-    contacts = ((),) * len(scenes.parts) if contacts is None else contacts
+    drawn: Sequence[Any] = (((),) * len(study.mission),) * len(scenes.parts) if contacts is None else contacts
     n_scenes = len(scenes.studies)
     sizes = (n_displacements,) * n_scenes if isinstance(n_displacements, int) else tuple(n_displacements)
-    return (build_mode_tasks if study.has_modes else _plan)(study, sizes, contacts, scenes)
+    if study.has_missions:
+        return build_mission_tasks(study, sizes, drawn, scenes)
+    return (build_mode_tasks if study.has_modes else _plan)(study, sizes, drawn, scenes)
 
 
 def _plan(
@@ -89,6 +93,8 @@ def march_variables(study: Study) -> tuple[str, ...]:
     """Variables that a march hands back: those asked for and those that the table at the end is made of."""
     if study.has_modes:
         return mode_variables(study)
+    if study.has_missions:
+        return mission_variables(study)
     asked = (name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
     return (*asked, *(LOOPS if study.outputs.loops else ()), *(COUNTS if study.to_the_end else ()))
 

@@ -13,12 +13,12 @@ from studyrunner.study.study import Study
 _SHORT = 1e4
 
 
-def describe_reach(last: float, end: float, error: float) -> str:
+def describe_reach(last: float, end: float, error: float, counted: str = "cycle") -> str:
     """How far a history was computed that ends early, and the relative error of the last worn volume that is known.
 
-    end: count that was asked for, inf where there is none.
+    end: count that was asked for, inf where there is none. counted: what is counted, "cycle" or "mission".
     """
-    reached = f"computed up to cycle {show_count(last)}" + (f" of {show_count(end)}" if end < math.inf else "")
+    reached = f"computed up to {counted} {show_count(last)}" + (f" of {show_count(end)}" if end < math.inf else "")
     # before the first count that was asked for nothing has worn, and that is known exactly
     known = last > 0.0 and 0.0 < error < math.inf
     return f"{reached}, the worn volume there to {show_percent(error)}" if known else reached

@@ -61,7 +61,7 @@ class BranchTask:
         that start from them.
     resume: progress of an earlier run; None to begin with the first frequency.
     key: hash of the branch in the file of the run.
-    model: reduced model of the scene, or where it is in shared memory, for a rank that does not have the model.
+    models: reduced models of `scenes`, or where they are in shared memory, for a rank that does not have them.
     """
 
     number: int
@@ -76,7 +76,12 @@ class BranchTask:
     known: frozenset[int] = frozenset()
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
-    model: ReducedModel | Address | None = field(default=None, compare=False, repr=False)
+    models: tuple[ReducedModel | Address, ...] = field(default=(), compare=False, repr=False)
+
+    @property
+    def scenes(self) -> tuple[int, ...]:
+        """Numbers of the scenes whose models the task needs."""
+        return (self.joint.scene,)
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -119,8 +124,28 @@ class BranchTask:
 
 
 @dataclass(frozen=True)
+class PlannedBlock:
+    """A block of a mission.
+
+    joint: scene and friction. frequency: Hz; where it starts for a passage.
+    passage: where the frequency stops, Hz, and its rate, Hz/s; None for steady vibration.
+    cycles: in one mission. begin: "ramp", "up", "down" or "continue".
+    """
+
+    name: str
+    joint: Joint
+    frequency: float
+    passage: tuple[float, float] | None
+    excitation_amplitude: float
+    cycles: float
+    begin: str
+
+
+@dataclass(frozen=True)
 class MarchTask:
     """One wear history from a start state on a branch, and the histories of other points that are read from this one.
+
+    Or one mission history, which finds the start states of its blocks itself.
 
     number: number of the task in the study.
     joint: scene and friction. law: wear law.
@@ -128,7 +153,8 @@ class MarchTask:
     histories: one result each. The first history is integrated; it needs the most cycles.
     held: whether nothing wears, so that the state at cycle 0 holds for all cycles. Step and scheme are then those of
         the first point.
-    cycles: cycle counts of the output of every history.
+    cycles: cycle counts of the output of every history, or numbers of missions.
+    blocks: of a mission; none for one vibration. sweep: how the first mission begins where its first block continues.
     until: wear at which the history ends before the last count.
     follow: what the frequency follows; None for the frequency of the start state.
     to_the_end: integration until nothing wears any more. Then `cycles` numbers the outputs.
@@ -138,7 +164,7 @@ class MarchTask:
     start: start state; None until the branch has reached it.
     resume: progress of an earlier run; None to begin with the start state.
     key: hash of the task in the file of the run.
-    model: reduced model of the scene, or where it is in shared memory, for a rank that does not have the model.
+    models: reduced models of `scenes`, or where they are in shared memory, for a rank that does not have them.
     """
 
     number: int
@@ -160,10 +186,17 @@ class MarchTask:
     follow: FollowedFrequency | None = None
     until: WearTarget | None = None
     to_the_end: ToTheEnd | None = None
+    blocks: tuple[PlannedBlock, ...] = ()
+    sweep: str = ""
     start: Packed | None = field(default=None, compare=False, repr=False)
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
-    model: ReducedModel | Address | None = field(default=None, compare=False, repr=False)
+    models: tuple[ReducedModel | Address, ...] = field(default=(), compare=False, repr=False)
+
+    @property
+    def scenes(self) -> tuple[int, ...]:
+        """Numbers of the scenes whose models the task needs."""
+        return tuple(sorted({joint.scene for joint in (self.joint, *(block.joint for block in self.blocks))}))
 
     @property
     def wear_coefficient(self) -> float:
@@ -219,7 +252,7 @@ class MarchTask:
 class TaskPlan:
     """All tasks of a study.
 
-    branches: tasks of the start states.
+    branches: tasks of the start states; a study of missions has a single one without states.
     marches: for each branch the tasks of the wear histories, by frequency.
     left_out: points that share a history, by reason.
     n_points: number of points of the study.
@@ -247,6 +280,17 @@ class TaskPlan:
             branch.cost + max((task.cost for task in line), default=0.0)
             for branch, line in zip(self.branches, self.marches, strict=True)
         )
+
+    @property
+    def n_missions(self) -> int:
+        """Number of mission histories."""
+        return sum(bool(march.blocks) for line in self.marches for march in line)
+
+    def frequency_of(self, march: MarchTask) -> float:
+        """Frequency at which a wear history begins, Hz."""
+        if march.blocks:
+            return march.blocks[0].frequency
+        return self.branches[march.branch].frequencies[march.position]
 
     def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
         """Tasks of the wear histories from one start state."""

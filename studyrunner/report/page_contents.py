@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator
 
 from studyrunner.report.drawing import Drawing, Missing, Table, style
 from studyrunner.report.figures.excitation import draw_excitation
-from studyrunner.report.figures.flank import draw_flanks
+from studyrunner.report.figures.flank import draw_flanks, draw_wear
 from studyrunner.report.figures.loops import draw_loops
+from studyrunner.report.figures.missions import draw_missions
 from studyrunner.report.figures.modes import draw_modes
 from studyrunner.report.figures.outcome import draw_certificates, draw_outcomes, list_branches, list_stability
 from studyrunner.report.figures.response import draw_responses
@@ -30,7 +31,8 @@ def draw_report(result: Result) -> Iterator[Item]:
     """Figures, tables, and sentences about what is missing: the results, then how far they are to be trusted.
 
     Where no point holds a state, the results are left out with a single sentence. Of nonlinear modes there are figures
-    over the amplitude, and a sentence in place of those of wear.
+    over the amplitude, and a sentence in place of those of wear. Of missions there are figures of their blocks in place
+    of those of single states.
     """
     of_results: tuple[_Part, ...] = (
         draw_scatter,
@@ -40,16 +42,22 @@ def draw_report(result: Result) -> Iterator[Item]:
         draw_excitation,
         *map(_of_pairs, (draw_root, draw_flanks, draw_loops)),
     )
+    if result.blocks is not None:
+        of_results = (draw_scatter, draw_trends, draw_missions, draw_volumes, *map(_of_pairs, (draw_root, draw_wear)))
     if result.has_modes:
         of_results = (draw_modes, _of_pairs(draw_mode_fractions), _tell_no_wear)
     if not result.held.any():
         of_results = (_tell_nothing,)
-    of_forced_vibration = (list_branches, list_stability, draw_certificates, _draw_precision)
+    of_states: tuple[_Part, ...] = (list_branches, list_stability, draw_certificates, _draw_precision)
+    if result.has_modes:
+        of_states = ()
+    elif result.blocks is not None:
+        of_states = (draw_certificates,)
     parts = (
         draw_outcomes,
         *(() if result.has_modes else (lambda result: draw_sector(of_shown_scene(result, OF_SECTOR)),)),
         *of_results,
-        *(() if result.has_modes else of_forced_vibration),
+        *of_states,
     )
     for part in parts:
         # The style is that of the whole process: it is not left on while the caller has the word.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from studyrunner.scatter.drawn_values import ScatteredPairs
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import SceneSet
+from studyrunner.scene.scene_set import SceneSet, check_blocks
 from studyrunner.study.realisation import draw_pairs, is_of_pairs
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, WrongValueError
@@ -18,11 +18,26 @@ ContactChange = tuple[tuple[str, tuple[float, ...]], ...]
 """Names of arrays of the contact interface with their values for all pairs, in place of those of the scene."""
 
 
-def contact_changes(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> tuple[ContactChange, ...]:
-    """What differs from the pairs of the scene, for each part of a study (`realise`).
+def contact_changes(
+    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]
+) -> tuple[ContactChange, ...] | tuple[tuple[ContactChange, ...], ...]:
+    """What differs from the pairs of the scene, for each part of a study (`realise`); in a study of missions by block.
 
-    facts: of each scene. Raises UserError where a sample draws a value that is none.
+    facts: of each scene. Raises UserError where a sample draws a value that is none, or blocks differ in their pairs.
     """
+    if not study.has_missions:
+        return _of_parts(study, scenes, facts)
+    check_blocks(study, scenes, facts)
+    of_blocks = []
+    for place in range(len(study.mission)):
+        variants = tuple(variant.block_studies[place] for variant in study.variants or (study,))
+        at_block = study.model_copy(update={"variants": variants})
+        of_blocks.append(_of_parts(at_block, scenes.at_block(place), facts))
+    return tuple(zip(*of_blocks, strict=True))
+
+
+def _of_parts(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> tuple[ContactChange, ...]:
+    """The same of a study, or of one block, by part."""
     changes: list[ContactChange] = []
     for variant, own, of_sample in drawn_pairs(study, scenes, facts):
         if variant.scene.worn is not None:

@@ -22,12 +22,19 @@ class SceneSet:
     """The different scenes of a study.
 
     studies: for each scene a study without axes of the scene, from which the scene is built.
-    parts: of the study (`realise`). numbers: number of the scene of each part.
+    parts: of the study (`realise`). numbers: number of the scene of each part; of its first block in a study of
+        missions.
+    of_blocks: for each part the numbers of the scenes of its blocks, or of its only vibration.
     """
 
     studies: tuple[Study, ...]
     parts: tuple[Realisation, ...]
     numbers: tuple[int, ...]
+    of_blocks: tuple[tuple[int, ...], ...]
+
+    def at_block(self, place: int) -> SceneSet:
+        """The same with the scenes of one block. place: of the block in the mission."""
+        return replace(self, numbers=tuple(numbers[place] for numbers in self.of_blocks))
 
 
 def find_scenes(study: Study) -> SceneSet:
@@ -37,18 +44,20 @@ def find_scenes(study: Study) -> SceneSet:
     """
     numbers: dict[str, int] = {}
     studies: list[Study] = []
-    of_parts = []
+    of_blocks = []
     parts = realise(study)
     for part in parts:
-        key = _key(part.study)
-        if key not in numbers:
-            numbers[key] = len(numbers)
-            studies.append(part.study)
-        of_parts.append(numbers[key])
+        of_part = part.study.block_studies or (part.study,)
+        keys = [_key(each) for each in of_part]
+        for key, each in zip(keys, of_part, strict=True):
+            if key not in numbers:
+                numbers[key] = len(numbers)
+                studies.append(each)
+        of_blocks.append(tuple(numbers[key] for key in keys))
     if study.outputs.scene and len(studies) > 1:
         remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
         raise UserError(study.source, "outputs.scene", True, remedy)
-    return SceneSet(tuple(studies), parts, tuple(of_parts))
+    return SceneSet(tuple(studies), parts, tuple(of_part[0] for of_part in of_blocks), tuple(of_blocks))
 
 
 def _key(study: Study) -> str:
@@ -56,6 +65,17 @@ def _key(study: Study) -> str:
     files = None if scene.files is None else [str(path) for path in scene.files.all]
     where = None if scene.path is None else str(scene.path), scene.group, files
     return json.dumps([scene.model, scene_parameters_of(study), where, harmonics_to_build(study)], sort_keys=True)
+
+
+def check_blocks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> None:
+    """Raises UserError where the blocks of a mission do not have equal pairs. facts: of each scene."""
+    for numbers in scenes.of_blocks if study.has_missions else ():
+        for block, number in zip(study.mission, numbers, strict=True):
+            if not _same_pairs(facts[numbers[0]], facts[number]):
+                remedy = (
+                    f"give parameters with which it has the contact pairs of {study.mission[0].name}: wear is carried"
+                )
+                raise UserError(study.source, f"mission.{block.name}", None, f"{remedy} from block to block")
 
 
 def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:

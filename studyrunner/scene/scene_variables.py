@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from studies.scenes import scene_answer
+from studyrunner.coordinates import SCENE
 from studyrunner.scene.scene_set import SceneSet, axes_of_difference
 from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.realisation import realise
 from studyrunner.study.study import Study
-from studyrunner.variables import SCENE
 
 
 def join_scene_variables(

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import scene_frequencies, scene_has, scene_mesh
+from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.computed import Computed, InMemory, frequencies_once
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim
-from studyrunner.variables import COORDINATES, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, SCENE, Variable
+from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -54,7 +55,12 @@ def check_outputs(study: Study, model: ReducedModel) -> None:
     if size > _LARGEST_HISTORY:
         remedy = f"give fewer pairs or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
         raise UserError(study.source, "outputs.loops", list(loops), remedy)
-    sizes = {"cycle": len(study.cycles_kept), "contact": n_contact, "response": len(model.response_names)}
+    sizes = {
+        **study.sizes,
+        "cycle": len(study.cycles_kept),
+        "contact": n_contact,
+        "response": len(model.response_names),
+    }
     # the variables of the certificate are there whether they are asked for or not
     size += 8.0 * sum(math.prod(sizes[name] for name in entry.dimensions) for entry in study.variables.values())
     if size > _LARGEST_HISTORY:

@@ -78,6 +78,10 @@ def worn_volume_statistics(
             raise ValueError(f"The result holds no {name} of samples: run a study with [scatter].")
     if not all(0.0 < each < 1.0 for each in (*quantiles, confidence)):
         raise ValueError(f"Give probabilities between 0 and 1, not {tuple(quantiles)} and {confidence}.")
+    if "mission" in dataset.dims:
+        # missions count slow time in place of cycles
+        in_cycles = dataset.drop_dims("block", errors="ignore").rename(mission=CYCLE)
+        return worn_volume_statistics(in_cycles, quantiles, confidence, exceed, depth).rename({CYCLE: "mission"})
     dataset = counted(dataset)
     everything, dims = volume_samples(dataset)
     section = scatter_of(dataset)
@@ -98,7 +102,7 @@ def worn_volume_statistics(
         depth_values = depths[0].at((..., rows))
         axis = _axis("exceeded_depth", _thresholds(depth, depth_values), "m", "wear depth")
         band = exceedance(depth_values, axis.values, confidence)
-        long_name = "probability that a pair is worn deeper before this cycle"
+        long_name = "probability that a pair is worn deeper before this count"
         found |= _band_arrays("wear_depth_exceedance", long_name, "1", band, list(depths[1]), axis)
 
     found |= _index_arrays(dataset, everything, layout, confidence, names)

@@ -15,6 +15,7 @@ from pydantic import BaseModel
 
 from studyrunner.scatter.drawn_values import Drawn, ScatteredPairs, drawn
 from studyrunner.scatter.section import OF_PAIRS, Scattered, ScatterSection
+from studyrunner.study.mission_tables import with_room_of_all
 from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.similar_names import nearest_name
 from studyrunner.study.study import Study
@@ -116,12 +117,28 @@ def check_scatter(study: Study) -> None:
         if several and scattered.distribution.kind == "value":
             remedy = f"give one value of axes.{name}, or a distribution around the study's own values, as {{std = ...}}"
             raise UserError(study.source, f"scatter.{name}", scattered.distribution.model_dump(), remedy)
+    _check_blocks(study, section)
     for variant in study.variants or (study,):
         for name, values in draw_inputs(variant).items():
             if name not in (*_OF_AXES, *study.wear.numbers):
                 # other parameters of the scene may not fit to one that is drawn
                 for extreme in (values.min(), values.max()):
                     _with_parameters(variant, {name: float(extreme)})
+
+
+def _check_blocks(study: Study, section: ScatterSection) -> None:
+    """Raises UserError where an input of [scatter] has no effect on blocks of a mission, or replaces what they give."""
+    for name, scattered in section.inputs.items():
+        for block in study.mission:
+            if not block.gives(name):
+                continue
+            if name == "frequency":
+                remedy = f"leave it out: the block {block.name} has a frequency of its own"
+            elif scattered.distribution.kind == "value":
+                remedy = f"give a distribution around own values, as {{std = ...}}: the block {block.name} gives one"
+            else:
+                continue
+            raise UserError(study.source, f"scatter.{name}", scattered.distribution.model_dump(), remedy)
 
 
 def _numbers_of(study: Study) -> list[str]:
@@ -160,6 +177,18 @@ def _samples(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
     if study.scatter is None:
         yield study, ()
         return
+    blocks = zip(*(_samples(block) for block in study.block_studies), strict=True)
+    for part, of_blocks in zip(
+        _drawn_studies(study), blocks if study.block_studies else itertools.repeat(()), strict=False
+    ):
+        given = tuple(block for block, _ in of_blocks)
+        # blocks have equal pairs, with room for the wear of all
+        yield (with_room_of_all(part[0].model_copy(update={"block_studies": given})), part[1]) if given else part
+
+
+def _drawn_studies(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
+    """The study with what each sample draws."""
+    assert study.scatter is not None
     values = draw_inputs(study)
     axes = [name for name in values if name in _OF_AXES]
     of_wear = [name for name in values if name in study.wear.numbers]
@@ -175,7 +204,7 @@ def _samples(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
         if of_wear:
             update["wear"] = study.wear.with_numbers({name: float(values[name][sample]) for name in of_wear})
         part = study.model_copy(update=update)
-        yield with_room_for_wear(part) if of_scene else part, (sample,)
+        yield with_room_for_wear(part) if of_scene and not study.has_missions else part, (sample,)
 
 
 def _with_parameters(study: Study, values: Mapping[str, float]) -> BaseModel:

@@ -10,6 +10,8 @@ from pydantic import BaseModel, BeforeValidator, Field, SerializeAsAny, TypeAdap
 
 from solver.settings import TARGETS
 from studies.fe_models.model_files import ModelFiles
+from studyrunner.coordinates import SCENE
+from studyrunner.mission_variables import OF_MISSIONS
 from studyrunner.mode_variables import OF_MODES
 from studyrunner.study.values import (
     Axis,
@@ -31,7 +33,7 @@ from studyrunner.study.values import (
 )
 from studyrunner.study.worn import Worn
 from studyrunner.user_error import WrongValueError
-from studyrunner.variables import ASKED, KEPT, SCENE, USUAL
+from studyrunner.variables import ASKED, KEPT, USUAL
 
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
@@ -40,7 +42,10 @@ SOLVER_AXES = ("harmonics", "samples", "tolerance", "rtol")
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
 AXES_OF_MODES = ("mode", "sweep")
 """Axes of a study of nonlinear modes, beside modal_amplitude."""
+AXES_OF_MISSIONS = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
+"""Axes of a study of missions; those that every block gives a value of its own are none."""
 
+_MISSIONS = whole(1, 10_000_000)
 _N_OUTPUTS = TypeAdapter(Annotated[int, whole(1, 1_000_000)])
 _COUNT = TypeAdapter(NotNegative)
 _TARGET = TypeAdapter(Positive)
@@ -71,7 +76,7 @@ def _read_outputs(value: object) -> int | tuple[float, ...]:
 def _read_variables(value: object) -> tuple[str, ...]:
     if not isinstance(value, list | tuple):
         raise WrongValueError(value, "give a list of names of result variables")
-    names_of_all = tuple(dict.fromkeys((*ASKED, *SCENE, *OF_MODES)))
+    names_of_all = tuple(dict.fromkeys((*ASKED, *SCENE, *OF_MODES, *OF_MISSIONS)))
     known = (*names_of_all, *KEPT)
     for name in value:
         if name != DEFAULT and name not in known:
@@ -129,6 +134,9 @@ class SlowTimeSection(Section):
 
     cycles: Cycles = Field(
         100_000.0, description="cycles; 0 for the unworn states only, inf: until nothing wears any more"
+    )
+    missions: Annotated[int, _MISSIONS] | None = Field(
+        None, description="how often the blocks under [[mission]] are flown, in place of cycles"
     )
     final_share: Fraction = Field(
         1e-4, description="of the largest wear rate of each pair: below it nothing wears any more, with cycles = inf"

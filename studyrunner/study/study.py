@@ -11,13 +11,17 @@ from pydantic import Field, model_validator
 
 from solver.contact.wear_law import WearLaw
 from solver.settings import TARGETS, Automatic, FollowedFrequency, WearTarget
+from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS, OF_MISSIONS_BY_DEFAULT, OF_SAMPLED_MISSIONS
 from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.scatter.section import ScatterSection
 from studyrunner.study.followed import LoadingSection
+from studyrunner.study.mission import OWN_AXES, MissionBlock
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.sections import (
     AUTO,
     AXES,
+    AXES_OF_MISSIONS,
     AXES_OF_MODES,
     DEFAULT,
     SOLVER_AXES,
@@ -32,7 +36,7 @@ from studyrunner.study.study_of_result import Archived
 from studyrunner.study.values import Section
 from studyrunner.study.wear_section import WearSection
 from studyrunner.user_error import WrongValueError
-from studyrunner.variables import ASKED, COORDINATES, FOLLOWED_FREQUENCY, KEPT, OF_SAMPLES, SCENE, USUAL, Variable
+from studyrunner.variables import ASKED, FOLLOWED_FREQUENCY, KEPT, OF_SAMPLES, USUAL, Variable
 
 _MOST_POINTS = 1_000_000
 
@@ -40,6 +44,8 @@ _MOST_POINTS = 1_000_000
 class Study(Section):
     """A whole study.
 
+    - mission: blocks in order; none where each point has one vibration.
+    - block_studies: for each block a study of this block alone.
     - follow: what the frequency of the excitation follows; None where it is given.
     - source: file of the study, as the user named it.
     - folder: folder of this file.
@@ -59,6 +65,8 @@ class Study(Section):
     outputs: OutputsSection = OutputsSection()
     scatter: ScatterSection | None = None
     loading: LoadingSection | None = None
+    mission: tuple[MissionBlock, ...] = ()
+    block_studies: tuple[Study, ...] = Field((), exclude=True)
     follow: FollowedFrequency | None = Field(None, exclude=True)
     source: str = Field(exclude=True)
     folder: Path = Field(exclude=True)
@@ -81,6 +89,8 @@ class Study(Section):
         usual = OF_SAMPLES if table.get("scatter") is not None else USUAL
         if "modal_amplitude" in table.get("axes", {}):
             usual = tuple(OF_MODES)
+        if table.get("mission"):
+            usual = OF_SAMPLED_MISSIONS if table.get("scatter") is not None else OF_MISSIONS_BY_DEFAULT
         followed = FOLLOWED_FREQUENCY if table.get("follow") is not None else ()
         cheap = [*usual, *followed, *(name for name in scene.offers if name == "mesh")]
         filled = [*cheap, *(name for name in names if name != DEFAULT and name not in cheap)]
@@ -89,12 +99,18 @@ class Study(Section):
     @model_validator(mode="after")
     def _check_variables(self) -> Study:
         for name in self.outputs.variables:
-            if self.has_modes and name in (*ASKED, "exact") and name not in OF_MODES:
+            if name in self.variables or (name in SCENE and not (name == "exact" and self._has_no_exact_answer)):
+                continue
+            if self.has_modes:
                 remedy = f"give names out of {', '.join(OF_MODES)}, mesh: with axes.modal_amplitude nothing wears"
-                raise WrongValueError(name, remedy, "outputs.variables")
-            if not self.has_modes and name in OF_MODES and name not in (*ASKED, "natural_frequency"):
+            elif self.has_missions:
+                known = ", ".join((*OF_MISSIONS, "mesh", "natural_frequency"))
+                remedy = f"give names out of {known}: missions do not have it"
+            elif name in OF_MISSIONS:
+                remedy = "leave it out, or give blocks under [[mission]]: only missions have it"
+            else:
                 remedy = "leave it out, or give axes.modal_amplitude: only nonlinear modes have it"
-                raise WrongValueError(name, remedy, "outputs.variables")
+            raise WrongValueError(name, remedy, "outputs.variables")
         for name in ("mesh", "exact"):
             if name in self.outputs.variables and name not in self.scene.offers:
                 remedy = f"leave it out: the scene {self.scene.model} has none"
@@ -124,7 +140,22 @@ class Study(Section):
         return self
 
     @model_validator(mode="after")
+    def _check_missions(self) -> Study:
+        missions, outputs = self.slow_time.missions, self.slow_time.outputs
+        if missions is None:
+            return self
+        if isinstance(outputs, tuple) and (outputs[-1] > missions or any(count != round(count) for count in outputs)):
+            remedy = f"give whole numbers of missions, at most slow_time.missions = {missions}"
+            raise WrongValueError(outputs, remedy, "slow_time.outputs")
+        if self.slow_time.until is not None and "frequency_shift" in self.slow_time.until:
+            remedy = "give wear_depth or worn_volume: blocks of a mission have frequencies of their own"
+            raise WrongValueError(self.slow_time.until, remedy, "slow_time.until")
+        return self
+
+    @model_validator(mode="after")
     def _check_outputs(self) -> Study:
+        if self.has_missions:
+            return self
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
         if isinstance(outputs, tuple):
             if self.to_the_end:
@@ -179,14 +210,31 @@ class Study(Section):
         return self.axes.modal_amplitude is not None
 
     @property
+    def has_missions(self) -> bool:
+        """Whether the points of the study are mission histories, whose slow time is counted in missions."""
+        return bool(self.mission)
+
+    @property
+    def _has_no_exact_answer(self) -> bool:
+        return self.has_modes or self.has_missions
+
+    @property
     def variables(self) -> Mapping[str, Variable]:
         """Variables that the points of such a study have, if they are asked for."""
-        return OF_MODES if self.has_modes else ASKED
+        return OF_MODES if self.has_modes else OF_MISSIONS if self.has_missions else ASKED
 
     @property
     def kept(self) -> Mapping[str, Variable]:
         """Variables that the result of such a study always holds."""
-        return OF_A_MODE_POINT if self.has_modes else KEPT
+        return OF_A_MODE_POINT if self.has_modes else OF_A_MISSION if self.has_missions else KEPT
+
+    @property
+    def sizes(self) -> Mapping[str, int]:
+        """Lengths of the dimensions after the axes that the study gives: slow time, and blocks of missions."""
+        if self.has_modes:
+            return {}
+        n_kept = len(self.cycles_kept)
+        return {"mission": n_kept, "block": len(self.mission)} if self.has_missions else {"cycle": n_kept}
 
     @property
     def scene_variables(self) -> tuple[str, ...]:
@@ -228,8 +276,12 @@ class Study(Section):
 
     @cached_property
     def cycles_kept(self) -> tuple[float, ...]:
-        """Cycle counts of the result, ascending; numbers of the outputs where each point has its own counts."""
+        """Cycle counts, or numbers of missions, of the result, ascending; numbers of the outputs where each point has
+        its own counts.
+        """
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
+        if self.has_missions:
+            return tuple(map(float, self.missions_kept))
         if isinstance(outputs, tuple):
             return outputs
         if self.to_the_end:
@@ -237,6 +289,16 @@ class Study(Section):
         if cycles == 0.0:
             return (0.0,)
         return (*(cycles * position / (outputs - 1) for position in range(outputs - 1)), cycles)
+
+    @property
+    def missions_kept(self) -> tuple[int, ...]:
+        """Numbers of flown missions of the result, ascending; equally spaced but for rounding to whole numbers."""
+        missions, outputs = self.slow_time.missions, self.slow_time.outputs
+        assert missions is not None
+        if isinstance(outputs, tuple):
+            return tuple(int(count) for count in outputs)
+        spaced = (round(missions * position / max(1, outputs - 1)) for position in range(outputs))
+        return tuple(sorted({*spaced, missions}))
 
     @property
     def harmonics(self) -> tuple[int | Automatic, ...]:
@@ -284,10 +346,16 @@ class Study(Section):
         return of_scene[name] if name in of_scene else COORDINATES[name].units
 
     @property
+    def idle_axes(self) -> tuple[str, ...]:
+        """Axes of which every block of a mission gives a value of its own; then they are none."""
+        return tuple(name for name in OWN_AXES if self.mission and all(block.gives(name) for block in self.mission))
+
+    @property
     def own_axes(self) -> tuple[str, ...]:
         """Names of the axes that are neither keys of [scene] or [wear] nor samples."""
-        axes = AXES_OF_MODES if self.has_modes else AXES
-        return (*axes, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
+        axes = AXES_OF_MODES if self.has_modes else AXES_OF_MISSIONS if self.has_missions else AXES
+        used = (name for name in axes if name not in self.idle_axes)
+        return (*used, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
 
 
 def check_axes(study: Study) -> None:

@@ -9,12 +9,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from studies.sandboxed_read import is_hdf5
 from studyrunner.study.checked_table import check_table
 from studyrunner.study.followed import take_followed
+from studyrunner.study.mission import OWN_AXES, MissionBlock, read_blocks
+from studyrunner.study.mission_tables import (
+    asks_for_missions,
+    block_studies,
+    check_mission_tables,
+    check_used_axes,
+    with_room_of_all,
+)
+from studyrunner.study.mission_tables import with_idle_keys as with_idle_keys_of_missions
+from studyrunner.study.mission_tables import without_idle_keys as without_idle_keys_of_missions
 from studyrunner.study.mode_tables import (
     asks_for_modes,
     check_mode_tables,
@@ -52,7 +63,7 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _SECTIONS = tuple(
     name
     for name in Study.model_fields
-    if name not in ("follow", "source", "folder", "archived", "scene_axes", "variants")
+    if name not in ("follow", "source", "folder", "archived", "scene_axes", "variants", "block_studies")
 )
 
 
@@ -106,17 +117,19 @@ def bundled_studies() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in files if file.suffix == ".toml"))
 
 
-def check_study(table: Mapping[str, object], source: str, path: Path, archived: Archived | None = None) -> Study:
+def check_study(
+    table: Mapping[str, object], source: str, path: Path, archived: Archived | None = None, *, room: bool = True
+) -> Study:
     """The study in a table as TOML has it, every default filled in.
 
     source: the file as the user named it. path: where it is; relative paths start in its folder. archived: what it says
-    of the result that it holds. Raises UserError.
+    of the result that it holds. room: whether scenes get room for what wears. Raises UserError.
     """
     sections = dict(table)
     for name, section in sections.items():
         if name not in _SECTIONS:
             raise UserError(source, name, section, f"unknown table, give {nearest_name(name, _SECTIONS)}")
-        if not isinstance(section, dict):
+        if not isinstance(section, dict) and name != "mission":
             raise UserError(source, name, section, f"give a table [{name}] with keys")
     for name in ("study", "scene", "axes"):
         if name not in sections:
@@ -129,24 +142,48 @@ def check_study(table: Mapping[str, object], source: str, path: Path, archived: 
     if worn is not None:
         sections["scene"] = {**_section(table, "scene"), "worn": read_worn(worn, source, path.parent)}
     check_mode_tables(sections, source)
+    check_mission_tables(sections, source)
     scene_axes = _take_scene_axes(sections, source)
+    blocks = _read_blocks(sections, source)
     if scene_axes:
+        check_used_axes([axis.name for axis in scene_axes], blocks, source)
         return _with_variants(sections, scene_axes, source, path, archived)
+    of_blocks = block_studies(
+        sections, blocks, source, lambda tables: check_study(tables, source, path, archived, room=False)
+    )
     # only what was kept on request takes the place of what a bundled scene builds
     kept = archived if _section(table, "outputs").get("scene") is True else None
     sections["scene"] = check_scene(_section(table, "scene"), source, path, archived, kept)
     follow = take_followed(sections, source)
     moved = _move_solver_axes(sections)
     given = {"source": source, "folder": path.parent, "archived": archived, "follow": follow}
+    if blocks:
+        given |= {"mission": blocks, "block_studies": of_blocks}
     try:
-        study = check_table(Study, {**with_idle_keys(sections), **given}, source, "")
-        study = with_room_for_wear(study)
+        filled = with_idle_keys_of_missions(with_idle_keys(sections))
+        study = check_table(Study, {**filled, **given}, source, "")
+        if blocks:
+            same = {"block_studies": tuple(each.model_copy(update={"outputs": study.outputs}) for each in of_blocks)}
+            study = study.model_copy(update=same)
+        if room:
+            study = with_room_of_all(study) if blocks else with_room_for_wear(study)
         check_scatter(study)
         return study
     except UserError as error:
         if error.key in moved:
             raise UserError(error.place, moved[error.key], error.value, error.remedy) from None
         raise
+
+
+def _read_blocks(sections: Table, source: str) -> tuple[MissionBlock, ...]:
+    """The blocks of a study of missions; none of another study."""
+    if not asks_for_missions(sections):
+        return ()
+    with scene_errors(source, None):
+        kind = parameters_of(_section(sections, "scene").get("model"))
+    blocks = read_blocks(sections["mission"], sections, kind, AxesSection, source)
+    check_used_axes([name for name in OWN_AXES if name in _section(sections, "axes")], blocks, source)
+    return blocks
 
 
 def _take_scene_axes(sections: Table, source: str) -> tuple[SceneAxis, ...]:
@@ -196,11 +233,14 @@ def format_study(study: Study) -> str:
         if sections["axes"][key] is not None:
             del sections["solver"][key]
     lines = []
-    for name, section in without_idle_keys(sections).items():
-        if section is None:
+    for name, section in without_idle_keys_of_missions(without_idle_keys(sections), study).items():
+        if not section:
             continue
-        lines.append(f"[{name}]")
-        lines.extend(f"{key} = {_toml_value(value)}" for key, value in section.items() if value is not None)
+        for table in section if isinstance(section, list) else [section]:
+            lines.append(f"[[{name}]]" if table is not section else f"[{name}]")
+            lines.extend(
+                f"{_toml_key(key)} = {_toml_value(value)}" for key, value in table.items() if value is not None
+            )
     return "\n".join(lines) + "\n"
 
 
@@ -254,6 +294,8 @@ def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> 
     """Sets the key of a dotted name. source, shown: where the user gave it, and how it is called there."""
     names = key.split(".")
     place: Table = table
+    if names[0] == "mission" and len(names) > 1 and isinstance(table.get("mission"), list):
+        place, names = _block_called(table["mission"], names, value, source, shown), names[2:]
     for name in names[:-1]:
         inner = place.setdefault(name, {})
         if not isinstance(inner, dict):
@@ -268,6 +310,17 @@ def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> 
         for other in others.get(names[0], ()):
             if not is_table(_section(table, other).get(names[1])):
                 _section(table, other).pop(names[1], None)
+
+
+def _block_called(blocks: Any, names: Sequence[str], value: object, source: str, shown: str) -> Table:
+    """The block of a mission that a dotted name begins with, by its name or its number from 0 on."""
+    if len(names) < 3:
+        raise UserError(source, shown, value, "give mission.NAME.KEY with the name of a block")
+    for number, block in enumerate(blocks):
+        if isinstance(block, dict) and names[1] in (block.get("name"), str(number)):
+            return block
+    called = [str(block.get("name")) for block in blocks if isinstance(block, dict)]
+    raise UserError(source, shown, value, f"there is no such block: give one of {', '.join(called)}")
 
 
 def _override_value(key: str, text: str) -> object:

@@ -83,13 +83,14 @@ class Findings:
         message = str(record["message"])
         if self._study.has_modes:
             return message
-        last = float(record["last_cycle"])
-        if int(record["outcome"]) in COMPLETE or "cycle" in message:
+        of = "mission" if self._study.has_missions else "cycle"
+        last = float(record[f"last_{of}"])
+        if int(record["outcome"]) in COMPLETE or of in message:
             return message
         if math.isnan(last):
             return message or "no state was found"
         end = math.inf if self._study.to_the_end else self._study.cycles_kept[-1]
-        return "; ".join(filter(None, (describe_reach(last, end, float(record["error_estimate"])), message)))
+        return "; ".join(filter(None, (describe_reach(last, end, float(record["error_estimate"]), of), message)))
 
     def _remark(self, number: int) -> str:
         """What the study makes of it: the width that has room, or that a travelling wave has no more harmonics."""

@@ -28,8 +28,8 @@ class OutcomeTable:
 
     def __init__(self, study: Study) -> None:
         sizes = {name: len(values) for name, values in study.dimensions.items()}
-        across = next((name for name in _ACROSS if 1 < sizes[name] <= _MOST_ACROSS), "")
-        down = next((name for name in _DOWN if name != across and 1 < sizes[name] <= _MOST_DOWN), "")
+        across = next((name for name in _ACROSS if 1 < sizes.get(name, 1) <= _MOST_ACROSS), "")
+        down = next((name for name in _DOWN if name != across and 1 < sizes.get(name, 1) <= _MOST_DOWN), "")
         self._study = study
         self._wears = study.cycles_kept[-1] > 0.0
         self._axes = (down, across) if down and across else None

@@ -39,7 +39,9 @@ class WornVolumes:
             # each is held against its own rtol: one that is above it is worse than any that is not
             first = min(less or points[row])
             if self._worst is None or (not less, -error, first) < (self._worst[0], -self._worst[1], self._worst[2]):
-                self._worst = (not less, error, first, records["wear_rate_error"][row].tolist())
+                there = "wear_rate_error" in (records.dtype.names or ())
+                rates = records["wear_rate_error"][row].tolist() if there else []
+                self._worst = (not less, error, first, rates)
 
     def format(self) -> str:
         """One line: how many points are known to `rtol`, how many less well, the worst, and what would help there."""

@@ -72,6 +72,7 @@ class Motion:
     """State at the end of a step: displacements, m, velocities, m/s (2, n), now and before; forces, N, of the pairs.
 
     work (n_contact,): lambda_N times slip over the last period, J. responses (n_steps, n): its displacements, m.
+    slope (2, 2): change over a period by a change of the amplitude of the mode, where the last settling has found it.
     """
 
     x: FloatArray
@@ -79,6 +80,7 @@ class Motion:
     force: FloatArray
     work: FloatArray
     responses: FloatArray
+    slope: FloatArray | None = None
 
 
 def fitted_weights(omega: float, step: float) -> FloatArray:
@@ -274,11 +276,11 @@ def settle(
 
     work_change: relative change of the slip work over a period; a mass on rigid ground turns on whole steps only.
     """
-    motion = one_period(structure, motion, gap)
+    known, motion = motion.slope, one_period(structure, motion, gap)
     period = 2.0 * np.pi / structure.omega
     growth = np.exp((structure.rate - 1j * structure.omega) * period) - 1.0 if structure.rate else -1.0 + 0.0j
     linear = np.array([[growth.real, -growth.imag], [growth.imag, growth.real]])
-    slope, last, calm = linear, None, 0
+    slope, last, calm = linear if known is None else known, None, 0
     for periods in range(2, _MOST_PERIODS):
         here, work = amplitude_of_mode(structure, motion), motion.work
         moved = one_period(structure, motion, gap)
@@ -293,7 +295,7 @@ def settle(
         still = np.abs(moved.work - work).max() <= work_change * max(float(moved.work.max()), faint)
         calm = calm + 1 if still and np.linalg.norm(correction) <= _SETTLED * size else 0
         if calm >= 2:
-            return moved, periods
+            return replace(moved, slope=slope), periods
         if periods % _TRIAL == 0:
             slope, last = linear, None
         elif structure.rate and periods // _TRIAL % 2 == 0:

@@ -31,7 +31,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from solver.packing import Packed
-from studyrunner import run
+from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.mpi import schedule
 from studyrunner.mpi.launcher import launcher_rank
@@ -183,7 +183,7 @@ def wait_until(condition: Callable[[], bool], patience: float) -> None:
 
 
 if __name__ == "__main__":
-    run.build_evaluator = build_fake
+    task_runs.build_evaluator = build_fake
     schedule.SECONDS_TO_PROGRESS = float(os.environ.get("FAKE_PROGRESS", "0.03"))
     if "FAKE_TELLING" in os.environ:
         progress.FIRST_LINE = progress.LONGEST_SILENCE = float(os.environ["FAKE_TELLING"])

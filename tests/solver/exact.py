@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.refinement import refine
-from solver.continuation.arc_length import follow_arc
+from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.converged import PathPoint
@@ -121,7 +121,9 @@ def first_found(exact: ExactState, case: Case, budget: Budget) -> PathPoint:
     for target in np.append(np.arange(begin + SWEEP_STEP, exact.omega, SWEEP_STEP), exact.omega):
         followed, arrived = follow_naturally(balance_at, at, float(target), solver, tolerance, budget)
         arc = (
-            None if arrived else follow_arc(balance_at, followed, float(target), SWEEP_STEP, solver, tolerance, budget)
+            None
+            if arrived
+            else follow_arc(Arc(balance_at, followed, SWEEP_STEP, solver, tolerance, budget), float(target))
         )
         reached = followed if arc is None else arc.point
         assert reached is not None

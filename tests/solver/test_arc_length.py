@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.continuation.arc_length import follow_arc
+from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint
@@ -49,7 +49,7 @@ def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
         return balance_at(amplitude, history)
 
     start = first(0.03)
-    result = follow_arc(watched, start, 0.06, 0.03, JacobianSolver(), TOLERANCE, Budget())
+    result = follow_arc(Arc(watched, start, 0.03, JacobianSolver(), TOLERANCE, Budget()), 0.06)
     point = result.point
     assert point is not None
     assert len(result.folds) == 2
@@ -65,7 +65,7 @@ def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
 def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> None:
     balance_at, first, _ = wall(0.5)
     budget = Budget()
-    result = follow_arc(balance_at, first(0.01), np.inf, 0.01, JacobianSolver(), TOLERANCE, budget)
+    result = follow_arc(Arc(balance_at, first(0.01), 0.01, JacobianSolver(), TOLERANCE, budget), np.inf)
     assert result.point is None
     assert budget.iterations <= CONTINUATION.arc_correctors * CONTINUATION.near_iterations
 
@@ -82,9 +82,8 @@ def test_arc_length_does_not_go_on_where_stability_is_lost_without_a_fold() -> N
             visited.append(amplitude)
             return balance_at(amplitude, history)
 
-        result = follow_arc(
-            watched, first(0.01), 0.03, 0.02, JacobianSolver(), TOLERANCE, budget, lambda _: False, beyond=beyond
-        )
+        arc = Arc(watched, first(0.01), 0.02, JacobianSolver(), TOLERANCE, budget)
+        result = follow_arc(arc, 0.03, lambda _: False, beyond=beyond)
         assert result.point is None
         spent.append(budget.iterations)
         farthest.append(max(visited))

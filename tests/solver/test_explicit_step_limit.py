@@ -120,7 +120,7 @@ def oscillation_of_all(rates: Sequence[float]) -> bool:
     size = max(np.abs(rates), default=0.0)
     run = 0
     for before, after in pairwise(np.diff(rates)):
-        alternates = before * after < 0.0 and abs(after) >= 0.98 * abs(before) and abs(after) > 1e-3 * size
+        alternates = before * after < 0.0 and abs(after) >= abs(before) and abs(after) > 1e-3 * size
         run = run + 1 if alternates else 0
         if run >= 3:
             return True

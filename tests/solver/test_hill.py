@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.continuation.arc_length import follow_arc
+from solver.continuation.arc_length import Arc, follow_arc
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
@@ -43,7 +43,7 @@ def crossings() -> dict[float, list[PathPoint]]:
             return len(seen) == 2
 
         begin = PathPoint(1.55, at, state.start_history)
-        follow_arc(balance_at, begin, target, 0.08, JacobianSolver(), 1e-8, Budget(), collect, toward=1.0)
+        follow_arc(Arc(balance_at, begin, 0.08, JacobianSolver(), 1e-8, Budget()), target, collect, toward=1.0)
     found[1.55].insert(0, PathPoint(1.55, at, state.start_history))
     return found
 

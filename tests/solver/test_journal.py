@@ -38,9 +38,9 @@ def frequent_saves(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def assert_same(found: StartState, expected: StartState) -> None:
     """Equal to the last bit, but for the time that it took."""
-    one, other = (repr(replace(start, state=None, coarse=None, run_time=0.0)) for start in (found, expected))
+    one, other = (repr(replace(start, state=None, reference=None, run_time=0.0)) for start in (found, expected))
     assert one == other
-    for state, wanted in ((found.state, expected.state), (found.coarse, expected.coarse)):
+    for state, wanted in ((found.state, expected.state), (found.reference, expected.reference)):
         assert (state is None) == (wanted is None)
         for entry in fields(wanted) if wanted is not None else ():
             np.testing.assert_array_equal(getattr(state, entry.name), getattr(wanted, entry.name), entry.name)

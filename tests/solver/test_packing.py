@@ -156,6 +156,6 @@ def test_a_sweep_over_a_fold_goes_on_to_the_same_numbers() -> None:
         left = [index for index in range(frequencies.size) if index not in done]
         for place, start in follow_branch(model, 0.0, 0.02, frequencies[left], "up", AUTO, resume=progress):
             wanted = whole[left[place]]
-            assert_same(replace(start, state=None, coarse=None), replace(wanted, state=None, coarse=None))
+            assert_same(replace(start, state=None, reference=None), replace(wanted, state=None, reference=None))
             assert_same(start.state, wanted.state)
-            assert_same(start.coarse, wanted.coarse)
+            assert_same(start.reference, wanted.reference)

@@ -149,7 +149,7 @@ def test_friction_and_wear_only_take(seed: int) -> None:
     work, damping = (
         series_work(force, moved) for force in (joint.to_relative(at.force_h), joint.structure.apply(moved))
     )
-    least = ACCURACY.energy_limit * float(at.slip_work.sum()) + ACCURACY.noticed_loss_factor * elastic_work(joint, at)
+    least = ACCURACY.energy_limit * float(at.slip_work.sum()) + ACCURACY.small_work * elastic_work(joint, at)
     opens = at.status_t == 0
     if (opens.any(axis=1) & ~opens.all(axis=1)).any():
         # few harmonics leave a pair that comes and goes wrong by a little of what flows: beyond the bound of all others

@@ -106,7 +106,7 @@ def test_a_stuck_state_keeps_the_first_harmonic_alone(settings: SolverSettings) 
     )
 
 
-@pytest.mark.parametrize(("name", "most"), [("most_samples", 64), ("few_pairs_unknowns", 5)])
+@pytest.mark.parametrize(("name", "most"), [("most_samples", 64), ("node_unknowns", 5)])
 def test_a_state_that_is_not_allowed_what_it_needs_says_so(
     name: str, most: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,12 +12,11 @@ from solver.accuracy.certificate import certify
 from solver.continuation.first_state import solve_static_state
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.options import BALANCE
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import Budget
 from solver.results.history import PeriodicState
 from solver.results.state_report import periodic_state, report_state
-from solver.settings import SolverSettings, all_orders
+from solver.settings import RESOLUTION, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint, build_case
 from tests.solver.contact_twin import pair_period, status
@@ -165,7 +164,7 @@ def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
     motion = full_motion(model, state)
     assert report.response == pytest.approx(motion.response(), rel=1e-8, abs=0.0)
     static = np.real(model.linear[0].response @ motion.displacement[0])
-    phase = 2 * np.pi * np.arange(BALANCE.peak_points) / BALANCE.peak_points
+    phase = 2 * np.pi * np.arange(RESOLUTION.fine_samples) / RESOLUTION.fine_samples
     waves = sum(np.real(motion.response(n)[:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
     assert report.response_peak == pytest.approx(np.abs(static[:, None] + waves).max(axis=1), rel=1e-8, abs=0.0)
     assert report.mean_pressure == pytest.approx(

@@ -84,12 +84,12 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch: py
         monkeypatch.setattr(sweep_module, "LOADING", options)
         found[change] = starts([213.25], settings=settings)[213.25]
     coarse, fine = found[0.3], found[0.02]
-    assert coarse.coarse is not None
+    assert coarse.reference is not None
     assert fine.state is not None
     assert coarse.state is not None
     wrong, seen = (
         np.linalg.norm((coarse.state.displacement_h - other.displacement_h)[:, :, 1:])
-        for other in (fine.state, coarse.coarse)
+        for other in (fine.state, coarse.reference)
     )
     assert 1e-3 * np.linalg.norm(fine.state.displacement_h[:, :, 1:]) < wrong < 2.0 * seen
     assert abs(slip_work(coarse) / slip_work(fine) - 1.0) < coarse.wear_rate_error

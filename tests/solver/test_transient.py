@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from solver.continuation import transient
-from solver.continuation.arc_length import follow_arc
+from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.first_state import solve_static_state
 from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
@@ -106,7 +106,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
 
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
     start, solver = first(0.03), JacobianSolver()
-    middle = follow_arc(balance_at, start, 0.03, 0.03, solver, 1e-9, Budget(), grows, 1.0).point
+    middle = follow_arc(Arc(balance_at, start, 0.03, solver, 1e-9, Budget()), 0.03, grows, 1.0).point
     assert middle is not None
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
@@ -159,8 +159,8 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch:
     idle = np.zeros(1)
     rest = first_point(case, 0.8 * NATURAL, 0.0, idle)
     outcomes = []
-    for most in (CONTINUATION.transient_effort, 10):
-        monkeypatch.setattr(transient, "CONTINUATION", replace(CONTINUATION, transient_effort=most))
+    for most in (CONTINUATION.search_iterations, 10):
+        monkeypatch.setattr(transient, "CONTINUATION", replace(CONTINUATION, search_iterations=most))
         budget = Budget()
         outcome, _ = relax_to_periodic(
             case, joint, idle, rest.evaluation, quiet, rest.history, JacobianSolver(), budget

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from solver.outcome import Outcome
+from studyrunner.coordinates import COORDINATES
 from studyrunner.netcdf.attributes import coordinates
 from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.plan.results import MarchResult
@@ -16,7 +17,7 @@ from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
+from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 
 def build_dataset(

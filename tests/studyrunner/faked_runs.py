@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from studyrunner import run
+from studyrunner import task_runs
 from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.scene import describe_scene
@@ -35,7 +35,7 @@ class Solver:
         def build_fake(model: object, *_: object) -> Callable[..., Iterator[StartResult | MarchResult]]:
             return lambda task, keep: self.evaluate(model, task, keep)
 
-        monkeypatch.setattr(run, "build_evaluator", build_fake)
+        monkeypatch.setattr(task_runs, "build_evaluator", build_fake)
 
     def evaluate(self, model: object, task: Task, keep: Keep) -> Iterator[StartResult | MarchResult]:
         self.tasks.append(task)

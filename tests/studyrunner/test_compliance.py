@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from studyrunner.cli import main
-from studyrunner.variables import ASKED, COORDINATES, KEPT, LOOPS, SCENE, USUAL
+from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner.variables import ASKED, KEPT, LOOPS, USUAL
 
 CHECK = str(Path(__file__).with_name("run_compliance_checker.py"))
 

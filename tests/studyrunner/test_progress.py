@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from studyrunner import run
+from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
@@ -109,9 +109,9 @@ def build_slow(model: object, *_: object) -> Callable[..., Iterator[StartResult 
 def test_a_run_that_has_to_compile_says_so_once(
     compiles: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(run, "build_evaluator", build_slow)
+    monkeypatch.setattr(task_runs, "build_evaluator", build_slow)
     numbers = itertools.count(3) if compiles else itertools.repeat(3)
-    monkeypatch.setattr(run, "n_compiled", lambda: next(numbers))
+    monkeypatch.setattr(task_runs, "n_compiled", lambda: next(numbers))
     assert main(["sdof_slider", "--set", "axes.frequency=100", "-o", str(tmp_path / "out.nc")]) == 0
     said = capsys.readouterr().err
     assert said.count("the solver is compiled for this machine, once after an installation") == int(compiles)

@@ -12,7 +12,7 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
-from studyrunner import run
+from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.history_result import build_result
 from studyrunner.plan.planning import build_tasks
@@ -45,7 +45,7 @@ def use_fake(monkeypatch: pytest.MonkeyPatch, change: Callable[[MarchTask, March
 
         return evaluate
 
-    monkeypatch.setattr(run, "build_evaluator", build_fake)
+    monkeypatch.setattr(task_runs, "build_evaluator", build_fake)
 
 
 def test_all_points_to_tolerance(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -113,7 +113,7 @@ def test_unexpected_failure_keeps_the_old_file(
     earlier = (folder / "out.nc").read_bytes()
     (folder / "out.nc.progress").unlink()
     with monkeypatch.context() as broken:
-        broken.setattr(run.TaskProgress, "take", fail)
+        broken.setattr(task_runs.TaskProgress, "take", fail)
         assert main(SMALL) == 1
     assert "ZeroDivisionError: a bug" in capsys.readouterr().err
     assert (folder / "out.nc").read_bytes() == earlier

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from solver.packing import Packed
-from studyrunner.checkpoint import contents, database
+from studyrunner.checkpoint import contents, database, entries
 from studyrunner.checkpoint import store as store_module
 from studyrunner.checkpoint.database import COMPUTED, RESULTS, STARTS, TABLES, UNDER_WAY, StoreInUseError
 from studyrunner.checkpoint.store import SECONDS_A_TRANSACTION, Store
@@ -160,13 +160,13 @@ def test_a_first_result_is_written_at_once_and_later_ones_wait_a_moment_for_othe
 
 
 def test_nobody_waits_for_a_slow_disk_unless_it_is_far_behind(opened: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    synced, own = threading.Event(), store_module.compress
+    synced, own = threading.Event(), contents.compress
 
     def slow(packed: Packed, level: int) -> tuple[int, bytes]:
         synced.wait(60.0)
         return own(packed, level)
 
-    monkeypatch.setattr(store_module, "compress", slow)
+    monkeypatch.setattr(entries, "compress", slow)
     monkeypatch.setattr(store_module, "MOST_BYTES_WAITING", 40 * kept(0).n_bytes)
     put(opened, RESULTS, 0)
     opened.tick()

@@ -21,23 +21,21 @@ import numpy as np
 
 from solver.contact.coulomb import SEPARATED
 from solver.continuation.natural import follow_naturally
+from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, FloatArray
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import solve_balance
+from solver.options import COMMON
 from solver.structure.joint import Joint
 from solver.wear.euler import held_wear
-from solver.wear.options import WEAR
 from solver.wear.state import Reached, WearState
 from solver.wear.wearing_joint import WearingJoint
 
 
 class NoActiveSetError(Exception):
     """The active set gives no final state; the text is the reason."""
-
-
-# Overlap of a pair that grazes without force, over its distance.
-_LEAST_OVERLAP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -121,10 +119,11 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
     overlap = np.divide(forces, stiffness, out=np.zeros_like(forces), where=stiffness > 0.0)
     grazing = np.maximum(closing(joint, last.evaluation), unworn)
     # a pair that grazes without force has no overlap
-    least = _LEAST_OVERLAP * float(np.abs(grazing[off]).max(initial=0.0))
-    margin = WEAR.off_margin * max(unworn.size * float(overlap.max()), least)
+    least = COMMON.negligible * float(np.abs(grazing[off]).max(initial=0.0))
+    # the pair has to remain open while others are opened: the result does not depend on the distance
+    margin = 10.0 * max(unworn.size * float(overlap.max()), least)
     force_h = np.where(off[:, None, None], 0.0, last.evaluation.force_h)
-    for _ in range(WEAR.off_attempts):
+    for _ in range(CONTINUATION.attempts):
         depth = np.where(off, np.maximum(closing(joint, last.evaluation), unworn) + margin, unworn)
         balance = Balance.frozen(joint, last.history, depth)
         start = balance.predict(last.evaluation.displacement_h, force_h)
@@ -147,8 +146,9 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
             last, force_h = near, np.where(off[:, None, None], 0.0, near.evaluation.force_h)
             continue
         if (point.evaluation.status_t[off] == SEPARATED).all():
-            finer = WEAR.off_tolerance * tolerance
+            # one more iteration: without it the depths of a sphere are 3e-6 off
+            finer = NEWTON.forcing * tolerance
             exact = solve_balance(balance, found.evaluation.predicted_h, work.solver, finer, work.budget)
             return PathPoint(0.0, exact.evaluation, last.history) if exact.converged else point
-        margin *= 10.0
+        margin *= 2.0
     raise NoActiveSetError("without the pairs that slip under pressure the joint does not bear its load")

@@ -22,6 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.accuracy.options import ACCURACY
 from solver.contact.alternating_frequency_time import law_tangent
 from solver.contact.wear_law import WearingWork
 from solver.continuation.natural import follow_naturally
@@ -81,7 +82,7 @@ def failure(work: WearingJoint, unworn: WearState, final: WornOff, share: float)
                 return "pairs still wear at the final depths, which the vibration comes to in another state"
             free = without(work, replace(unworn, point=point), before, final.off)
             apart = float(np.abs(grazing_depth(joint, free.evaluation, before, final.off) - after).max(initial=0.0))
-            if apart > WEAR.same_depth * float(after.max(initial=0.0)):
+            if apart > ACCURACY.negligible * work.case.settings.rtol * float(after.max(initial=0.0)):
                 return f"residual shear makes the depths depend on the way to them, by {apart:.2g} m or more"
             return ""
         wears = rate > floor

@@ -11,6 +11,7 @@ import numpy as np
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.reference import coarser
 from solver.clock import computing_time
+from solver.continuation.options import CONTINUATION
 from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import OutOfTimeError
 from solver.outcome import Outcome, describe_error
@@ -24,7 +25,6 @@ from solver.wear.check import Checked, FullCheck, unstable_at_end, with_harmonic
 from solver.wear.final_state.active_set import NoActiveSetError, WornOff, wear_off
 from solver.wear.final_state.cooperation import failure
 from solver.wear.history import integrate_wear
-from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput
 from solver.wear.solutions import SlowTime, begin_reference
 from solver.wear.state import Failure, WearState
@@ -122,7 +122,7 @@ def _solved(work: WearingJoint, state: WearState, check: FullCheck, share: float
     final = wear_off(work, unworn, unworn.depth, np.zeros(unworn.depth.size, bool), share)
     reason = failure(work, unworn, final, share)
     last: Checked | Failure = check(work, final.state)
-    for _ in range(WEAR.off_attempts):
+    for _ in range(CONTINUATION.attempts):
         if isinstance(last, Failure) or last.state.resolution == final.state.resolution:
             break
         # with other harmonics the pairs graze at other depths

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from studyrunner.report.drawing import Drawing, Missing, add_legend, line_style, new_figure
+from studyrunner.report.reading.choice import choose
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import scale_for, show_number
 
@@ -22,7 +23,7 @@ def draw_excitation(result: Result) -> Iterator[Drawing | Missing]:
     if not result.has(_NAME):
         yield Missing(_NAME, title, result.lacks(_NAME))
         return
-    shown, choice = result.shown_point(), result.choose([], _MOST_LINES)
+    shown, choice = result.shown_point(), choose(result, [], _MOST_LINES)
     cycles, figure = scale_for("cycles", result.cycles), new_figure(3.4)
     panel = figure.subplots()
     ends = []

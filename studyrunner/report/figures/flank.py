@@ -22,6 +22,7 @@ from studyrunner.report.drawing import (
     set_from_zero,
 )
 from studyrunner.report.isolines import add_colour_bar, add_isolines
+from studyrunner.report.reading.choice import choose
 from studyrunner.report.reading.flanks import Flank, find_flanks
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
@@ -43,32 +44,40 @@ _NO_DEPTH = 1e-15
 
 def draw_flanks(result: Result) -> Iterator[Drawing | Missing]:
     """Figures of the pairs at the shown point; sentences where the file does not hold what they need."""
-    worn = False
-    if not tells_depth(result):
-        yield Missing("wear_depth", "Wear depth of the pairs", result.lacks("wear_depth"))
-    elif len(result.cycles) > 1:
-        shown = result.shown_point()
-        worn = float(last_depth(result, shown).max()) > _NO_DEPTH
-    if worn and result.dataset.sizes["contact"] > 1:
-        yield draw_depths(result)
-    placed = all(flank.seen is not None for flank in find_flanks(result))
+    yield from draw_wear(result)
     if result.has("mean_pressure"):
-        if placed or result.dataset.sizes["contact"] > _FEW_PAIRS:
+        if _are_placed(result) or result.dataset.sizes["contact"] > _FEW_PAIRS:
             yield draw_pressure(result)
         elif len(result.cycles) > 1:
             yield draw_pressure_history(result)
     else:
         yield Missing("mean_pressure", "Mean pressure on the flanks", result.lacks("mean_pressure"))
+
+
+def draw_wear(result: Result) -> Iterator[Drawing | Missing]:
+    """Figures of the wear depth at the shown point; a sentence where the file does not hold what they need."""
+    if not tells_depth(result):
+        yield Missing("wear_depth", "Wear depth of the pairs", result.lacks("wear_depth"))
+        return
+    if len(result.cycles) == 1 or float(last_depth(result, result.shown_point()).max()) <= _NO_DEPTH:
+        return
+    if result.dataset.sizes["contact"] > 1:
+        yield draw_depths(result)
     # Without positions there is nothing that the wear depth per pair does not show.
-    if worn and placed:
+    if _are_placed(result):
         yield draw_profile(result)
+
+
+def _are_placed(result: Result) -> bool:
+    """Whether the file has the positions of all pairs."""
+    return all(flank.seen is not None for flank in find_flanks(result))
 
 
 def draw_depths(result: Result) -> Drawing:
     """Wear depth per pair at the last cycle count, one series a scheme (Fig. 5)."""
     shown = result.shown_point()
     course = result.course_axis
-    choice = result.choose([course] if course else [], _MOST_SERIES)
+    choice = choose(result, [course] if course else [], _MOST_SERIES)
     pairs, last = result.dataset["contact"].values, result.last_kept(shown)
     series = [(last_depth(result, {**shown, **point}), label) for point, label in choice]
     series = [(depth, label) for depth, label in series if not np.isnan(depth).all()]

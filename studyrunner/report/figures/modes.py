@@ -10,7 +10,7 @@ from matplotlib.axis import Axis
 
 from studyrunner.report.drawing import Drawing, Missing, add_legend, mark_failed, new_panels
 from studyrunner.report.figures.frequency_course import Course, find_course
-from studyrunner.report.reading.choice import Choice
+from studyrunner.report.reading.choice import Choice, choose
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import show_number, show_power
 from studyrunner.system.progress import count
@@ -38,7 +38,7 @@ def draw_modes(result: Result) -> Iterator[Drawing | Missing]:
 def _draw(result: Result, course: Course, name: str) -> Drawing:
     """A variable over the amplitude with its error bars."""
     factor, label, title = _FIGURES[name]
-    choice = result.choose(["modal_amplitude"], _MOST_LINES, first=_FIRST)
+    choice = choose(result, ["modal_amplitude"], _MOST_LINES, first=_FIRST)
     figure, panels = new_panels(1, 1, 3.6)
     panel: Axes = panels[0, 0]
     values = np.array([factor * course.read(result, name, point) for point in choice.points])

@@ -18,6 +18,7 @@ from studyrunner.percent import show_percent
 from studyrunner.report.drawing import Drawing, Missing, Table, add_legend, new_figure
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.response import folds
+from studyrunner.report.reading.choice import choose
 from studyrunner.report.reading.known_volumes import settings_of, tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, NO_VOLUME, Result, as_sentences
 from studyrunner.report.reading.units import show_cycles, show_number, show_power
@@ -68,7 +69,7 @@ def draw_outcomes(result: Result) -> Iterator[Drawing | Table]:
 
 def draw_outcome_map(result: Result, course: Course) -> Drawing:
     """One cell a point: the course across, a row for each other combination; the number of the outcome in the cell."""
-    choice = result.choose([course.axis], _MOST_ROWS)
+    choice = choose(result, [course.axis], _MOST_ROWS)
     field = np.array([course.read(result, "outcome", point) for point in choice.points]).astype(int)
     present = sorted(set(field.ravel().tolist()))
     special = [number for number in present if number != CONVERGED]
@@ -126,7 +127,9 @@ def draw_certificates(result: Result) -> Iterator[Drawing | Missing | Table]:
     """The table of the worst certificates that the file carries, and the estimated errors over the course."""
     summary = str(result.dataset.attrs.get("certificate_summary", ""))
     title = "Certificates: how right the states are"
-    if summary:
+    if result.blocks is not None:
+        yield Table("certificates", "Summary of the run", ("what", "found"), _split_summary(summary))
+    elif summary:
         yield Table("certificates", title, ("certificate", "worst value and where"), _split_summary(summary), _NOTE)
     else:
         yield Missing("certificates", title, "The file carries no certificate_summary: run the study anew.")

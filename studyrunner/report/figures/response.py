@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS, Drawing, Missing, add_legend, mark_failed, new_panels, set_from_zero
 from studyrunner.report.figures.frequency_course import Course, find_course
-from studyrunner.report.reading.choice import Choice
+from studyrunner.report.reading.choice import Choice, choose
 from studyrunner.report.reading.result import Point, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count
@@ -37,7 +37,7 @@ def draw_responses(result: Result) -> Iterator[Drawing | Missing]:
 def draw_response(result: Result, course: Course) -> Drawing:
     """Amplitude of the first harmonic over frequency, one panel a response (Fig. 9)."""
     # Scheme, step and wear coefficient make no difference at the first cycle: the sweep is what the figure is about.
-    choice = result.choose(["frequency"], _MOST_LINES, first=("sweep", "excitation_amplitude", "scheme"))
+    choice = choose(result, ["frequency"], _MOST_LINES, first=("sweep", "excitation_amplitude", "scheme"))
     n_panels = min(len(result.responses), _MOST_RESPONSES)
     figure, panels = new_panels(n_panels, 1, 0.5 + 3.1 * n_panels, sharex=True)
     amplitudes = [course.read(result, "response_amplitude", point) for point in choice.points]

@@ -24,7 +24,7 @@ from studyrunner.report.drawing import (
 from studyrunner.report.figures.frequency_course import Course, find_course
 from studyrunner.report.figures.volume_marks import draw_band, draw_bars, mark_care, mark_end, tell_error
 from studyrunner.report.isolines import add_colour_bar, add_isolines
-from studyrunner.report.reading.choice import Choice
+from studyrunner.report.reading.choice import Choice, choose
 from studyrunner.report.reading.flanks import cell_edges
 from studyrunner.report.reading.result import NO_VOLUME, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
@@ -44,7 +44,8 @@ def draw_volumes(result: Result) -> Iterator[Drawing | Missing]:
         return
     if len(result.cycles) == 1:
         sentence = (
-            f"The file holds {result.cycle_label(0)} only: set cycles and outputs under [slow_time] for a wear history."
+            f"The file holds {result.cycle_label(0)} only: set {result.counted} and outputs under [slow_time] for a"
+            " wear history."
         )
         yield Missing("worn_volume", title, sentence)
         return
@@ -68,7 +69,7 @@ def draw_volumes(result: Result) -> Iterator[Drawing | Missing]:
     yield draw_map(result, course, "worn_volume", scale)
     if result.has("wear_rate"):
         rate = result.read("wear_rate").values
-        yield draw_map(result, course, "wear_rate", scale_for("m3 per cycle", np.nanmax(rate)))
+        yield draw_map(result, course, "wear_rate", scale_for(f"m3 per {result.counted[:-1]}", np.nanmax(rate)))
     else:
         yield Missing("wear_rate_map", "Wear rate over frequency and cycles", result.lacks("wear_rate"))
     yield draw_final(result, course, scale)
@@ -78,8 +79,8 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
     """Worn volume over cycles at the shown point, one line a scheme (Fig. 4)."""
     course = result.course_axis
     shown = result.shown_point()
-    choice = result.choose([course] if course else [], _MOST_LINES)
-    cycles = scale_for("cycles", result.cycles)
+    choice = choose(result, [course] if course else [], _MOST_LINES)
+    cycles = scale_for(result.counted, result.cycles)
     figure = new_figure(3.4)
     panel = figure.subplots()
     ends: list[str] = []
@@ -126,7 +127,7 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
                 )
                 exact_drawn.append(exact)
                 highest = max(highest, float(np.nanmax(exact)))
-    panel.set_xlabel(cycles.label("vibration cycles"))
+    panel.set_xlabel(cycles.label(slow_time(result)))
     panel.set_ylabel(scale.label("worn volume"))
     panel.set_xlim(0.0, cycles(latest or result.cycles[-1]).item())
     set_from_zero(panel, scale(highest).item() if highest > NO_VOLUME else 0.0)
@@ -138,9 +139,20 @@ def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
     bands = "Bands: estimated error" if any(found.get_gid() == "error" for found in panel.collections) else ""
     schemes = "" if "scheme" in result.varying else _tell_scheme(result)
     text = as_sentences(
-        f"Worn volume over cycles{f' at {where}' if where else ''}", amount, bands, *early, schemes, choice.sentence
+        f"Worn volume over {result.counted}{f' at {where}' if where else ''}",
+        amount,
+        bands,
+        *early,
+        schemes,
+        choice.sentence,
     )
-    return Drawing("worn_volume", "Worn volume over cycles", f"{text} Fig. 4 of the paper.", figure)
+    paper = "" if result.blocks is not None else " Fig. 4 of the paper."
+    return Drawing("worn_volume", f"Worn volume over {result.counted}", f"{text}{paper}", figure)
+
+
+def slow_time(result: Result) -> str:
+    """Label of an axis of slow time, without its unit."""
+    return "vibration cycles" if result.blocks is None else "flown missions"
 
 
 def _tell_final(result: Result, scale: Scale) -> str:
@@ -163,7 +175,7 @@ def _tell_scheme(result: Result) -> str:
 
 def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing:
     """Worn volume or wear rate over the course and the cycles, one panel a combination (Figs. 6, 7)."""
-    cycles = scale_for("cycles", result.cycles)
+    cycles = scale_for(result.counted, result.cycles)
     choice, fields = _read_histories(result, course, name)
     largest = max(float(np.nanmax(field, initial=0.0)) for field in fields)
     n_columns = 2 if len(fields) == _MOST_MAPS else len(fields)
@@ -183,27 +195,27 @@ def draw_map(result: Result, course: Course, name: str, scale: Scale) -> Drawing
         hatch_empty(panel, bool(np.isnan(field).any()))
         panel.grid(visible=False)
         panel.set_title(label)
-    _label_map(panels, course, cycles)
+    _label_map(panels, course, cycles.label(slow_time(result)))
     for panel, field in zip(panels.flat, fields, strict=True):
         add_isolines(panel, course.values, cycles(result.cycles), scale(field.T), norm)
     text = {"worn_volume": "worn volume", "wear_rate": "wear rate"}[name]
     add_colour_bar(figure, panels, norm, scale.label(text))
     caption = as_sentences(
-        f"{text.capitalize()} over {course.name} and cycles",
+        f"{text.capitalize()} over {course.name} and {result.counted}",
         f"The largest is {scale.show(largest, 4)}{_where_largest(result, course, choice, fields)}",
         "Hatched: points without a result" if any(np.isnan(field).any() for field in fields) else "",
         "Each point comes to its end at a count of its own, and stays as it is then"
         if result.has("cycle_count")
         else "",
         choice.sentence,
-        f"Fig. {6 if name == 'worn_volume' else 7} of the paper",
+        "" if result.blocks is not None else f"Fig. {6 if name == 'worn_volume' else 7} of the paper",
     )
-    return Drawing(f"{name}_map", f"{text.capitalize()} over {course.name} and cycles", caption, figure)
+    return Drawing(f"{name}_map", f"{text.capitalize()} over {course.name} and {result.counted}", caption, figure)
 
 
 def _read_known(result: Result, course: Course, name: str, limit: int) -> tuple[Choice, list[NDArray[np.float64]]]:
     """Combinations with a result anywhere along the course, and their values (course, cycle)."""
-    choice = result.choose([course.axis], limit)
+    choice = choose(result, [course.axis], limit)
     found = [(point, label, course.read(result, name, point)) for point, label in choice]
     # The shown point has a result: there is at least one.
     points, labels, fields = zip(*(one for one in found if not np.isnan(one[2]).all()), strict=True)
@@ -231,14 +243,14 @@ def _read_histories(result: Result, course: Course, name: str) -> tuple[Choice, 
 
 def _read_reached(result: Result, course: Course) -> list[NDArray[np.float64]]:
     """First worn volumes along the course, of combinations without a result as well: NaN where there is no state."""
-    choice = result.choose([course.axis], _MOST_LINES)
+    choice = choose(result, [course.axis], _MOST_LINES)
     return [course.read(result, "worn_volume", point)[:, 0] for point in choice.points]
 
 
-def _label_map(panels: NDArray[Any], course: Course, cycles: Scale) -> None:
+def _label_map(panels: NDArray[Any], course: Course, upright: str) -> None:
     """Labels at the outer panels of a grid with shared axes."""
     for row in panels:
-        row[0].set_ylabel(cycles.label("vibration cycles"))
+        row[0].set_ylabel(upright)
     for panel in panels[-1]:
         course.set_axis(panel)
 
@@ -288,7 +300,7 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
         "Bars: estimated error" if bars > 0.0 else "",
         *care,
         choice.sentence,
-        "Fig. 8 of the paper",
+        "" if result.blocks is not None else "Fig. 8 of the paper",
     )
     return Drawing("final_worn_volume", f"Final worn volume over {course.name}", caption, figure)
 

@@ -45,7 +45,7 @@ def mark_end(result: Result, panel: Axes, point: Mapping[str, int], cycles: Scal
     at, last = float(result.counts(point)[told[-1]]), float(result.last_cycle[place])
     panel.plot(cycles(at), scale(worn[told[-1]]), "X", color=colour, markersize=9, label="ended early")
     ending = result.endings[int(result.dataset["outcome"].values[place])]
-    return f"Ended early, at {show_cycles(last)}: {ending.word.replace('_', ' ')}"
+    return f"Ended early, at {show_cycles(last, result.counted)}: {ending.word.replace('_', ' ')}"
 
 
 def tell_error(result: Result, point: Mapping[str, int]) -> str:

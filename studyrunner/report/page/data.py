@@ -117,6 +117,7 @@ def build_page_data(result: Result, limit: float) -> PageData:
         "horizontal": result.axes.index(result.course_axis or result.axes[0]),
         "lines": [result.axes.index(name) for name in _LINES if name in result.varying],
         "colours": COLOURS,
+        "counted": result.counted.removesuffix("s"),
         "cycles": result.dataset["cycle"].values[kept.cycles].tolist(),
         "counts": _counts(result, kept) if result.has("cycle_count") else None,
         "responses": result.responses,

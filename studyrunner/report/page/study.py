@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from studyrunner.coordinates import COORDINATES
 from studyrunner.report.reading.endings import Ending
 from studyrunner.report.reading.known_volumes import advise_ended, describe_ended, tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, Result
@@ -15,7 +16,6 @@ from studyrunner.report.reading.units import scale_for, show_cycles, show_number
 from studyrunner.report.scatter.points import last_of, statistics_at
 from studyrunner.statistics.sentence import sentence, sentences
 from studyrunner.system.progress import count
-from studyrunner.variables import COORDINATES
 
 _MOST_VALUES = 12
 _MOST_SENTENCES = 3
@@ -50,10 +50,12 @@ def describe_study(result: Result) -> StudyFacts:
     facts = [(name.replace("_", " "), _axis_values(result, name)) for name in result.axes]
     facts += _drawn(result)
     cycles = result.cycles
-    ends = f"{show_cycles(float(cycles[0]))} to {show_cycles(float(cycles[-1]))}"
-    kept = f"{ends}, {np.count_nonzero(~np.isnan(cycles))} kept"
+    first, last = (show_cycles(float(each), result.counted) for each in (cycles[0], cycles[-1]))
+    kept = f"{first} to {last}, {np.count_nonzero(~np.isnan(cycles))} kept"
     if not result.has_modes:
-        facts.append(("cycles", kept if len(cycles) > 1 else show_cycles(float(cycles[0]))))
+        facts.append((result.counted, kept if len(cycles) > 1 else first))
+    if result.blocks is not None:
+        facts.append(("blocks", ", ".join(map(str, result.blocks["block"].values))))
     facts.append(("scene", _scene(result)))
     named = {"source": "source", "versions": "versions", "scene_sha256": "hash of the scene"}
     facts += [(label, str(attributes[name])) for name, label in named.items() if name in attributes]

@@ -71,9 +71,13 @@ def describe_ended(result: Result, number: int) -> list[str]:
     for index in found[:_MOST_NAMED]:
         place = tuple(index.tolist())
         said = "" if messages is None else str(messages[place])
-        if result.held[place] and "cycle" not in said:
+        if result.held[place] and result.counted[:-1] not in said:
             error = float(result.errors[place])
-            end = "" if result.computed[place] else f"computed up to {show_cycles(float(result.last_cycle[place]))}"
+            end = (
+                ""
+                if result.computed[place]
+                else f"computed up to {show_cycles(float(result.last_cycle[place]), result.counted)}"
+            )
             known = f"worn volume known to {show_error(result, place)}" if np.isfinite(error) and error > 0.0 else ""
             said = ", ".join(filter(None, (end, known, said)))
         where = result.describe(_point(result, place))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import warnings
 from collections.abc import Collection, Mapping
@@ -14,13 +13,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.choice import Choice
 from studyrunner.report.reading.endings import Ending, read_endings
+from studyrunner.report.reading.missions import as_history
 from studyrunner.report.reading.opening import open_vetted
 from studyrunner.report.reading.sample_statistics import SAMPLE, statistics_of
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors, study_tables
 from studyrunner.report.reading.units import show_cycles, show_value
-from studyrunner.system.progress import count
 from studyrunner.user_error import UserError, show_text
 
 CONVERGED = 0
@@ -41,12 +39,14 @@ class Result:
     """A result file. A point is one combination of the axes.
 
     dataset: read lazily. A variable that was read as a whole stays in memory. fixed: axes of which this holds one value
-    of several, and how many the file has.
+    of several, and how many the file has. blocks: of a result of missions what belongs to single blocks; in `dataset`
+    missions then have the name of the cycles that they replace.
     """
 
     path: Path
     dataset: xr.Dataset
     fixed: Mapping[str, int] = field(default_factory=dict)
+    blocks: xr.Dataset | None = None
 
     @cached_property
     def axes(self) -> tuple[str, ...]:
@@ -62,6 +62,11 @@ class Result:
     def has_modes(self) -> bool:
         """Whether the points are those of nonlinear modes, which have no slow time: `cycle` is then an axis."""
         return "modal_amplitude" in self.axes
+
+    @property
+    def counted(self) -> str:
+        """What slow time counts: "cycles", or "missions"."""
+        return "cycles" if self.blocks is None else "missions"
 
     @cached_property
     def computed(self) -> NDArray[np.bool_]:
@@ -290,39 +295,6 @@ class Result:
                 return name
         return numbers[0] if numbers else None
 
-    def choose(self, free: Collection[str], limit: int, first: tuple[str, ...] = ("scheme", "sweep")) -> Choice:
-        """At most `limit` combinations of the axes that are not `free`; the one of the shown point is among them.
-
-        Where there are more, the axes `first` are split first, then the others in the order of the file, each whole or
-        not at all; the rest stays at the shown point.
-        """
-        order = [name for name in (*first, *self.axes) if name in self.varying and name not in free]
-        order = list(dict.fromkeys(order))
-        shown = {name: index for name, index in self._shown.items() if name not in free}
-        split: list[str] = []
-        number = 1
-        for name in order:
-            size = self.dataset.sizes[name]
-            if number * size <= limit:
-                split.append(name)
-                number *= size
-        split.sort(key=self.axes.index)
-        ranges = [range(self.dataset.sizes[name]) for name in split]
-        points = tuple({**shown, **dict(zip(split, place, strict=True))} for place in itertools.product(*ranges))
-        labels = tuple(self.describe(point, split) for point in points)
-        sizes = {name: self.dataset.sizes[name] for name in order if name not in split}
-        sizes |= {name: size for name, size in self.fixed.items() if name not in free}
-        fixed = [name for name in self.axes if name in sizes]
-        if not fixed:
-            return Choice(points, labels, "")
-        others = " and ".join(
-            count(sizes[name] - 1, "other sample" if name == SAMPLE else "other value")
-            + ("" if name == SAMPLE else f" of {name.replace('_', ' ')}")
-            for name in fixed
-        )
-        sentence = f"Shown for {self.describe(shown, fixed)}; the file also holds {others}."
-        return Choice(points, labels, sentence)
-
     def describe(self, point: Point, axes: Collection[str] | None = None) -> str:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
         kept = axes if axes is not None else ((*self.varying, *self.fixed) or self.axes)
@@ -336,7 +308,7 @@ class Result:
 
     def cycle_label(self, index: int) -> str:
         """A kept cycle count in words."""
-        return show_cycles(float(self.cycles[index]))
+        return show_cycles(float(self.cycles[index]), self.counted)
 
     def when(self, index: int, before: str = "at") -> str:
         """A kept cycle count in words, with the word `before` it: "at 5 cycles", "in the final state"."""
@@ -362,4 +334,5 @@ def open_for_report(path: Path | str) -> Result:
     """
     opened = open_vetted(path)
     with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
-        return Result(Path(path), check_dataset(opened, str(path)))
+        dataset, blocks = as_history(check_dataset(opened, str(path)))
+        return Result(Path(path), dataset, blocks=blocks)

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.report.reading.result import Point, Result
-from studyrunner.variables import COORDINATES, SCENE
 
 EXISTS = "contact_exists"
 OF_PAIRS = (*(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)), *SCENE["mesh"])

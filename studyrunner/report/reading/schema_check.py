@@ -13,11 +13,13 @@ from contextlib import contextmanager
 import numpy as np
 import xarray as xr
 
+from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS
 from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
 from studyrunner.study.toml_text import NoTomlError, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
-from studyrunner.variables import ASKED, CERTIFICATE, COORDINATES, COUNTS, KEPT, LOOPS, SCENE, Variable
+from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, KEPT, LOOPS, Variable
 
 MOST_POINTS = 10**6
 """Largest number of points of a study."""
@@ -32,6 +34,9 @@ _INFINITE = (
     "error_estimate",
     "worn_volume_error",
     "cycle_count",
+    "block_worn_volume_error",
+    "missions_to_target_error",
+    "response_error",
     *CERTIFICATE,
 )
 _MOST_INPUTS, _MOST_DRAWN = 100, 2**24  # inputs that scatter, values of one of them
@@ -45,8 +50,7 @@ _WITHOUT_AXES = {name: entry for table in ("mesh", "natural_frequency") for name
 _WITH_AXES = ASKED | KEPT | LOOPS | COUNTS | SCENE["exact"]
 _OF_CONTACTS = {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
 _ATTRIBUTES = {"units": _LONGEST_NAME, "long_name": _LONGEST_SENTENCE, "flag_meanings": _LONGEST_TEXT}
-_TEXTS = ("scheme", "sweep", "response", "component")
-_NEEDED = ("outcome", "cycle", "contact")
+_TEXTS = ("scheme", "sweep", "response", "component", "block")
 
 
 def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
@@ -64,16 +68,19 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
     UserError
         Where a needed variable is missing or has a wrong shape or type.
     """
-    lacking = [name for name in _NEEDED if name not in dataset.variables]
+    slow = slow_dimension(dataset)
+    lacking = [name for name in ("outcome", slow, "contact") if name not in dataset.variables]
     if lacking:
         raise UserError(source, "OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
     axes = tuple(map(str, dataset["outcome"].dims))
-    with_axes = OF_MODES | OF_A_MODE_POINT if "modal_amplitude" in axes else _WITH_AXES
+    with_axes = OF_MISSIONS | OF_A_MISSION if slow == "mission" else _WITH_AXES
+    if "modal_amplitude" in axes:
+        with_axes = OF_MODES | OF_A_MODE_POINT
     without_axes = {name: entry for name, entry in _WITHOUT_AXES.items() if name not in with_axes}
     if not math.prod(dataset["outcome"].shape):
         raise UserError(source, "OUT.nc", None, f"holds no point; {_REMEDY}")
     try:
-        _check_sizes(dataset, axes)
+        _check_sizes(dataset, (*axes, slow))
         kept = {name: _check_coordinate(dataset, name) for name in _coordinates(dataset, axes)}
         for name, entry in with_axes.items():
             if name in dataset.variables:
@@ -84,7 +91,7 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
                 along = tuple(axis for axis in axes if axis in dataset.variables[name].dims)
                 kept[name] = _check_variable(dataset, name, entry, (*along, *entry.dimensions))
         drawn = {name: _check_drawn(dataset, name, axes) for name in _drawn_names(dataset)}
-        _check_values(kept, axes)
+        _check_values(kept, axes, slow)
     except _WrongError as wrong:
         raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
     names = set(_OF_CONTACTS) | set(_coordinates(dataset, axes))
@@ -96,6 +103,11 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
     checked.set_close(dataset.close)
     study_tables(checked.attrs, source)
     return checked
+
+
+def slow_dimension(dataset: xr.Dataset) -> str:
+    """Name of the dimension of slow time: "mission" in a result of missions, else "cycle"."""
+    return "mission" if "mission" in dataset.dims else "cycle"
 
 
 def check_numbers(dataset: xr.Dataset, source: str) -> None:
@@ -170,20 +182,22 @@ def _coordinates(dataset: xr.Dataset, axes: Sequence[str]) -> list[str]:
     return [*axes, *(name for name in others if name in dataset.variables and name in dataset.dims)]
 
 
-def _check_sizes(dataset: xr.Dataset, axes: Sequence[str]) -> None:
+def _check_sizes(dataset: xr.Dataset, names: Sequence[str]) -> None:
+    """names: of the axes, and that of the dimension of slow time."""
+    *axes, slow = names
     if not all(name.isidentifier() and len(name) <= _LONGEST_NAME for name in axes):
         raise _WrongError("outcome", "axes with unusual names")
     sizes = {str(name): size for name, size in dataset.sizes.items()}
-    for name in (*axes, "cycle", "contact"):
+    for name in (*names, "contact"):
         if not sizes.get(name, 0):
             raise _WrongError(name, "no values")
     for name in sizes:
         if (name in COORDINATES or name in axes) and sizes[name] > _MOST_NAMES:
             raise _WrongError(name, f"{sizes[name]} values")
     n_points = math.prod(sizes[name] for name in axes)
-    n_values = n_points * sizes["cycle"] * sizes.get("response", 1)
+    n_values = n_points * sizes[slow] * sizes.get("response", 1) * (sizes.get("block", 1) if slow == "mission" else 1)
     if n_points > MOST_POINTS or n_values > _MOST_VALUES:
-        raise _WrongError("outcome", f"{n_points} points, {sizes['cycle']} cycle counts")
+        raise _WrongError("outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
 
 
 def _check_coordinate(dataset: xr.Dataset, name: str) -> xr.Variable:
@@ -255,12 +269,12 @@ def _check_variable(dataset: xr.Dataset, name: str, entry: Variable, dimensions:
     return variable
 
 
-def _check_values(kept: Mapping[str, xr.Variable], axes: Sequence[str]) -> None:
-    """Tests the values that lead to other values: cycles, pairs, flags and mesh."""
+def _check_values(kept: Mapping[str, xr.Variable], axes: Sequence[str], slow: str) -> None:
+    """Tests the values that lead to other values: cycles or missions, pairs, flags and mesh."""
     # worn joints whose modes are sought stand in any order
-    cycles = np.sort(kept["cycle"].values) if "cycle" in axes else kept["cycle"].values
+    cycles = np.sort(kept[slow].values) if slow in axes else kept[slow].values
     if cycles.dtype.kind not in "iuf" or cycles[0] < 0 or (np.diff(cycles) <= 0).any():
-        raise _WrongError("cycle", "no counts in ascending order")
+        raise _WrongError(slow, "no counts in ascending order")
     pairs = kept["contact"].values
     if pairs.dtype.kind not in "iu" or len(set(pairs.tolist())) < pairs.size:
         raise _WrongError("contact", "no whole numbers that differ")

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from studyrunner.variables import COORDINATES
+from studyrunner.coordinates import COORDINATES
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,15 @@ _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
         (1e-17, 1e12, "mm³ per kcycle"),
         (0.0, 1e18, "µm³ per cycle"),
     ),
+    "m3 per mission": (
+        (1e-4, 1.0, "m³ per mission"),
+        (1e-13, 1e9, "mm³ per mission"),
+        (0.0, 1e18, "µm³ per mission"),
+    ),
     "Pa": ((2e9, 1e-9, "GPa"), (0.1e6, 1e-6, "MPa"), (100.0, 1e-3, "kPa"), (0.0, 1.0, "Pa")),
     "N": ((5e3, 1e-3, "kN"), (0.1, 1.0, "N"), (0.0, 1e3, "mN")),
     "cycles": ((5e6, 1e-6, "Mcycles"), (5e3, 1e-3, "kcycles"), (0.0, 1.0, "cycles")),
+    "missions": ((0.0, 1.0, "missions"),),
     "Hz": ((0.0, 1.0, "Hz"),),
     "m kg^0.5": ((0.0, 1.0, "m√kg"),),
     "rad": ((0.0, 180.0 / np.pi, "°"),),
@@ -93,11 +99,13 @@ def show_number(value: float, digits: int = 6) -> str:
     return text
 
 
-def show_cycles(value: float) -> str:
-    """A cycle count in words: in whole numbers as it is, else in four digits; infinite, the final state."""
+def show_cycles(value: float, counted: str = "cycles") -> str:
+    """A count of cycles, or of missions, in words: in whole numbers as it is, else in four digits; infinite, the final
+    state.
+    """
     if value == np.inf:
         return "the final state"
-    return f"{show_number(value, 4)} cycle" + ("" if value == 1 else "s")
+    return f"{show_number(value, 4)} {counted.removesuffix('s') if value == 1 else counted}"
 
 
 def units_of(axis: xr.DataArray) -> str:

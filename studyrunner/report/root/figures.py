@@ -27,8 +27,8 @@ from studyrunner.report.root.views import View, find_views
 
 _MOST_CLOSE_UPS = 2
 _MOST_NUMBERS = 120
-MOST_PAIRS = 20_000
-MOST_FACES = 60_000
+_MOST_PAIRS = 20_000
+_MOST_FACES = 60_000
 NO_DEPTH = 1e-15
 """m. A depth below this is round-off: it is far less than an atom."""
 
@@ -36,13 +36,11 @@ NO_DEPTH = 1e-15
 def draw_root(result: Result) -> Iterator[Drawing | Missing]:
     """Worn shape of the shown point, numbers of the pairs, and the whole disk.
 
-    Nothing where there are no positions, or more pairs than can be told from each other.
+    Nothing where `find_root` finds none.
     """
-    surface = read_root(result) if result.dataset.sizes["contact"] <= MOST_PAIRS else None
+    surface, views = find_root(result)
     if surface is None:
         return
-    surface = simplify(surface, MOST_FACES)
-    views = find_views(result, surface)
     state = _find_state(result)
     if state is not None:
         yield draw_state(result, surface, views, state)
@@ -50,6 +48,15 @@ def draw_root(result: Result) -> Iterator[Drawing | Missing]:
     disk = build_disk(result, surface)
     if disk is not None:
         yield disk
+
+
+def find_root(result: Result) -> tuple[RootSurface | None, tuple[View, ...]]:
+    """The surface as it is drawn, and from where; None without positions, or with too many pairs to tell."""
+    surface = read_root(result) if result.dataset.sizes["contact"] <= _MOST_PAIRS else None
+    if surface is None:
+        return None, ()
+    surface = simplify(surface, _MOST_FACES)
+    return surface, find_views(result, surface)
 
 
 @dataclass(frozen=True)

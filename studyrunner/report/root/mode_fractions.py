@@ -9,10 +9,7 @@ import numpy as np
 from studyrunner.report.drawing import Drawing, Missing
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import scale_for
-from studyrunner.report.root.figures import MOST_FACES, MOST_PAIRS, State, draw_numbers, paint_state
-from studyrunner.report.root.simplified import simplify
-from studyrunner.report.root.surface import read_root
-from studyrunner.report.root.views import find_views
+from studyrunner.report.root.figures import State, draw_numbers, find_root, paint_state
 
 _TITLES = {"slip_fraction": "Where the joint slips", "open_fraction": "Where the joint opens"}
 
@@ -20,13 +17,11 @@ _TITLES = {"slip_fraction": "Where the joint slips", "open_fraction": "Where the
 def draw_mode_fractions(result: Result) -> Iterator[Drawing | Missing]:
     """Fractions of the period in which pairs slip and are open, at the shown point: a large amplitude.
 
-    Nothing where there are no positions, or more pairs than can be told from each other.
+    Nothing where `find_root` finds none.
     """
-    surface = read_root(result) if result.dataset.sizes["contact"] <= MOST_PAIRS else None
+    surface, views = find_root(result)
     if surface is None:
         return
-    surface = simplify(surface, MOST_FACES)
-    views = find_views(result, surface)
     point = result.shown_point()
     for name, title in _TITLES.items():
         if not result.has(name):

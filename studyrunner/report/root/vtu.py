@@ -119,5 +119,5 @@ def _tell(result: Result, surface: RootSurface) -> str:
     """What the series is, in a line of XML comment, in which two hyphens must not meet."""
     bodies = ", ".join(f"{number} {name}" for number, name in enumerate(surface.bodies))
     flanks = ", ".join(f"{number} {name}" for number, name in enumerate(surface.flanks))
-    text = f"{result.title}; {result.describe(result.shown_point(), result.axes)}; time: cycles"
+    text = f"{result.title}; {result.describe(result.shown_point(), result.axes)}; time: {result.counted}"
     return f" {text}; body: {bodies}; contact_surface: {flanks} ".replace("--", "- -")

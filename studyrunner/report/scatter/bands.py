@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS, Drawing, add_legend, set_from_zero
 from studyrunner.report.figures.frequency_course import Course
+from studyrunner.report.figures.volume import slow_time
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.report.scatter.points import HIGHEST, LOWEST, Shown, choose_points, ends, largest, last_of, panel_grid
@@ -27,7 +28,7 @@ def draw_over_cycles(result: Result, statistics: xr.Dataset) -> Drawing:
     """5, 25, 50, 75 and 95 % of the samples over the cycles, one panel a combination of the other axes."""
     shown = choose_points(result, statistics)
     counts = statistics["cycle"].values.astype(float)
-    cycles = scale_for("cycles", counts)
+    cycles = scale_for(result.counted, counts)
     volumes = [ends(point, _NAME, "cycle", "quantile") for point in shown.statistics]
     scale = scale_for("m3", *(each[..., LOWEST] for each in volumes))
     figure, panels = panel_grid(len(volumes), 3.0, sharex=True, sharey=True)
@@ -35,17 +36,17 @@ def draw_over_cycles(result: Result, statistics: xr.Dataset) -> Drawing:
         _draw_bands(panel, cycles(counts), point, "cycle", scale)
         panel.set_title(label)
     for panel in panels[-1]:
-        panel.set_xlabel(cycles.label("vibration cycles"))
+        panel.set_xlabel(cycles.label(slow_time(result)))
     _set_axes(panels, cycles(counts), scale, _highest(volumes, shown, "cycle"))
     add_legend(figure)
     text = as_sentences(
-        f"Worn volume of {count(int(statistics['n_samples']), 'sample')} over cycles: so much is worn at most in 5, 25,"
-        " 50, 75 and 95 % of them",
+        f"Worn volume of {count(int(statistics['n_samples']), 'sample')} over {result.counted}: so much is worn at most"
+        " in 5, 25, 50, 75 and 95 % of them",
         *_tell_last(shown, scale),
         *_tell_marks(shown, "cycle"),
         shown.sentence,
     )
-    return Drawing("worn_volume_bands", "Worn volume of the samples over cycles", text, figure)
+    return Drawing("worn_volume_bands", f"Worn volume of the samples over {result.counted}", text, figure)
 
 
 def draw_over_course(result: Result, statistics: xr.Dataset, course: Course) -> Drawing:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import new_panels
+from studyrunner.report.reading.choice import choose
 from studyrunner.report.reading.result import Point, Result
 from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
 
@@ -38,7 +39,7 @@ def choose_points(
     result: Result, statistics: xr.Dataset, free: Collection[str] = (), limit: int = MOST_PANELS
 ) -> Shown:
     """Combinations of the axes beside samples and `free`, at most `limit`; that of the shown point is among them."""
-    choice = result.choose([SAMPLE, *free], limit)
+    choice = choose(result, [SAMPLE, *free], limit)
     found = tuple(statistics_at(statistics, point) for point in choice.points)
     return Shown(choice.points, choice.labels, found, choice.sentence)
 

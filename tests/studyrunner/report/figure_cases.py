@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from studyrunner.coordinates import COORDINATES
 from studyrunner.report.reading.result import Result
-from studyrunner.variables import ASKED, COORDINATES, KEPT
+from studyrunner.variables import ASKED, KEPT
 
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
 WORDS = ("not_computed", "converged", "static_failed", "branch_lost", "inaccurate", "sensitive")

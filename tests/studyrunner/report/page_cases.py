@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from studyrunner.coordinates import COORDINATES
 from studyrunner.report.reading.result import Result, open_for_report
-from studyrunner.variables import ASKED, COORDINATES, KEPT, USUAL
+from studyrunner.variables import ASKED, KEPT, USUAL
 
 FAILED = 4
 SENTENCES = ("The point was computed to the end.", "one", "two", "three", "A step did not converge: <b>use</b> less.")

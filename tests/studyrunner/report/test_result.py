@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from studyrunner.report.reading.choice import choose
 from studyrunner.report.reading.result import open_for_report
 from studyrunner.report.reading.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.user_error import UserError
@@ -65,7 +66,7 @@ def test_the_shown_point_wears_most_of_those_to_be_trusted() -> None:
 
 
 def test_combinations_within_the_limit_are_all_chosen() -> None:
-    choice = make_result(sweep=["up", "down"]).choose(["frequency"], 4)
+    choice = choose(make_result(sweep=["up", "down"]), ["frequency"], 4)
     assert choice.labels == (
         "implicit scheme, sweep up",
         "implicit scheme, sweep down",

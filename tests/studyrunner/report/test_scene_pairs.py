@@ -14,6 +14,7 @@ from studyrunner.report.drawing import style
 from studyrunner.report.figures.flank import draw_flanks
 from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.maps import LAST_DEPTH
+from studyrunner.report.reading.choice import choose
 from studyrunner.report.reading.flanks import find_flanks
 from studyrunner.report.reading.result import Result
 from studyrunner.report.reading.scene_pairs import last_depth, of_scene, of_shown_scene
@@ -57,7 +58,7 @@ def test_a_scene_has_its_own_pairs(meshes: Result) -> None:
 def test_axes_of_the_scene_are_named_with_their_unit(meshes: Result) -> None:
     shown = of_shown_scene(meshes)
     assert "rpm, mesh 1" in shown.describe(shown.shown_point())
-    choice = shown.choose([], 4)
+    choice = choose(shown, [], 4)
     assert choice.sentence == "Shown for mesh 1; the file also holds 1 other value of mesh."
 
 

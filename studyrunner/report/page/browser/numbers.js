@@ -91,7 +91,7 @@ const countText = (point, cycle) => (countAt(point, cycle) === Infinity ? "final
 function cycleText(cycle) {
   const count = countAt(state.point, cycle);
   if (Number.isNaN(count)) return `output ${cycles[cycle]}`;
-  return count === Infinity ? "the final state" : `cycle ${digits(count)}`;
+  return count === Infinity ? "the final state" : `${data.counted} ${digits(count)}`;
 }
 
 // Why nothing is known of a point at an output.

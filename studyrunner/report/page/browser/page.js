@@ -10,7 +10,7 @@ function readout() {
   const rows = [];
   // The other axes have one value, which the table of the study tells.
   varying.forEach((axis) => rows.push([`axis ${axes[axis].label}`, axes[axis].label, axisText(axis, found[axis])]));
-  rows.push(["cycle", "cycle", countText(point, cycle)]);
+  rows.push(["cycle", data.counted, countText(point, cycle)]);
   for (const entry of scatter ? scatter.inputs : []) {
     if (entry.values.length === sizes[scatter.axis] || rowOf(found) >= 0) rows.push([`drawn ${entry.label}`, `${entry.label}, drawn`, show(entry, drawnValue(entry, found))]);
   }
@@ -122,6 +122,8 @@ function prepare() {
   byId("loop-part").hidden = !loops;
   byId("course-part").hidden = cycles.length < 2 || data.without.length === data.outcome.length || !(courses.worn_volume || courses.wear_rate);
   byId("course-part").classList.toggle("wide", Boolean(maps) && !loops);
+  document.querySelector("label[for=cycle]").textContent = data.counted;
+  byId("course-title").textContent = `Wear over the ${data.counted}s`;
   const slider = byId("cycle");
   slider.max = String(cycles.length - 1);
   slider.hidden = cycles.length < 2;

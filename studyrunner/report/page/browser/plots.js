@@ -159,7 +159,7 @@ function drawCourse() {
     }
     traces.push({
       ...place, x: across, y: values, mode: cycles.length > 1 && !leaps ? "lines" : "markers", showlegend: false, meta: name, name: title,
-      line: { color: data.colours[0], width: 2 }, marker: { color: data.colours[0], size: 10 }, hovertemplate: `${leaps ? "" : "cycle %{x}<br>"}${title} %{y:.4~g} ${plain(entry.unit)}<extra></extra>`,
+      line: { color: data.colours[0], width: 2 }, marker: { color: data.colours[0], size: 10 }, hovertemplate: `${leaps ? "" : `${data.counted} %{x}<br>`}${title} %{y:.4~g} ${plain(entry.unit)}<extra></extra>`,
     });
     if (name === "worn_volume" && courses.exact_worn_volume) {
       traces.push({ ...place, x: across, y: scaled("exact_worn_volume"), mode: "lines", name: "exact", meta: "exact",
@@ -170,7 +170,7 @@ function drawCourse() {
       marker: { symbol: "circle-open", size: 13, color: "#000", line: { width: 2.5 } }, cliponaxis: false, meta: "picked",
     });
     const alone = beside || i === panels.length - 1;
-    shape[`xaxis${suffix}`] = axisLayout(alone && !leaps ? "cycles" : "", {
+    shape[`xaxis${suffix}`] = axisLayout(alone && !leaps ? `${data.counted}s` : "", {
       ...ticks, anchor: `y${suffix}`, domain: beside ? domains[i] : [0, 1], showticklabels: alone, ...(i && !beside ? { matches: "x" } : {}),
     });
     shape[`yaxis${suffix}`] = axisLayout("", {

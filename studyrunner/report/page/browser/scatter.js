@@ -102,7 +102,7 @@ function drawBands(row, picked) {
   const axis = axes[data.horizontal];
   Plotly.react("band-plot", traces, layout({
     height: 380, uirevision: `${row} ${scattered.along}`, legend: LEGEND, showlegend: true,
-    xaxis: axisLayout(scattered.along ? titled(axis.label, axis.unit) : "cycles"), yaxis: axisLayout("", { ...upright("worn volume", scatter.unit), range: [0, roof] }),
+    xaxis: axisLayout(scattered.along ? titled(axis.label, axis.unit) : `${data.counted}s`), yaxis: axisLayout("", { ...upright("worn volume", scatter.unit), range: [0, roof] }),
   }), CONFIG);
 }
 
@@ -165,7 +165,7 @@ function prepareScatter() {
   addChoice("scatter-choice", "scatter input", "over", scatter.inputs.map((entry) => entry.label), scattered.input, choose("input"));
   const axis = axes[data.horizontal];
   const overCourse = sizes[data.horizontal] > 1 && data.horizontal !== scatter.axis && !axis.words;
-  addChoice("band-choice", "band along", "over", ["cycles", ...(overCourse ? [`${axis.label}, last count`] : [])], 0, choose("along"));
+  addChoice("band-choice", "band along", "over", [`${data.counted}s`, ...(overCourse ? [`${axis.label}, last count`] : [])], 0, choose("along"));
   addChoice("exceedance-choice", "exceedance of", "probability of more", scatter.exceedances.map((entry) => entry.label), 0, choose("exceeded"));
   byId("scatter-hint").textContent = TOUCH ? "Touch a sample to pick it." : "Click a sample to pick it: its root, its maps and its numbers are shown.";
 }

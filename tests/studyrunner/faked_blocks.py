@@ -1,0 +1,85 @@
+"""Blocks of missions whose wear follows a formula, in place of their harmonic balance; and a study of such blocks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from solver.missions import solutions
+from solver.missions.block_run import BlockRun
+from solver.missions.blocks import Passage
+from solver.outcome import Outcome
+from solver.wear.solutions import Like
+from solver.wear.state import Failure
+
+STUDY = """
+[study]
+name = "slider_missions"
+[scene]
+model = "sdof_slider"
+[axes]
+frequency = [160, 161]
+wear_coefficient = [1e-11, 2e-11]
+sweep = ["up", "down"]
+[slow_time]
+missions = 300
+outputs = 4
+[[mission]]
+name = "run-up"
+frequency = {start = 150, stop = 170, rate = 1.0}
+excitation_amplitude = 10.0
+[[mission]]
+name = "cruise"
+begin = "sweep"
+seconds = 10
+[[mission]]
+name = "heavy"
+normal_load = 12.0
+frequency = 155.0
+excitation_amplitude = 14.0
+cycles = 1000
+"""
+
+_DEPTH = 1e-3
+"""Depth, m, at which nothing would wear any more."""
+
+
+class FakedBlocks:
+    """Stands for `run_block` and `run_passage`. flown: cases so far. disturb: called with the number of each."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.flown: list[Any] = []
+        self.fails: dict[str, Outcome] = {}
+        self.disturb: Any = lambda _: None
+        for name in ("run_block", "run_passage"):
+            monkeypatch.setattr(solutions, name, self.run)
+
+    def run(self, case: Any, like: Any = None) -> BlockRun:
+        """Wear with the rate k_w P A (1 - W / _DEPTH); the reference solution wears by 0.1 % more."""
+        self.disturb(len(self.flown))
+        self.flown.append(case)
+        block, contact = case.block, case.block.model.contact
+        cycles = block.frequency.cycles if isinstance(block.frequency, Passage) else block.cycles
+        counts = np.array(case.missions) * cycles
+        rate = case.mission.wear_coefficient * block.excitation_amplitude * load_of(block) * block.ends[1] * 1e-5
+        rate = rate * (1.0 if like is None else 1.001) * (1.0 - (case.depth + contact.gap) / _DEPTH)
+        growth = counts[:, None] * rate
+        response = 1e-6 * block.excitation_amplitude * (1.0 + case.depth.sum() + counts[:, None] / counts.max())
+        ended = Failure(self.fails.get(block.name, Outcome.CONVERGED), "")
+        return BlockRun(
+            case.missions, growth, response.astype(complex), 1.5 * response, np.full(len(counts), 1e-3), ended, rate,
+            like=Like((), 1.0, 1), iterations=7,
+        )  # fmt: skip
+
+
+def load_of(block: Any) -> float:
+    """Static load of the model of a block, N."""
+    return float(np.abs(block.model.linear[0].load_static).max())
+
+
+@pytest.fixture
+def blocks(monkeypatch: pytest.MonkeyPatch) -> FakedBlocks:
+    """Stands for the blocks in all runs of a test."""
+    return FakedBlocks(monkeypatch)

@@ -1,0 +1,110 @@
+"""Report, page, statistics and joined results of missions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from solver.outcome import Outcome
+from studyrunner.accessor import join_results
+from studyrunner.api import run_study
+from studyrunner.report.cli import main
+from studyrunner.report.drawing import Drawing, Missing, Table
+from studyrunner.report.page_contents import draw_report
+from studyrunner.report.reading.result import Result, open_for_report
+from tests.studyrunner.faked_blocks import STUDY, FakedBlocks
+
+pytestmark = pytest.mark.slow
+
+ONE = {"axes.frequency": 160, "axes.sweep": "up", "axes.wear_coefficient": 1e-11}
+SCATTER = {"samples": 8, "friction_coefficient": {"normal": {"std": 0.03}}, "normal_load": {"normal": {"std": 0.5}}}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with results of one point, of a grid in which a block fails for some, and of samples."""
+    folder = tmp_path_factory.mktemp("missions")
+    study = folder / "missions.toml"
+    study.write_text(STUDY, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        blocks = FakedBlocks(patch)
+        for name, overrides in {
+            "one": ONE,
+            "grid": {"axes.sweep": "up"},
+            "scatter": {**ONE, "scatter": SCATTER},
+        }.items():
+            run_study(study, folder / f"{name}.nc", overrides=overrides, progress=False).close()
+        blocks.fails["cruise"] = Outcome.START_FAILED
+        run_study(study, folder / "failed.nc", overrides=ONE, progress=False).close()
+    return folder
+
+
+def items(result: Result) -> dict[str, Drawing | Missing | Table]:
+    return {item.name: item for item in draw_report(result)}
+
+
+def test_the_report_tells_of_missions_and_blocks(results: Path) -> None:
+    result = open_for_report(results / "grid.nc")
+    found = items(result)
+    drawn = {name for name, item in found.items() if isinstance(item, Drawing)}
+    assert {"block_shares", "block_responses", "worn_volume", "worn_volume_map", "final_worn_volume", "trends"} <= drawn
+    for item in found.values():
+        text = item.caption if isinstance(item, Drawing) else item.title
+        assert "cycle" not in text.replace("cycles of one mission", ""), text
+    table = found["blocks"]
+    assert isinstance(table, Table)
+    assert [row[:3] for row in table.rows] == [
+        ("run-up", "150 to 170", "3200"),
+        ("cruise", "161", "1610"),
+        ("heavy", "155", "1000"),
+    ]
+    shares = found["block_shares"]
+    assert isinstance(shares, Drawing)
+    _, below = shares.figure.axes
+    with xr.open_dataset(results / "grid.nc") as dataset:
+        worst = dataset.isel(excitation_amplitude=0, sweep=0).sel(frequency=161.0, wear_coefficient=2e-11)
+        for line, name in zip(below.get_lines(), worst.block.values, strict=True):
+            assert line.get_label() == name
+            np.testing.assert_array_equal(line.get_xdata(), worst.mission)
+            np.testing.assert_allclose(line.get_ydata(), 1e9 * worst.block_worn_volume.sel(block=name))
+
+
+@pytest.mark.parametrize("name", ["grid", "scatter", "failed"])
+def test_page_and_files_for_paraview_are_written(
+    results: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(results / f"{name}.nc"), "-o", str(tmp_path / name)]) == 0, capsys.readouterr().err
+    page = (tmp_path / name / "index.html").read_text(encoding="utf-8")
+    assert "run-up, cruise, heavy" in page
+    assert '"counted":"mission"' in page.replace(" ", "")
+
+
+def test_missing_variables_are_named(results: Path) -> None:
+    result = open_for_report(results / "one.nc")
+    assert result.blocks is not None
+    blocks = result.blocks.drop_vars(["block_share", "response_amplitude"])
+    found = items(Result(result.path, result.dataset, blocks=blocks))
+    assert "block_shares" not in found
+    assert isinstance(found["blocks"], Missing)
+
+
+def test_samples_of_missions_have_statistics(results: Path) -> None:
+    with xr.open_dataset(results / "scatter.nc") as dataset:
+        statistics = dataset.fretwear.worn_volume_statistics([0.5])
+        assert statistics.worn_volume_mean.dims[-2:] == ("mission", "bound")
+        mean = statistics.worn_volume_mean.isel(mission=-1, bound=0).squeeze()
+        assert mean == pytest.approx(dataset.worn_volume.isel(mission=-1).mean().item())
+        assert dataset.fretwear.response().dims == dataset.response_amplitude.dims
+
+
+def test_results_of_missions_are_joined(results: Path) -> None:
+    with xr.open_dataset(results / "grid.nc") as dataset:
+        whole = dataset.load()
+    parts = [whole.isel(frequency=[place]) for place in (1, 0)]
+    joined = join_results(parts)
+    for name in ("worn_volume", "block_worn_volume", "excitation_frequency", "outcome"):
+        xr.testing.assert_equal(joined[name].sel(frequency=whole.frequency), whole[name])
+    assert joined.block.values.tolist() == ["run-up", "cruise", "heavy"]
