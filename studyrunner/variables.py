@@ -131,7 +131,7 @@ ASKED = {
         ("cycle",),
         "1",
         "estimated relative error of the response",
-        comment="Of first harmonic and peak, by harmonics, samples, steps and start state; NaN where it was not estimated.",
+        comment="First harmonic and peak, by harmonics, samples, steps and start state; NaN where not estimated.",
     ),
     "wear_rate_error": Variable(
         ("cycle",),
