@@ -130,14 +130,14 @@ ASKED = {
     "response_error": Variable(
         ("cycle",),
         "1",
-        "estimated relative truncation error of the response",
-        comment="Of the first harmonic, by solving again with more of both; NaN where it was not estimated.",
+        "estimated relative error of the response",
+        comment="First harmonic and peak, by harmonics, samples, steps and start state; NaN where not estimated.",
     ),
     "wear_rate_error": Variable(
         ("cycle",),
         "1",
-        "estimated relative truncation error of the wear rate",
-        comment="By solving again with more harmonics and samples; NaN where it was not estimated.",
+        "estimated relative error of the wear rate",
+        comment="By harmonics, samples, steps and start state; NaN where it was not estimated.",
     ),
     "worn_volume_error": Variable(
         ("cycle",),

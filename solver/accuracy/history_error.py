@@ -33,57 +33,69 @@ class Met:
     """Difference of a history and its reference solution at all counts where both were compared.
 
     cycles (n,): ascending counts.
-    differences (n,): sum over all pairs of area times difference of depth, m3; NaN beyond the end of the reference
-        solution.
+    differences (n, ...): of the worn volume, m3, the depths, m, or a relative difference; NaN beyond the end of the
+        reference solution.
     """
 
     cycles: FloatArray
     differences: FloatArray
 
     def largest_before(self, counts: FloatArray) -> FloatArray:
-        """Largest difference (n_output,), m3, from `crossing_window` times each count up to this count; 0 if none.
+        """Largest difference (n_output, ...) from `crossing_window` times each count up to this count; 0 if none.
 
         Two histories in which an event happens at different counts cross each other. At the crossing their difference
         is small and is no measure of the error.
         """
-        known = np.isfinite(self.differences)
+        known = np.isfinite(self.differences).all(axis=tuple(range(1, self.differences.ndim)))
         at, differences = self.cycles[known], self.differences[known]
         first = np.searchsorted(at, ACCURACY.crossing_window * counts, "left")
         last = np.searchsorted(at, counts, "right")
-        return np.array([differences[one:other].max(initial=0.0) for one, other in zip(first, last, strict=True)])
+        return np.array([
+            differences[one:other].max(axis=0, initial=0.0) for one, other in zip(first, last, strict=True)
+        ])  # fmt: skip
 
 
-def history_error(
-    counts: FloatArray,
-    fine: Mapping[str, Any],
-    reference: Mapping[str, Any],
-    met: Met,
-    area: FloatArray,
-    scheme: Scheme,
-) -> HistoryError:
+@dataclass(frozen=True)
+class Both:
+    """Values of a history and of its reference solution at equal counts.
+
+    counts (n,): ascending.
+    fine, reference: values by name as from `solver.wear.output.DenseOutput.read`; the reference has NaN beyond its end.
+    """
+
+    counts: FloatArray
+    fine: Mapping[str, Any]
+    reference: Mapping[str, Any]
+
+
+def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) -> HistoryError:
     """Errors of a history.
 
     Parameters
     ----------
-    counts
-        (n_output,), ascending, the first 0.
-    fine, reference
-        Values of both solutions at the counts, from `solver.wear.output.DenseOutput.read`.
-    met
-        Differences of both solutions at more counts.
+    outputs
+        Both solutions at the counts to report, the first 0.
+    steps
+        Both solutions at the ends of the steps: depths, responses and wear rates.
     area
         (n_contact,), m2.
     scheme
         Scheme of the history.
     """
+    counts, fine, reference = outputs.counts, outputs.fine, outputs.reference
+    safety = ACCURACY.history_safety
+
+    def crossing(differences: FloatArray) -> FloatArray:
+        return safety * Met(steps.counts, differences).largest_before(counts)
+
     depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
-    difference = ACCURACY.history_safety * np.abs(depth - reference["wear_depth"])
-    error = np.fmax(difference @ area, ACCURACY.history_safety * met.largest_before(counts))
+    difference, apart = safety * _depth_change(outputs), _depth_change(steps)
+    error = np.fmax(difference @ area, crossing(apart @ area))
     # the error of the start state remains, even where later states agree by chance
     at_start = np.fmax(_start_error(fine, reference, area), fine["wear_rate_error"][0])
     error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume)
     # the local errors of Euler steps have one sign and add up
-    error = np.fmax(error, (1.0 if scheme == "adaptive" else ACCURACY.history_safety) * fine["local"])
+    error = np.fmax(error, (1.0 if scheme == "adaptive" else safety) * fine["local"])
     reached = np.isfinite(volume)
     unknown = reached & ~np.isfinite(difference).all(axis=1)
     relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
@@ -92,15 +104,15 @@ def history_error(
     # the rest of the error of the volume is shared by the pairs in proportion to their depth
     rest = relative - np.divide(difference @ area, volume, out=np.zeros_like(volume), where=volume > 0.0)
     with np.errstate(invalid="ignore"):
-        of_pairs = difference + np.where(depth > 0.0, rest[:, None] * depth, 0.0)
+        of_pairs = np.fmax(difference + np.where(depth > 0.0, rest[:, None] * depth, 0.0), crossing(apart))
     of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
     # an unworn state has errors of its own, from states with more harmonics
     unworn = (counts == 0.0) | (volume <= 0.0)
     response, rate = (
-        np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], apart)))
-        for name, apart in (
-            ("response_error", _response_change(fine, reference)),
-            ("wear_rate_error", _rate_change(fine, reference)),
+        np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], larger)))
+        for name, larger in (
+            ("response_error", np.fmax(safety * _response_change(outputs), crossing(_response_change(steps)))),
+            ("wear_rate_error", np.fmax(safety * _rate_change(outputs), crossing(_rate_change(steps)))),
         )
     )
     return HistoryError(relative, of_pairs, response, rate)
@@ -113,17 +125,22 @@ def _start_error(fine: Mapping[str, Any], reference: Mapping[str, Any], area: Fl
     return float(np.abs(rate - other).sum()) / whole if whole > 0.0 and np.isfinite(other).all() else 0.0
 
 
-def _response_change(fine: Mapping[str, Any], reference: Mapping[str, Any]) -> FloatArray:
-    """Relative difference (n_output,) of the responses: the larger one of first harmonic and peak."""
-    found = np.zeros(len(fine["response"]))
+def _depth_change(both: Both) -> FloatArray:
+    """Difference (n, n_contact) of the depths, m."""
+    return np.asarray(np.abs(both.fine["wear_depth"] - both.reference["wear_depth"]))
+
+
+def _response_change(both: Both) -> FloatArray:
+    """Relative difference (n,) of the responses: the larger one of first harmonic and peak."""
+    found = np.zeros(len(both.counts))
     for name in ("response", "response_peak"):
-        size = np.linalg.norm(fine[name], axis=1)
-        apart = np.linalg.norm(fine[name] - reference[name], axis=1)
+        size = np.linalg.norm(both.fine[name], axis=1)
+        apart = np.linalg.norm(both.fine[name] - both.reference[name], axis=1)
         found = np.fmax(found, np.divide(apart, size, out=np.zeros_like(size), where=size > 0.0))
     return found
 
 
-def _rate_change(fine: Mapping[str, Any], reference: Mapping[str, Any]) -> FloatArray:
-    """Relative difference (n_output,) of the wear rates."""
-    rate, other = fine["wear_rate"], reference["wear_rate"]
+def _rate_change(both: Both) -> FloatArray:
+    """Relative difference (n,) of the wear rates."""
+    rate, other = both.fine["wear_rate"], both.reference["wear_rate"]
     return np.asarray(np.divide(np.abs(rate - other), rate, out=np.zeros_like(rate), where=rate > 0.0))

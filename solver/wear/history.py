@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.accuracy.history_error import Met, history_error
+from solver.accuracy.history_error import Both, history_error
 from solver.accuracy.options import ACCURACY
 from solver.model import FloatArray, ReducedModel
 from solver.options import COMMON
@@ -87,8 +87,8 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
     coarse = None if reference is None else solutions.output_of_reference(reference)
     other = _read_or_nan(coarse, counts, own)
     at_steps = np.array(course.cycles)
-    apart = _read_or_nan(coarse, at_steps, own)["wear_depth"] - np.array(course.depths)
-    error = history_error(counts, own, other, Met(at_steps, np.abs(apart) @ area), area, asked.scheme)
+    steps = Both(at_steps, course.values(), _read_or_nan(coarse, at_steps, own))
+    error = history_error(Both(counts, own, other), steps, area, asked.scheme)
     volume = own["wear_depth"] @ area
     reached = np.flatnonzero(np.isfinite(volume))
     last, target, worst = course.ends[-1], fine.output.reached, state.worst

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.model import BoolArray, FloatArray
+from solver.model import BoolArray, ComplexArray, FloatArray
 from solver.packing import packable
 from solver.results.loops import LOOP_PHASES
 from solver.results.state_report import StateReport
@@ -70,6 +70,7 @@ class Course:
     cycles (n,): counts at the ends of steps, thinned where the steps are many.
     depths (n, n_contact): depths at these counts, m.
     rates (n,): wear rates of the joint at these counts, m3 per cycle.
+    responses, peaks (n, n_response): complex first harmonic and largest magnitude at these counts, m.
     resolutions: cycle count from which on a resolution holds, and this resolution.
     """
 
@@ -77,19 +78,28 @@ class Course:
     cycles: tuple[float, ...] = ()
     depths: tuple[FloatArray, ...] = ()
     rates: tuple[float, ...] = ()
+    responses: tuple[ComplexArray, ...] = ()
+    peaks: tuple[FloatArray, ...] = ()
     resolutions: tuple[tuple[float, Resolution], ...] = ()
 
-    def after(self, cycle: float, depth: FloatArray, rate: float, resolution: Resolution) -> Course:
-        """The course with the end of another step."""
+    def after(self, cycle: float, report: StateReport, rate: float) -> Course:
+        """The course with the end of another step; rate: wear rate of the joint, m3 per cycle."""
         kept = slice(0, None, 2 if len(self.cycles) >= WEAR.kept_steps else 1)
-        changed = not self.resolutions or self.resolutions[-1][1] != resolution
+        changed = not self.resolutions or self.resolutions[-1][1] != report.resolution
         return Course(
             ends=(*self.ends, cycle),
             cycles=(*self.cycles[kept], cycle),
-            depths=(*self.depths[kept], depth),
+            depths=(*self.depths[kept], report.wear_depth),
             rates=(*self.rates[kept], rate),
-            resolutions=(*self.resolutions, (cycle, resolution)) if changed else self.resolutions,
+            responses=(*self.responses[kept], report.response),
+            peaks=(*self.peaks[kept], report.response_peak),
+            resolutions=(*self.resolutions, (cycle, report.resolution)) if changed else self.resolutions,
         )
+
+    def values(self) -> dict[str, Any]:
+        """Values at `cycles`, by their names in `DenseOutput.read`; the first axis is that of the counts."""
+        names = {"wear_depth": self.depths, "wear_rate": self.rates, "response": self.responses}
+        return {name: np.array(found) for name, found in (names | {"response_peak": self.peaks}).items()}
 
 
 @packable
@@ -164,7 +174,7 @@ class DenseOutput:
         nodes.append(node)
         if self.counts is None and len(nodes) > WEAR.kept_steps:
             nodes = self._thinned(nodes)
-        course = self.taken.course.after(cycle, report.wear_depth, float(rate @ self.area), report.resolution)
+        course = self.taken.course.after(cycle, report, float(rate @ self.area))
         self.taken = OutputState(tuple(nodes), course, reached)
 
     def _is_read(self, before: float, cycle: float) -> bool:

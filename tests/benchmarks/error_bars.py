@@ -1,13 +1,17 @@
 """Estimated over true errors of worn volumes: bundled dovetail and random small joints, all schemes and steps.
 
     python -m tests.benchmarks.error_bars --mesh 1 2 --random 200
+    python -m tests.benchmarks.error_bars --mesh 1 --diameter 3 7 --frequency -0.25 0.25
+    OPENBLAS_CORETYPE=Nehalem python -m tests.benchmarks.error_bars --mesh 2 --frequency 212 --stuck-modes 30
 
 The truth of a dovetail is the adaptive scheme with a tolerance ten times smaller and harmonics given, from the start
 state of a sweep in steps five times as fine; that of a random joint the same with 13 harmonics for its five: what the
 harmonics of its start state are wrong by is an error, too. What is wanted: at least half the true error everywhere, in
 the median not more than ten times it. Where both are below `FLOOR` of the volume nothing is compared: the truth is not
-known better. `--fixed` takes fixed harmonics instead of automatic ones, and the adaptive scheme alone: with three of
-them a pair of the dovetail at 211.5 Hz locks that slips with five and more.
+known better. The responses are compared on the way, too, and at the end the depths of all pairs that have a tenth of
+the deepest. Frequencies of a travelling wave (`--diameter`) are offsets from the resonance of the glued structure, Hz.
+`--stuck-modes` reduces the structure in another way. `--fixed` takes fixed harmonics instead of automatic ones, and the
+adaptive scheme alone: with three of them a pair of the dovetail at 211.5 Hz locks that slips with five and more.
 
 At 212.5 Hz the truth is one of three. Two pairs of mesh 2 come to rest at 15 000 cycles, or go on by a hair: 0.082 mm3,
 0.094 where one goes on, 0.106 where both do. A sweep with 13 harmonics in steps of 0.02 gives 0.0819; nine harmonics
@@ -20,14 +24,16 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from solver.loading_history import sweep
 from solver.loading_history.start_states import follow_branch
-from solver.model import ReducedModel
+from solver.model import FloatArray, ReducedModel
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
+from tests.benchmarks.travelling_waves import HARMONICS, OFFSETS, glued_resonance
 from tests.solver.models import branch_states, march_wear, random_model, scene
 
 WEAR = 1.1e-11  # 1/Pa
@@ -43,12 +49,22 @@ KINDS = (("3d", "3d"), ("3d", "one_tangent"), ("one_tangent", "one_tangent", "3d
 
 @dataclass(frozen=True)
 class Compared:
-    """One history: its name, its estimated and true error at the end, the smallest ratio of both on the way."""
+    """One history.
+
+    estimated, true: relative error of the worn volume at the end.
+    smallest, response: smallest ratio of estimated and true error on the way, of worn volume and responses.
+    outside, pairs: number of deep pairs whose true error at the end is beyond its estimate, of how many.
+    worst: smallest ratio of estimated and true error of these pairs.
+    """
 
     name: str
     estimated: float
     true: float
     smallest: float
+    response: float
+    outside: int
+    pairs: int
+    worst: float
     seconds: float
 
     def line(self) -> str:
@@ -56,7 +72,7 @@ class Compared:
         ratio = self.estimated / self.true if self.true > 0.0 else float("nan")
         return (
             f"{self.name:<44} {self.estimated:9.2e} {self.true:9.2e} {ratio:7.2f} {self.smallest:7.2f} "
-            f"{self.seconds:6.1f} s"
+            f"{self.response:7.2f} {self.outside:4d} of {self.pairs:2d} {self.worst:6.2f} {self.seconds:6.1f} s"
         )
 
 
@@ -66,16 +82,28 @@ def compare(name: str, history: WearHistory, truth: WearHistory, seconds: float)
     estimated = history.worn_volume_error * history.worn_volume
     # only where something has worn and the truth is known
     last = np.nanmax(truth.worn_volume)
-    seen = (truth.worn_volume > 1e-3 * last) & (true > FLOOR * truth.worn_volume) & np.isfinite(true)
-    ratios = estimated[seen] / true[seen]
-    volume = history.worn_volume[-1]
+    worn = (truth.worn_volume > 1e-3 * last) & np.isfinite(true)
+    moved = np.linalg.norm(history.response - truth.response, axis=1) / np.linalg.norm(truth.response, axis=1)
+    volume, depth = history.worn_volume[-1], truth.wear_depth[-1]
+    deep = (depth > 0.1 * depth.max()) & np.isfinite(history.wear_depth[-1])
+    off = np.abs(history.wear_depth[-1] - depth)[deep]
+    off = np.where(off > FLOOR * depth[deep], off, 0.0)
     return Compared(
         name,
         history.error_estimate,
         float(true[-1] / volume) if volume > 0.0 else 0.0,
-        ratios.min(initial=np.inf),
+        smallest_ratio(estimated, true, worn & (true > FLOOR * truth.worn_volume)),
+        smallest_ratio(history.response_error, moved, worn & (moved > FLOOR)),
+        int((off > history.wear_depth_error[-1][deep]).sum()),
+        int(deep.sum()),
+        smallest_ratio(history.wear_depth_error[-1][deep], off, off > 0.0),
         seconds,
     )
+
+
+def smallest_ratio(estimated: FloatArray, true: FloatArray, seen: np.ndarray) -> float:
+    """Smallest ratio of estimated and true errors where they are seen, inf where none are; all (n,)."""
+    return float((estimated[seen] / true[seen]).min(initial=np.inf))
 
 
 def dovetail_starts(
@@ -93,10 +121,9 @@ def dovetail_starts(
 
 
 def dovetail(
-    mesh: int, steps: tuple[float, ...], frequencies: tuple[float, ...], fixed: tuple[int, ...] = ()
+    title: str, model: ReducedModel, steps: tuple[float, ...], frequencies: tuple[float, ...], fixed: tuple[int, ...]
 ) -> list[Compared]:
-    """All schemes and steps at the frequencies at which the dovetail wears; fixed: harmonics, adaptive scheme alone."""
-    model = scene("dovetail_sector", 13, mesh=mesh)
+    """All schemes and steps at some frequencies, Hz; fixed: harmonics, adaptive scheme alone."""
     cycles = np.linspace(0.0, 1e5, 101)
     runs: list[tuple[Scheme, float]] = [("adaptive", 1e-2)]
     if not fixed:
@@ -107,7 +134,7 @@ def dovetail(
     truths = [march_wear(model, 0.5, start, WEAR, 1000.0, "adaptive", cycles, exact) for start in fine]
     for frequency, truth in zip(frequencies, truths, strict=True):
         print(
-            f"mesh {mesh}, {frequency} Hz: {1e9 * truth.worn_volume[-1]:.5f} mm3, by itself known to "
+            f"{title}, {frequency:.7g} Hz: {1e9 * truth.worn_volume[-1]:.5f} mm3, by itself known to "
             f"{truth.error_estimate:.1e}, {truth.outcome.meaning}",
             flush=True,
         )
@@ -118,7 +145,7 @@ def dovetail(
                 begun = time.thread_time()
                 history = march_wear(model, 0.5, start, WEAR, step, scheme, cycles, settings)
                 name = (
-                    f"mesh {mesh}, H {settings.harmonics}, {frequency} Hz, {scheme} {step:g} {history.outcome.meaning}"
+                    f"{title}, H {settings.harmonics}, {frequency:.7g} Hz, {scheme} {step:g} {history.outcome.meaning}"
                 )
                 compared.append(compare(name, history, truth, time.thread_time() - begun))
                 print(compared[-1].line(), flush=True)
@@ -159,9 +186,12 @@ def summarise(title: str, compared: list[Compared]) -> None:
         return
     worst = min(known, key=lambda one: one.smallest)
     n_low = sum(one.smallest < 0.5 for one in known)
+    moved, outside = min(one.response for one in compared), sum(one.outside for one in compared)
     print(
         f"{title}: {len(known)} histories, ratio at the end in the median {np.median(ratios):.2f}, at least "
-        f"{min(ratios):.2f}; on the way at least {worst.smallest:.2f}; {n_low} below 0.5"
+        f"{min(ratios):.2f}; on the way at least {worst.smallest:.2f}; {n_low} below 0.5; "
+        f"responses at least {moved:.2f}, {sum(one.response < 0.5 for one in compared)} below 0.5; {outside} of "
+        f"{sum(one.pairs for one in compared)} depths outside, at least {min(one.worst for one in compared):.2f}"
     )
     for one in sorted(known, key=lambda one: one.smallest)[:5]:
         print("   ", one.line())
@@ -171,15 +201,21 @@ def main() -> None:
     """Everything that is asked for."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--mesh", type=int, nargs="*", default=[1])
+    parser.add_argument("--diameter", type=int, nargs="*", default=[0], help="0: blades alike; above: travelling wave")
+    parser.add_argument("--stuck-modes", type=int, default=20, help="modes of the glued sector in the reduced model")
     parser.add_argument("--random", type=int, default=0)
     parser.add_argument("--step", type=float, nargs="*", default=list(STEPS))
     parser.add_argument("--fixed", type=int, nargs="*", default=[], help="harmonics, in place of automatic ones")
     parser.add_argument("--frequency", type=float, nargs="*", default=[], help="Hz, those of the mesh by default")
     given = parser.parse_args()
-    print(f"{'history':<44} estimated      true   ratio  on the way")
-    for mesh in given.mesh:
-        frequencies = tuple(given.frequency) or FREQUENCIES[mesh]
-        summarise(f"mesh {mesh}", dovetail(mesh, tuple(given.step), frequencies, tuple(given.fixed)))
+    print(f"{'history':<44} estimated      true   ratio  on the way: volume, response; pairs outside, worst")
+    for mesh, diameter in product(given.mesh, given.diameter):
+        model = scene("dovetail_sector", HARMONICS, mesh=mesh, nodal_diameter=diameter, stuck_modes=given.stuck_modes)
+        frequencies = np.array(given.frequency or (OFFSETS if diameter else FREQUENCIES[mesh]))
+        if diameter:
+            frequencies += glued_resonance(model)
+        title = f"mesh {mesh}, d {diameter}"
+        summarise(title, dovetail(title, model, tuple(given.step), tuple(frequencies.tolist()), tuple(given.fixed)))
     if given.random:
         summarise("random joints", random_joints(given.random))
 

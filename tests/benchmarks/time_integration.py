@@ -1,7 +1,8 @@
 """Wear of a reduced model once more, by nonsmooth time integration with cycle jumps: a second opinion.
 
 `python -m tests.benchmarks.time_integration [--mesh 1] [--frequency 211.5] [--jump 1000] [--steps 500]` prints worn
-volume and tip amplitude of the bundled dovetail root. Nothing of the solver is used but the model.
+volume and tip amplitude of the bundled dovetail root. `--approach ramp --periods 50 --cycles 0` shows the unworn motion
+after a fast ramp. Nothing of the solver is used but the model.
 
 - Time: backward differences of second order whose three weights are exact for the excitation frequency. With them
   M x'' + C x' + K x + S^T lambda = f becomes x = G (r - S^T lambda) at each step, and the relative displacements of the
@@ -10,7 +11,7 @@ volume and tip amplitude of the bundled dovetail root. Nothing of the solver is 
   the increment of u_T over a step along lambda_T, zero inside the cone. Newton's method on the set of open, sticking
   and slipping pairs.
 - Wear: the rate of a pair, k_w / area times the sum of lambda_N |increment of u_T| over a period, of a settled motion;
-  Adams-Bashforth of second order over the jumps, the first ones graded.
+  Adams-Bashforth of second order over the jumps, the first ones graded, corrected by the trapezoidal rule.
 - Settling: the first mode of the glued joint dies out slowly. So its complex amplitude is found by Broyden's method on
   the change over one period; all else settles in a few periods. A motion that does not settle ends the run.
 """
@@ -34,6 +35,7 @@ _SETTLED = 1e-4  # change of the amplitude of the mode over a period, by which a
 _SETTLED_WORK = 1e-3  # relative change of the slip work over a period
 _FAINT_WORK = 1e-5  # of the work of the excitation: slip work below which no change counts
 _MOST_PERIODS = 3000
+_HELD = 1000  # periods after a run-up or ramp, in which the first mode dies out to 0.1 %
 _TRIAL = 60  # periods after which Broyden's method is given up for as many plain ones, and begun again
 
 
@@ -70,6 +72,7 @@ class Motion:
     """State at the end of a step: displacements, m, velocities, m/s (2, n), now and before; forces, N, of the pairs.
 
     work (n_contact,): lambda_N times slip over the last period, J. responses (n_steps, n): its displacements, m.
+    slope (2, 2): change over a period by a change of the amplitude of the mode, where the last settling has found it.
     """
 
     x: FloatArray
@@ -77,6 +80,7 @@ class Motion:
     force: FloatArray
     work: FloatArray
     responses: FloatArray
+    slope: FloatArray | None = None
 
 
 def fitted_weights(omega: float, step: float) -> FloatArray:
@@ -272,11 +276,11 @@ def settle(
 
     work_change: relative change of the slip work over a period; a mass on rigid ground turns on whole steps only.
     """
-    motion = one_period(structure, motion, gap)
+    known, motion = motion.slope, one_period(structure, motion, gap)
     period = 2.0 * np.pi / structure.omega
     growth = np.exp((structure.rate - 1j * structure.omega) * period) - 1.0 if structure.rate else -1.0 + 0.0j
     linear = np.array([[growth.real, -growth.imag], [growth.imag, growth.real]])
-    slope, last, calm = linear, None, 0
+    slope, last, calm = linear if known is None else known, None, 0
     for periods in range(2, _MOST_PERIODS):
         here, work = amplitude_of_mode(structure, motion), motion.work
         moved = one_period(structure, motion, gap)
@@ -291,7 +295,7 @@ def settle(
         still = np.abs(moved.work - work).max() <= work_change * max(float(moved.work.max()), faint)
         calm = calm + 1 if still and np.linalg.norm(correction) <= _SETTLED * size else 0
         if calm >= 2:
-            return moved, periods
+            return replace(moved, slope=slope), periods
         if periods % _TRIAL == 0:
             slope, last = linear, None
         elif structure.rate and periods // _TRIAL % 2 == 0:
@@ -303,44 +307,56 @@ def settle(
     raise RuntimeError(f"the motion does not settle in {_MOST_PERIODS} periods")
 
 
-def sweep(
-    model: ReducedModel, friction: float, frequencies: FloatArray, amplitude: float, n_steps: int
-) -> tuple[Structure, Motion]:
-    """Unworn settled motion at the last of some frequencies, Hz, each from the one before, the first from rest."""
+def run_up(frequency: float, amplitude: float, periods: int, begin: float = 0.97) -> FloatArray:
+    """Frequencies, Hz, and amplitudes, N, (n_periods, 2): up, ever slower, after a ramp at `begin` times the frequency.
+
+    Jumps from one settled motion to the next are no run-up: `settle` may pass through larger motions.
+    """
+    share = np.linspace(0.0, 1.0, periods)
+    up = frequency * (1.0 - (1.0 - begin) * (1.0 - share) ** 3)
+    return np.concatenate([ramp(up[0], amplitude, 300), np.stack([up, np.full(periods, amplitude)], axis=1)])
+
+
+def ramp(frequency: float, amplitude: float, periods: int) -> FloatArray:
+    """Frequencies, Hz, and amplitudes, N, (periods, 2): the amplitude raised evenly at one frequency."""
+    return np.stack([np.full(periods, frequency), amplitude * np.linspace(0.0, 1.0, periods + 1)[1:]], axis=1)
+
+
+def loaded(model: ReducedModel, friction: float, course: FloatArray, n_steps: int) -> tuple[Structure, Motion]:
+    """Unworn settled motion after a course of frequencies, Hz, and amplitudes, N, (n_periods, 2), begun at rest."""
     gap = model.contact.gap
-    structure = build(model, friction, float(frequencies[0]), amplitude, n_steps)
+    structure = build(model, friction, *course[0], n_steps)
     motion = at_rest(model, structure, gap)
-    for frequency in frequencies.tolist():
+    for frequency, amplitude in (*course.tolist(), *_HELD * [course[-1].tolist()]):
         structure = build(model, friction, frequency, amplitude, n_steps)
-        motion, _ = settle(structure, motion, gap)
-    return structure, motion
+        motion = one_period(structure, motion, gap)
+    return structure, settle(structure, motion, gap)[0]
 
 
 def wear(
-    model: ReducedModel,
-    structure: Structure,
-    motion: Motion,
-    wear_coefficient: float,
-    jumps: FloatArray,
+    model: ReducedModel, structure: Structure, motion: Motion, wear_coefficient: float, jumps: FloatArray,
     work_change: float = _SETTLED_WORK,
-) -> Iterator[tuple[float, FloatArray, Motion, int]]:
-    """Cycle count, depths (n_contact,), m, settled motion and its periods, after each of the jumps, cycles."""
+) -> Iterator[tuple[float, FloatArray, Motion, int]]:  # fmt: skip
+    """Cycle count, depths (n_contact,), m, settled motion and its periods, after each of the jumps, cycles.
+
+    The motion settles at depths that are extrapolated (Adams-Bashforth); the depths are those of the trapezoidal rule.
+    """
     depth, cycle = np.zeros(model.contact.n_contact), 0.0
-    last_rate, last_jump = None, 1.0
+    rate = wear_coefficient * motion.work / model.contact.area
+    slope = np.zeros_like(rate)
     for jump in jumps.tolist():
-        rate = wear_coefficient * motion.work / model.contact.area
-        ahead = rate if last_rate is None else rate + 0.5 * jump / last_jump * (rate - last_rate)
-        depth = depth + jump * np.maximum(ahead, 0.0)
+        ahead = np.maximum(rate + 0.5 * jump * slope, 0.0)
+        motion, periods = settle(structure, motion, model.contact.gap + depth + jump * ahead, work_change)
+        reached = wear_coefficient * motion.work / model.contact.area
+        depth = depth + 0.5 * jump * (rate + reached)
         cycle += jump
-        last_rate, last_jump = rate, jump
-        motion, periods = settle(structure, motion, model.contact.gap + depth, work_change)
+        rate, slope = reached, (reached - rate) / jump
         yield cycle, depth, motion, periods
 
 
 def graded(jump: float, cycles: float, first: float = 0.01) -> FloatArray:
     """Jumps that grow from a share of the full length by 1.5 each, and end at a number of cycles."""
-    lengths = []
-    length = first * jump
+    lengths, length = [], first * jump
     while sum(lengths) < cycles * (1.0 - 1e-12):
         lengths.append(min(length, cycles - sum(lengths)))
         length = min(1.5 * length, jump)
@@ -358,32 +374,28 @@ def main() -> None:
     from studies import build_scene
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for name, value in (("mesh", 1), ("steps", 500), ("nodes", 40)):
+    for name, value in (("mesh", 1), ("steps", 500), ("periods", 2000)):
         parser.add_argument(f"--{name}", type=int, default=value)
-    for name, value in (("frequency", 211.5), ("jump", 1000.0), ("cycles", 1e5), ("amplitude", 0.5), ("begin", 0.97)):
+    for name, value in (("frequency", 211.5), ("jump", 1000.0), ("cycles", 1e5), ("amplitude", 0.5), ("friction", 0.5)):
         parser.add_argument(f"--{name}", type=float, default=value)
+    parser.add_argument("--approach", choices=("up", "ramp"), default="up", help="to the frequency, in --periods")
     given = parser.parse_args()
     model = build_scene("dovetail_sector", mesh=given.mesh)
-    frequencies = given.frequency * (1.0 - (1.0 - given.begin) * np.linspace(1.0, 0.0, given.nodes) ** 1.5)
+    course = (run_up if given.approach == "up" else ramp)(given.frequency, given.amplitude, given.periods)
     began = time.process_time()
-    structure, motion = sweep(model, 0.5, frequencies, given.amplitude, given.steps)
+    structure, motion = loaded(model, given.friction, course, given.steps)
     rows = np.real(model.linear[0].response)
-    tip = 1e3 * abs(first_harmonic(structure, motion, rows)[0])
-    print(
-        f"unworn: tip {tip:.4f} mm, slip work {motion.work.sum():.4e} J, {time.process_time() - began:.0f} CPU s",
-        flush=True,
-    )
+
+    def say(what: str, now: Motion, more: str) -> None:
+        tip, spent = 1e3 * abs(first_harmonic(structure, now, rows)[0]), time.process_time() - began
+        print(f"{what}, tip {tip:.4f} mm, {more}, {spent:.0f} CPU s", flush=True)
+
+    say("unworn", motion, f"slip work {motion.work.sum():.4e} J")
     shown = 0.0
     for cycle, depth, now, periods in wear(model, structure, motion, 1.1e-11, graded(given.jump, given.cycles)):
         if cycle >= shown or cycle >= given.cycles * (1.0 - 1e-12):
             shown = cycle + 0.05 * given.cycles
-            volume = 1e9 * float(depth @ model.contact.area)
-            tip = 1e3 * abs(first_harmonic(structure, now, rows)[0])
-            spent = time.process_time() - began
-            print(
-                f"{cycle:8.0f} cycles: {volume:.4f} mm3, tip {tip:.4f} mm, {periods} periods, {spent:.0f} CPU s",
-                flush=True,
-            )
+            say(f"{cycle:8.0f} cycles: {1e9 * depth @ model.contact.area:.4f} mm3", now, f"{periods} periods")
 
 
 if __name__ == "__main__":

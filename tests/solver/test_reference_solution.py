@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.accuracy.history_error import Met, history_error
+from solver.accuracy.history_error import Both, HistoryError, Met, history_error
 from solver.accuracy.options import ACCURACY
 from solver.model import ReducedModel
 from solver.outcome import Outcome
@@ -154,7 +154,6 @@ def test_histories_that_cross_are_wrong_by_what_they_differed_before() -> None:
 
 AREA = np.array([1.0, 2.0])
 COUNTS = np.array([0.0, 1.0, 2.0])
-NOWHERE = Met(np.zeros(0), np.zeros(0))
 
 
 def read(depth: Any, rate: Any = ((1.0, 1.0), (1.0, 1.0), (1.0, 1.0)), **other: Any) -> dict[str, np.ndarray]:
@@ -176,10 +175,22 @@ def read(depth: Any, rate: Any = ((1.0, 1.0), (1.0, 1.0), (1.0, 1.0)), **other: 
 DEPTH = [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]
 
 
+def at_step(value: float) -> dict[str, np.ndarray]:
+    """Values at one step, all alike."""
+    shapes = {"wear_depth": (1, 2), "response": (1, 1), "response_peak": (1, 1), "wear_rate": (1,)}
+    return {name: np.full(shape, value) for name, shape in shapes.items()}
+
+
+def error_of(fine: Any, reference: Any, scheme: Scheme, steps: Both | None = None) -> HistoryError:
+    """The errors at `COUNTS`; steps: both solutions at the ends of steps, none by default."""
+    nowhere = {name: value[:0] for name, value in at_step(0.0).items()}
+    return history_error(Both(COUNTS, fine, reference), steps or Both(np.zeros(0), nowhere, nowhere), AREA, scheme)
+
+
 def test_an_error_adds_up_what_differs_at_each_pair() -> None:
     # volumes agree by chance: what the first pair wears less the second one wears more
     other = [[0.0, 0.0], [1.2, 0.9], [2.4, 1.8]]
-    found = history_error(COUNTS, read(DEPTH), read(other), NOWHERE, AREA, "implicit")
+    found = error_of(read(DEPTH), read(other), "implicit")
     safety = ACCURACY.history_safety
     assert found.worn_volume == pytest.approx([0.0, safety * 0.4 / 3.0, safety * 0.8 / 6.0])
     assert found.wear_depth == pytest.approx(safety * np.abs(np.subtract(DEPTH, other)))
@@ -189,25 +200,30 @@ def test_an_error_adds_up_what_differs_at_each_pair() -> None:
 
 def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing() -> None:
     fine = read(DEPTH, local=[0.0, 0.3, 0.6])
-    found = history_error(COUNTS, fine, read(DEPTH), NOWHERE, AREA, "adaptive")
+    found = error_of(fine, read(DEPTH), "adaptive")
     assert found.worn_volume == pytest.approx([0.0, 0.1, 0.1])
     # it falls to the pairs as they are worn
     assert found.wear_depth == pytest.approx(0.1 * np.array(DEPTH))
-    crossing = history_error(COUNTS, fine, read(DEPTH), Met(np.array([1.5]), np.array([6.0])), AREA, "adaptive")
-    assert crossing.worn_volume == pytest.approx([0.0, 0.1, ACCURACY.history_safety])
+    # between the outputs, at a step, all values of the reference solution differ; at the outputs they agree
+    steps = Both(np.array([1.5]), at_step(2.0), at_step(2.5))
+    crossing, safety = error_of(fine, read(DEPTH), "adaptive", steps), ACCURACY.history_safety
+    assert crossing.worn_volume == pytest.approx([0.0, 0.1, safety * 1.5 / 6.0])
+    assert crossing.wear_depth[2] == pytest.approx([safety * 0.5] * 2)
+    assert crossing.response == pytest.approx([1e-3, 1e-3, safety * 0.25])
+    assert crossing.wear_rate == pytest.approx([0.0, 0.0, safety * 0.25])
 
 
 def test_what_nothing_confirms_is_not_known() -> None:
     lost = read([[0.0, 0.0], [1.0, 1.0], [np.nan, np.nan]])
-    found = history_error(COUNTS, read(DEPTH), lost, NOWHERE, AREA, "explicit")
+    found = error_of(read(DEPTH), lost, "explicit")
     assert found.worn_volume.tolist() == [0.0, 0.0, np.inf]
     assert found.wear_depth[2].tolist() == [np.inf, np.inf]
     assert np.isinf([found.response[2], found.wear_rate[2]]).all()
     # and what was not reached has no error
-    ended = history_error(COUNTS, lost, lost, NOWHERE, AREA, "explicit")
+    ended = error_of(lost, lost, "explicit")
     assert ended.worn_volume[:2].tolist() == [0.0, 0.0]
     assert np.isnan(ended.worn_volume[2])
     # a joint that has worn nothing is known to have worn nothing, with or without
-    still = history_error(COUNTS, read(np.zeros((3, 2))), read(np.full((3, 2), np.nan)), NOWHERE, AREA, "explicit")
+    still = error_of(read(np.zeros((3, 2))), read(np.full((3, 2), np.nan)), "explicit")
     assert not still.worn_volume.any()
     assert not still.wear_depth.any()
