@@ -69,45 +69,6 @@ print({'matplotlib', 'netCDF4', 'pandas', 'scipy.spatial', 'scipy.stats', 'xarra
     assert done.stdout.split() == ["set()", "set()"]
 
 
-@pytest.mark.slow
-def test_a_script_is_checked_by_mypy(tmp_path: Path) -> None:
-    script = tmp_path / "script.py"
-    script.write_text(
-        """\
-import numpy as np
-import xarray as xr
-from numpy.typing import NDArray
-
-from solver import Outcome, ReducedModel, SolverSettings, build_model, frequency_response, march_wear
-from studies import build_scene, read_scene
-from studyrunner import Study, open_result, read_study, run_study
-
-study: Study = read_study("sdof_slider", {"axes.frequency": [150.0]})
-result: xr.Dataset = run_study(study, "out.nc", fresh=True)
-result = open_result("out.nc")
-model: ReducedModel = build_scene("sdof_slider", normal_load=12.0)
-model = read_scene("root.h5")
-model = build_model([[1.0]], None, [[1.0]], [[-1, 0, -1]], 1e-4, load_harmonic=[1.0], normal_load=1.0)
-settings = SolverSettings(harmonics=5, rtol=1e-3)
-response: NDArray[np.complex128] = frequency_response(model, [0.1], 1.0, 0.5, sweep="down", settings=settings).response
-outcome: Outcome = march_wear(model, 0.1, 1.0, [0.5], 1e-11, np.linspace(0.0, 10.0, 3)).outcome
-wrong: str = run_study(3)
-frequency_response(model, [0.1], 1.0, 0.5, sweep="sideways")
-""",
-        encoding="utf-8",
-    )
-    # with the cache of the project's own check, as everything is read again otherwise
-    options = ["--strict", "--config-file", "pyproject.toml", "--cache-dir", ".mypy_cache", str(script)]
-    done = subprocess.run(
-        [sys.executable, "-m", "mypy", *options], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    errors = re.findall(r"script\.py:(\d+): error:.*\[([a-z-]+)\]", done.stdout)
-    last = script.read_text(encoding="utf-8").count("\n")
-    found = [(int(line), kind) for line, kind in errors]
-    expected = [(last - 1, "assignment"), (last - 1, "arg-type"), (last, "arg-type")]
-    assert sorted(found) == sorted(expected), done.stdout + done.stderr
-
-
 # --- the pages ---
 
 

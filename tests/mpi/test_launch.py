@@ -87,14 +87,6 @@ def test_ranks_with_different_software(change: str, said: list[str], tmp_path: P
     assert [path.name for path in tmp_path.iterdir()] == ["other.py"]
 
 
-def test_more_ranks_than_tasks(tmp_path: Path) -> None:
-    """Nothing is wrong with that."""
-    study = ["two_masses", "-o", "out.nc", "--set", "axes.frequency=0.1"]
-    assert run([*launcher(3), sys.executable, FAKED, *study], tmp_path).returncode == 0
-    assert run([sys.executable, FAKED, *study[:-3], "alone.nc", *study[-2:]], tmp_path).returncode == 0
-    xr.testing.assert_identical(results(tmp_path / "out.nc"), results(tmp_path / "alone.nc"))
-
-
 def test_only_rank_0_sees_study_scene_and_output(tmp_path: Path) -> None:
     if os.geteuid() != 0 or subprocess.run(["unshare", "-m", "true"], capture_output=True, check=False).returncode:
         pytest.skip("a view of its own of the file system is for root only")

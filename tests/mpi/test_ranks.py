@@ -56,12 +56,12 @@ def test_result_does_not_depend_on_the_number_of_ranks(tmp_path: Path) -> None:
 def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> None:
     arguments = [
         *("-m", "studyrunner.cli", "dovetail"),
-        *("--set", "axes.frequency=[211.5, 212.5]"),
+        *("--set", "axes.frequency=212.5"),
         *("--set", "axes.scheme=['explicit', 'adaptive']"),
         *("--set", "scene.mesh=1"),
         *("--set", "solver.harmonics=3"),
         *("--set", "solver.samples=64"),
-        *("--set", "slow_time.cycles=10000"),
+        *("--set", "slow_time.cycles=3000"),
         *("--set", "slow_time.outputs=3"),
         *("--set", "outputs.loops=[0, 5]"),
     ]
@@ -72,7 +72,7 @@ def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path: Path) -> Non
         with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
             results.append(result.load().drop_vars("run_time"))
     assert (results[0].worn_volume.isel(cycle=-1) > 0.0).any()
-    assert results[0].loop_force.notnull().any(["frequency", "cycle", "phase", "component"]).sum() == 2 * 2
+    assert results[0].loop_force.notnull().any(["cycle", "phase", "component"]).sum() == 2 * 2
     assert "mesh_quad" in results[0]
     xr.testing.assert_identical(results[1], results[0])
 

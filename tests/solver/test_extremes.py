@@ -202,7 +202,7 @@ def test_amplitude(base: Case, factor: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [1.0, 5.0, 50.0])
+@pytest.mark.parametrize("factor", [1.0, 5.0])
 def test_a_block_that_bounces(factor: float) -> None:
     # lightly damped on stiff ground: a motion of the period of the excitation need not be stable, nor be found
     base = block(lift=0.2)

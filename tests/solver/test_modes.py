@@ -296,11 +296,10 @@ def test_the_dovetail_softens_and_damps_and_its_forced_resonance_agrees() -> Non
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("nodal_diameter", [3, 20])
-def test_a_travelling_wave_of_the_dovetail_damps_as_it_slips(nodal_diameter: int) -> None:
-    model = dovetail(3, nodal_diameter)
+def test_a_travelling_wave_of_the_dovetail_damps_as_it_slips() -> None:
+    model = dovetail(3, 20)
     found = backbone(model, [1e-6, 1e-3], 0.5, settings=SolverSettings(harmonics=3, samples=64))
-    assert found.frequency[0] == pytest.approx({3: 214.638, 20: 215.031}[nodal_diameter], abs=2e-3)
+    assert found.frequency[0] == pytest.approx(215.031, abs=2e-3)
     assert all(outcome.complete for outcome in found.outcome)
     assert found.frequency[1] < found.frequency[0]
     assert found.damping_ratio[1] > 2.0 * found.damping_ratio[0]

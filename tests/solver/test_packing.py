@@ -1,4 +1,4 @@
-"""The progress of a history and of a sweep survives being kept, and what goes on from there ends with equal numbers."""
+"""The progress of a history survives being kept, and what goes on from there ends with equal numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
@@ -17,7 +16,7 @@ from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, Scheme, SolverSettings
 from solver.wear import integrate
 from solver.wear.solutions import Saved
-from tests.solver.models import branch_states, dovetail, march_wear, scene
+from tests.solver.models import branch_states, dovetail, march_wear
 from tests.solver.test_branch_loss import start as impacting_start
 from tests.solver.test_branch_loss import worn_wall
 from tests.solver.test_explicit_step_limit import WEAR as SEESAW_WEAR
@@ -96,10 +95,10 @@ def from_every_stop(
     kept: list[Packed] = []
     whole = march_wear(model, friction, start, wear, step, scheme, cycles, settings, keep=kept.append)
     places = [unpack(progress) for progress in kept]
-    # within the history itself, and within its reference solution
+    # within the history itself, and within its reference solution: from the last one backwards
     own, reference = ([n for n, at in enumerate(places) if (at.fine is None) is alone] for alone in (True, False))
     for found in (own, reference):
-        for n in found[:: max(1, len(found) // MOST_STOPS)]:
+        for n in found[:: -max(1, len(found) // MOST_STOPS)][:MOST_STOPS]:
             again = march_wear(model, friction, start, wear, step, scheme, cycles, settings, resume=kept[n])
             assert_same(again, whole)
     return whole, places

@@ -152,5 +152,5 @@ print(run_in_own_process(lambda: time.sleep(600) or 0))
 
 
 def test_a_signal_that_comes_before_the_other_process_is_there_is_handed_on() -> None:
-    ended = subprocess.run([sys.executable, "-c", EARLY], capture_output=True, text=True, timeout=60, check=True)
+    ended = subprocess.run([sys.executable, "-c", EARLY], capture_output=True, text=True, timeout=200, check=True)
     assert ended.stdout == "1\n"

@@ -143,7 +143,7 @@ def test_check_says_what_the_model_is(folder, capsys):
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 def test_matrices_of_calculix_give_the_scene_of_the_mesh(folder, capsys):
-    subprocess.run(["ccx", "-i", "sector"], check=True, capture_output=True, timeout=100)
+    subprocess.run(["ccx", "-i", "sector"], check=True, capture_output=True, timeout=300)
     expected, found = scene_of(), scene_of("scene.matrices=sector")
     n = 27
     for k, linear in expected.linear.items():
