@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.accuracy.history_error import HistoryError, Met, history_error
+from solver.accuracy.history_error import Both, HistoryError, history_error
 from solver.accuracy.options import ACCURACY
 from solver.missions.blocks import Mission
 from solver.missions.course import RESPONSES, MissionCourse
@@ -103,19 +103,28 @@ def _errors(
     mission: Mission, counts: FloatArray, fine: MissionCourse, reference: MissionCourse | None
 ) -> list[HistoryError]:
     """Errors of the whole wear, and of wear and responses of each block, at the counts (n_output,), the first 0."""
-    ends, area = fine.ends, mission.area
-    solutions = [fine, MissionCourse.begun(*fine.nodes[0].growth.shape) if reference is None else reference]
-    read = [(of.growth_at(counts), _values(mission, of, counts), of.growth_at(ends)) for of in solutions]
-    if reference is None:
-        read[1][0][:], read[1][2][:] = np.nan, np.nan
+    area, blocks = mission.area, range(len(mission.blocks))
+    at = {"outputs": counts, "steps": fine.ends}
+    read = {name: (_read(mission, fine, rows), _read(mission, reference, rows)) for name, rows in at.items()}
     found = []
-    for chosen in (range(len(mission.blocks)), *([place] for place in range(len(mission.blocks)))):
-        own, other = (_of_blocks(growth, values, list(chosen), area) for growth, values, _ in read)
-        apart = read[0][2][:, chosen].sum(axis=1) - read[1][2][:, chosen].sum(axis=1)
-        found.append(history_error(counts, own, other, Met(ends, np.abs(apart) @ area), area, "adaptive"))
+    for chosen in (list(blocks), *([place] for place in blocks)):
+        outputs, steps = (
+            Both(at[name], *(_of_blocks(growth, values, chosen, area) for growth, values in read[name])) for name in at
+        )
+        found.append(history_error(outputs, steps, area, "adaptive"))
     # where blocks adapt the pressures of the pairs against each other, two solutions may agree in a pair by chance
-    by_steps = np.fmax(found[0].wear_depth, read[0][1]["local"])
+    by_steps = np.fmax(found[0].wear_depth, read["outputs"][0][1]["local"])
     return [replace(found[0], wear_depth=by_steps), *found[1:]]
+
+
+def _read(
+    mission: Mission, course: MissionCourse | None, missions: FloatArray
+) -> tuple[FloatArray, dict[str, NDArray[Any]]]:
+    """Depths worn by each block (n, n_block, n_contact), m, and other values of a course; NaN where there is none."""
+    shape = len(mission.blocks), mission.area.size
+    if course is None:
+        return np.full((missions.size, *shape), np.nan), _values(mission, MissionCourse.begun(*shape), missions)
+    return course.growth_at(missions), _values(mission, course, missions)
 
 
 def _values(mission: Mission, course: MissionCourse, counts: FloatArray) -> dict[str, NDArray[Any]]:

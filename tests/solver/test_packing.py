@@ -1,4 +1,4 @@
-"""The progress of a history survives being kept, and what goes on from there ends with equal numbers."""
+"""The progress of a history and of a sweep survives being kept, and what goes on from there ends with equal numbers."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
@@ -16,7 +17,7 @@ from solver.results.history import StartState, WearHistory
 from solver.settings import Resolution, Scheme, SolverSettings
 from solver.wear import integrate
 from solver.wear.solutions import Saved
-from tests.solver.models import branch_states, dovetail, march_wear
+from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.test_branch_loss import start as impacting_start
 from tests.solver.test_branch_loss import worn_wall
 from tests.solver.test_explicit_step_limit import WEAR as SEESAW_WEAR
