@@ -124,12 +124,16 @@ def sliding_node(rest: Rest, amplitude: float, budget: Budget) -> Nodes | None:
     tolerance = problem.case.settings.tolerance
     _, folded = problem.model.harmonic_structure(1)
     dofs = problem.model.contact.dofs
-    joint = problem.case.joint(mode.omega, amplitude)
-    shape = amplitude * (mode.shape.conj() if folded else mode.shape)
-    amplitudes = np.zeros((dofs.size, joint.basis.n_harmonics), complex)
-    amplitudes[:, 0] = np.where(dofs.ravel() >= 0, shape[dofs.ravel()], 0.0)
-    motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
-    start = rest.point.evaluation.predicted_h + joint.to_relative(joint.force_correction(motion))
-    values = np.array([mode.omega, mode.damping_ratio, amplitude])
-    found = problem.solve(amplitude, start, values, rest.point.history, JacobianSolver(), tolerance, budget)
-    return None if found is None else Nodes(problem, (found,))
+    for attempt in range(MODES.sliding_starts):
+        size = amplitude * MODES.top_base**attempt
+        joint = problem.case.joint(mode.omega, size)
+        shape = size * (mode.shape.conj() if folded else mode.shape)
+        amplitudes = np.zeros((dofs.size, joint.basis.n_harmonics), complex)
+        amplitudes[:, 0] = np.where(dofs.ravel() >= 0, shape[dofs.ravel()], 0.0)
+        motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
+        start = rest.point.evaluation.predicted_h + joint.to_relative(joint.force_correction(motion))
+        values = np.array([mode.omega, mode.damping_ratio, size])
+        found = problem.solve(size, start, values, rest.point.history, JacobianSolver(), tolerance, budget)
+        if found is not None:
+            return Nodes(problem, (found,))
+    return None

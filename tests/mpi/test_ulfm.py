@@ -50,7 +50,7 @@ def run_and_kill(
 
     def kill(running: Running) -> None:
         if rank is not None:
-            running.wait_for("following")
+            running.wait_for("computing")
             assert running.reaches(is_time), running.said
             os.kill(running.ranks()[rank], signal.SIGKILL)
 

@@ -265,7 +265,7 @@ def test_wrong_arguments_are_named() -> None:
         ({"amplitude": 0.0}, "amplitude: give values above 0"),
         ({"direction": "left"}, "direction: give one of up, down"),
         ({"mode": 0}, "mode: give a whole number"),
-        ({"wear_depth": [1e-6, 1e-6]}, "wear_depth: give 1 depths"),
+        ({"wear_depth": [1e-6, 1e-6]}, "wear_depth: give a depth, m, for each of 1 pairs, not 2"),
         ({"wear_depth": -1e-6}, "wear_depth: give values of at least 0"),
         ({"settings": SolverSettings(harmonics=5, samples=8)}, "settings.samples"),
     ):

@@ -36,5 +36,5 @@ def test_a_law_that_depends_on_the_depth_is_refused() -> None:
     law = WearLaw("table", table=WearTable((0.0, 1e6), (0.0, 1e-5), ((1.0, 1.0), (1.0, 1.0))))
     with pytest.raises(ValueError, match="wear_depth: give another law"):
         march_wear(scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, [END], law=law, wear_depth=0.0)
-    with pytest.raises(ValueError, match="wear_depth: give 1 depths"):
+    with pytest.raises(ValueError, match="wear_depth: give a depth, m, for each of 1 pairs, not 2"):
         march_wear(scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, [END], wear_depth=[0.0, 0.0])

@@ -91,7 +91,7 @@ def test_a_mode_that_is_not_there_says_so(result: xr.Dataset) -> None:
     first, second = result.attrs["certificate_summary"].splitlines()
     assert first.startswith(f"mode 1: {found.min():.6g} to {found.max():.6g} Hz, damping ")
     assert second == "mode 3: found at none of 12 points"
-    assert "folds of the amplitude are not passed" in result.outcome.attrs["sentences"]
+    assert "The mode may turn back before it (a fold)" in result.outcome.attrs["sentences"]
 
 
 def test_points_are_the_same_in_another_list(study_file: Path, result: xr.Dataset, tmp_path: Path) -> None:

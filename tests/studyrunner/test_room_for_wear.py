@@ -147,7 +147,7 @@ def test_a_scar_that_is_cut_off_is_a_failed_point_with_a_remedy(path: Path, caps
     narrow = ["--set", "scene.half_width=5e-5"]
     assert main([str(path), "-o", str(output), *narrow]) == 3
     told = capsys.readouterr().out
-    assert "1 x contact_cut_off: The contact goes on beyond the pairs that model it" in told
+    assert "1 x contact_cut_off: The contact goes on beyond the modelled pairs" in told
     needed = half_width(read_study(path))
     assert f"Here half_width = {needed:g} has room for it; strips = " in told
     with xr.open_dataset(output) as result:
