@@ -46,6 +46,7 @@ class BlockRun:
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
     iterations: Newton iterations, start state included.
     sweep_rate: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.passage`; 0 for steady vibration.
+    frequencies: with which a passage of the next mission begins, ascending, Hz.
     """
 
     failure: Failure
@@ -62,6 +63,7 @@ class BlockRun:
     last: StartState | None = None
     iterations: int = 0
     sweep_rate: float = 0.0
+    frequencies: tuple[float, ...] = ()
 
     @property
     def completed(self) -> bool:
@@ -78,6 +80,7 @@ class BlockCase:
     carried: state that the block continues; None for a block that begins anew.
     with_slope: whether the slope of the growth is asked for.
     settings: with the time that is left.
+    frequencies: with which a passage begins, ascending, Hz; none for the first one.
     """
 
     mission: Mission
@@ -86,6 +89,7 @@ class BlockCase:
     carried: StartState | None
     with_slope: bool
     settings: SolverSettings
+    frequencies: tuple[float, ...] = ()
 
     @property
     def block(self) -> Block:

@@ -33,6 +33,7 @@ class MissionNode:
         its blocks by their states.
     likes: of each block, for the reference solution.
     carried: state at the end of the last block, for a first block that continues; of the last node only.
+    frequencies: of each block, see `BlockRun.frequencies`; of the last node only.
     """
 
     mission: int
@@ -42,6 +43,7 @@ class MissionNode:
     values: dict[str, NDArray[Any]] | None = None
     likes: tuple[Like, ...] = ()
     carried: StartState | None = None
+    frequencies: tuple[tuple[float, ...], ...] = ()
 
     @property
     def depth(self) -> FloatArray:

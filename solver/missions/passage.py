@@ -72,12 +72,14 @@ class Swept:
     wear (n_contact,): m.
     error: estimated error by the number of frequencies, m3.
     iterations: Newton iterations.
+    needed: frequencies without which the error would be too large, Hz.
     """
 
     states: tuple[SweptState, ...]
     wear: FloatArray
     error: float
     iterations: int
+    needed: tuple[float, ...]
 
 
 def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
@@ -112,6 +114,7 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
         last=states[-1].start if case.mission.continued_by(case.place) else None,
         iterations=first.iterations,
         sweep_rate=sweep_rate(passage, first.states),
+        frequencies=first.needed,
     )
     return in_rows(found)
 
@@ -169,7 +172,9 @@ def _part(states: tuple[SweptState, ...], place: int) -> FloatArray:
 def _swept(case: BlockCase, passage: Passage, aim: float) -> Swept | Failure:
     """The wear of one passage at the depth before it; aim: error by the frequencies over the volume, over rtol."""
     low, high = sorted((passage.start, passage.stop))
-    wanted = list(np.linspace(low, high, MISSIONS.first_frequencies))
+    least = np.linspace(low, high, MISSIONS.first_frequencies).tolist()
+    # the mission before has found the frequencies that count: a second sweep is then seldom needed
+    wanted = list(case.frequencies or least)
     states: list[SweptState] = []
     iterations, error, area = 0, np.inf, case.mission.area
     while wanted:
@@ -180,14 +185,37 @@ def _swept(case: BlockCase, passage: Passage, aim: float) -> Swept | Failure:
         states = sorted([*states, *found], key=lambda state: state.frequency)
         errors = interval_errors(states, area)
         volume = float(sum(_part(tuple(states), place) @ area for place in range(len(states))))
-        allowed, error = aim * case.settings.rtol * volume, float(errors.sum())
+        allowed, error = aim * case.settings.rtol * max(volume, _negligible(case, passage, states)), float(errors.sum())
         if error <= allowed or len(states) >= MISSIONS.most_frequencies:
             break
         wanted = []
         for place in np.flatnonzero(errors > allowed / len(errors)):
             wanted.extend(_between(states[place], states[place + 1]))
     wear = np.sum([_part(tuple(states), place) for place in range(len(states))], axis=0)
-    return Swept(tuple(states), wear, error, iterations)
+    return Swept(tuple(states), wear, error, iterations, _needed(states, errors, allowed / len(errors), least))
+
+
+def _negligible(case: BlockCase, passage: Passage, states: list[SweptState]) -> float:
+    """Worn volume of a passage, m3, that does not matter: beside the wear so far, or as round-off.
+
+    Wear by round-off is compared with the wear if friction took up all work of the excitation.
+    """
+    size = max(float(np.abs(state.response).max()) for state in states)
+    work = np.pi * case.block.excitation_amplitude * size * passage.cycles
+    so_far = float(case.depth @ case.mission.area)
+    return max(COMMON.negligible * so_far, COMMON.round_off * case.mission.wear_coefficient * work)
+
+
+def _needed(states: list[SweptState], errors: FloatArray, allowed: float, least: Sequence[float]) -> tuple[float, ...]:
+    """The frequencies `least`, Hz, and those whose absence makes the error of an interval larger than allowed, m3."""
+    found = [states[0].frequency]
+    for place in range(1, len(states) - 1):
+        at = states[place].frequency
+        # an interval twice as long has eight times the error; of two neighbours one is kept
+        dropped = found[-1] == states[place - 1].frequency and 8.0 * errors[place - 1 : place + 1].sum() < allowed
+        if at in least or not dropped:
+            found.append(at)
+    return (*found, states[-1].frequency)
 
 
 def _between(one: SweptState, other: SweptState) -> list[float]:

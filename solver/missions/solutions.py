@@ -144,6 +144,7 @@ class MissionSolutions:
         fine: the history, for a block of the reference solution; mission: number of the mission that is flown.
         """
         known = iter(self.progress.runs)
+        frequencies = self.progress.course.nodes[-1].frequencies
         likes = () if fine is None else fine.nodes[int(np.searchsorted(fine.ends, mission))].likes
 
         def run(place: int, depth: FloatArray, carried: StartState | None, with_slope: bool) -> BlockRun:
@@ -152,7 +153,8 @@ class MissionSolutions:
                 return found
             settings = self.mission.settings
             left = replace(settings, time_limit=settings.time_limit - self.spent)
-            case = BlockCase(self.mission, place, depth, carried, with_slope, left)
+            near = frequencies[place] if frequencies else ()
+            case = BlockCase(self.mission, place, depth, carried, with_slope, left, near)
             through = run_passage if isinstance(case.block.frequency, Passage) else run_block
             flown = guarded(lambda: through(case, likes[place] if likes else None))
             found = not_flown(case, flown, 0) if isinstance(flown, Failure) else flown

@@ -216,4 +216,5 @@ def _node(
         values,
         tuple(run.like for run in runs if run.like is not None),
         runs[-1].last,
+        tuple(run.frequencies for run in runs),
     )

@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from scipy.sparse import csr_array
 
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit, sample_tangents
@@ -74,37 +75,78 @@ class Monodromy:
         return 4 * len(self.inertia)
 
     @cached_property
-    def _contact(self) -> tuple[FloatArray, FloatArray]:
-        """Motion under unit contact forces (n, 3p), m/N, and the inverse (N, 3p, 3p) of the law for the forces."""
-        spread = np.asarray(self.select @ self.compliance).T
+    def _operators(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Arrays of a time step.
+
+        - (n, 2n): from the acceleration and the velocity without the step to minus the free motion.
+        - (n, 3p): motion under unit contact forces, m/N.
+        - (N, 3p, 3p): inverse of the law for the forces.
+        - (N, p, 3, 12): from the motion and the velocity at the sample before, the free motion and the velocity without
+          the step to the right-hand side of the law.
+        """
+        free = np.hstack([self.compliance @ self.inertia, self.compliance @ self.drag])
+        spread = np.ascontiguousarray((self.select @ self.compliance).T)
         flexibility = np.asarray(self.select @ spread)
         n_samples, n_pairs = self.law.by_force.shape[:2]
         blocks = flexibility.reshape(n_pairs, 3, 3 * n_pairs)
         inverse = np.empty((n_samples, 3 * n_pairs, 3 * n_pairs))
         pairs = np.arange(n_pairs)
+        law = self.law
+        by_free = law.by_motion + 1.5 * law.by_speed
         for n in range(n_samples):
-            system = -((self.law.by_motion[n] + 1.5 * self.law.by_speed[n]) @ blocks)
-            system.reshape(n_pairs, 3, n_pairs, 3)[pairs, :, pairs] += self.law.by_force[n]
+            system = -(by_free[n] @ blocks)
+            system.reshape(n_pairs, 3, n_pairs, 3)[pairs, :, pairs] += law.by_force[n]
             inverse[n] = np.linalg.inv(system.reshape(3 * n_pairs, 3 * n_pairs))
-        return spread, inverse
+        right = np.concatenate([law.by_last_motion, law.by_last_speed, -by_free, -law.by_speed], axis=3)
+        return free, spread, inverse, right
+
+    @cached_property
+    def _chosen(self) -> IntArray:
+        """Displacement (3p,) that is each motion of the switching pairs, -1 where there is none."""
+        rows, places = self.select.nonzero()
+        chosen = np.full(self.select.shape[0], -1)
+        chosen[rows] = places
+        return chosen
 
     def apply(self, disturbance: FloatArray) -> FloatArray:
         """Disturbances (size, j) a period later: displacements now and at the sample before, velocities likewise."""
-        now, before, speed, speed_before = np.split(disturbance, 4)
-        law, shape = self.law, (-1, 3, disturbance.shape[1])
-        spread, inverse = self._contact
-        for n, solve in enumerate(inverse):
-            # BDF2: v = 3/2 y + known; acceleration from v in the same way
-            known = 0.5 * before - 2.0 * now
-            push = self.inertia @ (1.5 * known + 0.5 * speed_before - 2.0 * speed) + self.drag @ known
-            after = -(self.compliance @ push)
-            if solve.size:
-                free, last, given, swift = ((self.select @ part).reshape(shape) for part in (after, now, known, speed))
-                right = law.by_last_motion[n] @ last + law.by_last_speed[n] @ swift
-                right -= law.by_motion[n] @ free + law.by_speed[n] @ (1.5 * free + given)
-                after -= spread @ (solve @ right.reshape(-1, disturbance.shape[1]))
-            now, before, speed, speed_before = after, now, 1.5 * after + known, speed
-        return np.concatenate([now, before, speed, speed_before])
+        parts = np.ascontiguousarray(disturbance.reshape(4, -1, disturbance.shape[1]))
+        return _integrate(*self._operators, self._chosen, parts).reshape(disturbance.shape)
+
+
+@njit(cache=True)
+def _integrate(
+    free: FloatArray, spread: FloatArray, inverse: FloatArray, law: FloatArray, chosen: IntArray, parts: FloatArray
+) -> FloatArray:
+    """Disturbances (4, n, j) a period later; the operators are those of `Monodromy`."""
+    now, before, speed, speed_before = parts[0].copy(), parts[1].copy(), parts[2].copy(), parts[3].copy()
+    size, columns = now.shape
+    moved = np.zeros((4, chosen.size, columns))
+    right = np.zeros((chosen.size, columns))
+    pushed = np.zeros((2 * size, columns))
+    for n in range(len(inverse)):
+        # BDF2: v = 3/2 y + known; acceleration from v in the same way
+        known = 0.5 * before - 2.0 * now
+        pushed[:size] = 1.5 * known + 0.5 * speed_before - 2.0 * speed
+        pushed[size:] = known
+        after = -np.dot(free, pushed)
+        if chosen.size:
+            for row in range(chosen.size):
+                place = chosen[row]
+                if place >= 0:
+                    moved[0, row], moved[1, row] = now[place], speed[place]
+                    moved[2, row], moved[3, row] = after[place], known[place]
+            for row in range(chosen.size):
+                pair, own = row // 3, row % 3
+                right[row] = 0.0
+                for part in range(4):
+                    for other in range(3):
+                        right[row] += law[n, pair, own, 3 * part + other] * moved[part, 3 * pair + other]
+            after -= np.dot(spread, np.dot(inverse[n], right))
+        now, before, speed, speed_before = after, now, 1.5 * after + known, speed
+    last = np.empty_like(parts)
+    last[0], last[1], last[2], last[3] = now, before, speed, speed_before
+    return last
 
 
 def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples: int) -> Monodromy:
