@@ -2,8 +2,6 @@
 as on every rank: processes that share cores wait for the threads of each other.
 """
 
-from __future__ import annotations
-
 import os
 
 import pytest

@@ -1,7 +1,5 @@
 """Which equations of the paper the solver cites, and whether the page of the physics says rightly where each one is."""
 
-from __future__ import annotations
-
 import io
 import re
 import tokenize

@@ -1,7 +1,5 @@
 """No file on disk is a pickle: nothing that reads or writes one can run what somebody has put into it."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What the project says of itself in several places is the same everywhere."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 import re

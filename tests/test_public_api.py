@@ -1,7 +1,5 @@
 """What users of Python import: a few names of each package, against exact answers and against the command."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The references against each other, against closed forms and against a general integrator."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

@@ -1,7 +1,5 @@
 """The plain time integration of the benchmarks: against closed forms, and nonlinear modes against its free decay."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -8,8 +8,6 @@ added to the file, whose points are not computed again; `--again OUTCOME ...` co
 their error bars.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 from collections import Counter

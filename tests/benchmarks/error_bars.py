@@ -19,8 +19,6 @@ At 212.5 Hz the truth is one of three. Two pairs of mesh 2 come to rest at 15 00
 and 0.02. The same holds for 0.155 and 0.163 mm3 at 212.25 Hz.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from dataclasses import dataclass, replace

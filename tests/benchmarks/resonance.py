@@ -10,8 +10,6 @@ Then the CPU time and the Newton iterations of a history with followed frequency
 the same start, in one process, without start states and reference solutions.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from solver.clock import computing_time

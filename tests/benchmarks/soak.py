@@ -8,8 +8,6 @@ in eight is computed by the solver itself. The stand-in notes when it has finish
 a kill was lost with it. The trial of a seed can be repeated. `tests/mpi/test_kills.py` does a few of these.
 """
 
-from __future__ import annotations
-
 import shutil
 import sys
 import tempfile

@@ -16,8 +16,6 @@ after a fast ramp. Nothing of the solver is used but the model.
   the change over one period; all else settles in a few periods. A motion that does not settle ends the run.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Iterator

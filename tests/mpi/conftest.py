@@ -1,7 +1,5 @@
 """An environment with another MPI library, for the tests that need one, and the interrupt."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """What was lost with the runs that were killed in a folder: what was finished before, and was done again afterwards."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import time

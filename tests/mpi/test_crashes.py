@@ -1,7 +1,5 @@
 """A task that crashes two processes costs its own points, nothing else; one that crashes a single one costs none."""
 
-from __future__ import annotations
-
 import os
 import signal
 from pathlib import Path

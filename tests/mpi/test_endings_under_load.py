@@ -1,7 +1,5 @@
 """Runs whose tasks keep the interpreter for seconds, as long calls of C do, end all the same, and soon."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """A full disk: one line says so, what was finished is kept, and the run goes on when there is room."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A run that is killed or ended at any time goes on, and ends with the result of one that was not disturbed."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random

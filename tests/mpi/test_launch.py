@@ -1,7 +1,5 @@
 """Launching it wrong says so: one line, one exit status, no hang; and what only rank 0 need see."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

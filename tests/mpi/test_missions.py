@@ -1,7 +1,5 @@
 """Missions under mpiexec: blocks with scenes of their own, computed by any number of ranks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

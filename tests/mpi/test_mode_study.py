@@ -1,7 +1,5 @@
 """Nonlinear modes on several ranks, killed and gone on."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """Rank 0 keeps no results in memory. What a point costs beyond its computing, `tests.benchmarks.overhead` measures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tests.benchmarks.overhead import run

@@ -1,7 +1,5 @@
 """The log of a run under mpiexec says how far it is, again and again."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tests.mpi.launching import CHEAP, FAKED, run_to_end

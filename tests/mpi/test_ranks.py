@@ -1,7 +1,5 @@
 """run-study under mpiexec: the same result for any number of ranks, and an end in good order for all of them."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -1,7 +1,5 @@
 """Studies of several scenes on several ranks: built side by side, killed and gone on."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

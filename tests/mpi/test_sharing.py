@@ -1,7 +1,5 @@
 """The ranks of a machine have one copy of the scene between them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

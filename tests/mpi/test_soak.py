@@ -1,7 +1,5 @@
 """How tests and soak tell what was lost with a run that was killed."""
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from pathlib import Path

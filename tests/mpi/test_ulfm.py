@@ -1,7 +1,5 @@
 """Open MPI under `mpiexec --with-ft ulfm`: the others finish the study when a rank is killed, all but rank 0."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Small models for the tests of the solver, all seeded, and the textbook and dovetail scenes at a small size."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache

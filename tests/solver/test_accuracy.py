@@ -1,7 +1,5 @@
 """Automatic harmonics and samples against exact motions, and the convergence of the marched mass with harmonics."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Branches followed by arc length through their folds."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Residual and Jacobian of the harmonic balance against differences, its inverse, and the full equations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A mass at a wall that wears away: the branch with impacts ends, the mass falls on the other one, wear goes on."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

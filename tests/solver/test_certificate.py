@@ -1,7 +1,5 @@
 """Certificates: good states hold, their numbers fall as harmonics are added, and every broken state is caught."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

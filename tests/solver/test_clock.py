@@ -1,7 +1,5 @@
 """Run time and time limit are those of computing: a first run compiles for longer than many states take."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time

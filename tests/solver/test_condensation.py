@@ -1,7 +1,5 @@
 """The condensed structure against the full equations, and a folded sector against its whole ring."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Choice among dense solves, factorisations in the slip space and marches, by their predicted costs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A contact that reaches an edge of its pairs where the bodies go on is told by the outcome, and no other one is."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What is kept of the steps of a wear history, and what is read between their ends."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

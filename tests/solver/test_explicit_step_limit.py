@@ -1,7 +1,5 @@
 """The limit of the explicit step against a closed form, and oscillation beyond it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise

@@ -4,8 +4,6 @@ Never NaN with a converged outcome, never a number with another one, no wear tha
 leaves no doubt that a state exists, convergence is demanded.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The final state without slow time: where an active set has it, and where only the march does."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

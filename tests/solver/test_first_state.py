@@ -1,7 +1,5 @@
 """Static and periodic states under much friction: all are found, and their limit is the glued structure."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Floquet multipliers of states against those of exact motions, and what becomes of unstable states."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Histories whose frequency follows the resonance: exact motions, brute force, interruption, loss of the resonance."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """A dovetail root that slides all over: free along its slot, and held there once unequal wear drives it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

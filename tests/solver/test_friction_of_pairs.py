@@ -1,7 +1,5 @@
 """A friction coefficient for each pair: equal ones are one for all, different ones are those of joints of their own."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import numpy as np

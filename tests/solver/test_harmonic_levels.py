@@ -1,7 +1,5 @@
 """How many harmonics a joint may have."""
 
-from __future__ import annotations
-
 from solver.accuracy.harmonic_levels import n_unknowns, room_for
 from solver.accuracy.options import ACCURACY
 from solver.settings import Resolution, all_orders

@@ -1,7 +1,5 @@
 """Stability of states on all three branches of a mass at a wall; signs of determinants against dense ones."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

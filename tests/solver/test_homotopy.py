@@ -1,7 +1,5 @@
 """Harmonics added by homotopy: its ends, and the states that it finds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

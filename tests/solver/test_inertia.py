@@ -1,7 +1,5 @@
 """Masses on sliders against an exact and a plain twin, their limits, and their derivative against differences."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A search that is interrupted again and again on its way to one state ends with the same numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import fields, replace
 

@@ -1,7 +1,5 @@
 """Contact kernels against the law, a plain twin, differences, and themselves without compilation."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

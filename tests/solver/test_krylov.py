@@ -1,7 +1,5 @@
 """Krylov methods against dense solves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Elastic pairs and masses on sliders in one joint: each as it is alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

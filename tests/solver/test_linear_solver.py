@@ -1,7 +1,5 @@
 """Newton directions against a dense solve of the whole Jacobian."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

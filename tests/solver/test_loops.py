@@ -1,7 +1,5 @@
 """Fretting loops: exact cases, the laws in every loop, and loops between the steps of a march."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Missions: blocks in order, flown many times, against wear histories, exact volumes and missions one by one."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import fields, replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Single nonlinear mode theory against the linear oscillator and the full forced response."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Nonlinear modes against closed forms, the linear limits, energy, and forced responses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

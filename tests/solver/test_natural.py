@@ -1,7 +1,5 @@
 """Natural continuation along a parameter, and the history that its states leave."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

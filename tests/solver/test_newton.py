@@ -1,7 +1,5 @@
 """Newton's method on small piecewise examples that know nothing of contact."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """The same wear with every system solved densely: fast solves change nothing but the time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The progress of a history and of a sweep survives being kept, and what goes on from there ends with equal numbers."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import fields, replace

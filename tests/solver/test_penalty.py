@@ -1,7 +1,5 @@
 """Which formulation the scene leads to, and the motion that belongs to a force in each of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The march through the period that preconditions, against the contact law, plain solves and the exact Jacobian."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """States at a given phase lag and at the largest amplitude: derivatives, linear limits, exact motions."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ Symmetries are checked on the state itself: it is turned, scaled or permuted and
 depend on the way by which it was found, and there may be several of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Automatic states of random scenes against their exact motions: as accurate as asked for, errors not played down."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A few of the random scenes of the benchmark, and that they are what they are said to be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

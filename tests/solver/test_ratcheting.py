@@ -1,7 +1,5 @@
 """Ratcheting of marched masses ends in shakedown, and what a state without it is worth."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The reference solution, and the error of a worn volume against what the volume is wrong by."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How states choose their harmonics and samples, and their error estimates against much finer states."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The resonance of a vibration, and marches that end where it has shifted."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Rigid friction at the tip of a cantilever, and the peak of a response, against exact motions."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Products of three digits, against those with the matrices themselves."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

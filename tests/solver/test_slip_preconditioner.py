@@ -1,7 +1,5 @@
 """Factorisation in the slip space against a dense one of the whole Jacobian."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sweeps against exact motions, and their convergence with samples and harmonics."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

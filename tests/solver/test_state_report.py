@@ -1,7 +1,5 @@
 """Static and periodic states against equilibrium, the contact law and the energy; reports against time signals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

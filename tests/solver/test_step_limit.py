@@ -1,7 +1,5 @@
 """Steps that wear off too much: seen by the share of the preload that they move, and never reported as results."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

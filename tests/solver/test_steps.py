@@ -1,7 +1,5 @@
 """Single steps on the slow time scale, their control, and the state that they take and give."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

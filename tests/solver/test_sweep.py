@@ -1,7 +1,5 @@
 """A start state is that of its own point: whatever else is asked for, in whatever steps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Histories that end at a wear: the count at which it is reached."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Histories until nothing wears any more: where they end, what they keep, and joints that wear without end."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from typing import Any

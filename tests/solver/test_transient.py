@@ -1,7 +1,5 @@
 """Relaxation in time: steps against the exact motion, states behind a fold against exact branches."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

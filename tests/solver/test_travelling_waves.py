@@ -1,7 +1,5 @@
 """Travelling waves on the coarse dovetail sector: states over the resonances, what they wear, and how it all ends."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

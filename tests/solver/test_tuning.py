@@ -1,7 +1,5 @@
 """Limits that are changed for a while from Python."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The outcome of a wear history and its sentence, for the history itself and for those that share it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Wear histories of the slider under a spring against its differential equation and its exact motion."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

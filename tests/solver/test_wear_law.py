@@ -1,7 +1,5 @@
 """Wear laws: rate and gain, the work that wears, its derivatives, and histories against differential equations."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

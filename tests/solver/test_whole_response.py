@@ -1,7 +1,5 @@
 """Whole response curves, and balances as functions: against finite differences, exact motions and each other."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Responses and marches that begin with a worn joint."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The bundled scene `dovetail_sector`."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pydantic import ValidationError

@@ -1,7 +1,5 @@
 """Cylinder and sphere on a flat: compliances against quadrature, contact, stick zone and wear against closed forms."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

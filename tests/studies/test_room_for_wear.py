@@ -1,7 +1,5 @@
 """The width of a contact in gross slip against wear that is computed apart from the solver, and what needs none."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

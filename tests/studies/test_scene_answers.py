@@ -1,7 +1,5 @@
 """What scenes tell beside their models: the mesh, natural frequencies, exact answers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scene files: bitwise round trip and other writers' habits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The page of bundled scenes is what the scenes say, and the command prints the same."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

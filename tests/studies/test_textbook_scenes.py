@@ -1,7 +1,5 @@
 """The registry of scenes and the three textbook scenes against their equations and exact motions."""
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Every wrong scene file is refused and named by its dataset."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A folder of its own, a stand-in for the solver, and a process that reads files of unknown origin."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

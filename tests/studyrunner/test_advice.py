@@ -1,7 +1,5 @@
 """Advice on points that failed, or that are known less well than was asked for: nothing in use, nothing ignored."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

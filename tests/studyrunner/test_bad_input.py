@@ -1,7 +1,5 @@
 """Bad input: exit status 2 and one line that names the file, the key, the value and what would be right."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Every bundled study runs, at a small size, and shows what it is there to show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The table of the worst certificates: against a plain loop over all points and cycles, and its wording."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """What of a study is left to do after an earlier run: by the tasks that are asked for."""
 
-from __future__ import annotations
-
 import contextlib
 import sqlite3
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The result file as an archive reads it: compliance-checker, and a header that reads like documentation."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

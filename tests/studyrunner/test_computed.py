@@ -1,7 +1,5 @@
 """What takes long is computed once: a later run takes it from the file, equal to the last bit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NoReturn
 

@@ -1,7 +1,5 @@
 """Notes on crashes: counted once each, and never the way to another file."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`--date`: an attribute of choice, which changes nothing else."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import netCDF4

@@ -1,7 +1,5 @@
 """Which rank gets which task, and what is learnt of costs: without clock and messages."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import pytest

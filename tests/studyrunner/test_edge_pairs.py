@@ -1,7 +1,5 @@
 """Pairs at the edge of a surface, on meshes of all kinds, and how much of the wear is there."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

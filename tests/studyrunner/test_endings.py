@@ -1,7 +1,5 @@
 """Signals that end a run come between any two instructions of the main thread, and leave nothing half done."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """Nothing is replaced unasked: what stands where a result is to go, found before anything is computed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """File systems without locks, and faults of a disk: the run works there, or says what the system says."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

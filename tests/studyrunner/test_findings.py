@@ -1,7 +1,5 @@
 """Points that failed or are less exact than asked for are named, with cycle and error, and not too many of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from solver.outcome import Outcome

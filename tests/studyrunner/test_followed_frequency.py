@@ -1,7 +1,5 @@
 """Studies whose excitation follows the resonance: what they take, what they compute, what they say."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

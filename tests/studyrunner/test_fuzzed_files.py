@@ -1,7 +1,5 @@
 """Some fuzzed study, scene and result files: no traceback, no hang, at most 1 GB; `fuzz_files` tries thousands."""
 
-from __future__ import annotations
-
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The result file: dimensions, units, attributes, and that it appears whole or not at all."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

@@ -1,7 +1,5 @@
 """A run that is ended at any point leaves a result that opens, and the next one ends with the same numbers."""
 
-from __future__ import annotations
-
 import contextlib
 import sqlite3
 import time

@@ -1,7 +1,5 @@
 """Files that were made to do harm: exit status 2 within 5 s and 1 GB, one line, nothing that a terminal obeys."""
 
-from __future__ import annotations
-
 import os
 import resource
 import shutil

@@ -1,7 +1,5 @@
 """What a finished task is known by: everything that its result depends on, and nothing else."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import itertools
 import shutil

@@ -1,7 +1,5 @@
 """What a run finds beside its result: finished results, those of others, files of runs that were killed."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

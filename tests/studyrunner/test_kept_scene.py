@@ -1,7 +1,5 @@
 """`outputs.scene`: the reduced model of a bundled scene stands in the result, which is then run with it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Fretting loops in the result file: where they stand, and that other pairs take no room."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable
 from dataclasses import replace

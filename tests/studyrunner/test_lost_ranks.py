@@ -1,7 +1,5 @@
 """What becomes of the tasks of a rank that is lost: nothing is counted twice, and none takes all ranks with it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Faults of the machine cost no point: the task is done again, elsewhere where there is a choice, or by a later run."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """No wait of the main thread is one that a signal makes endless."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

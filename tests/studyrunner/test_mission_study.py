@@ -1,7 +1,5 @@
 """Studies of missions: blocks under [[mission]], flown slow_time.missions times in place of cycles."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

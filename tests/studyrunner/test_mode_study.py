@@ -1,7 +1,5 @@
 """Studies of nonlinear modes: axes.modal_amplitude in place of frequency, excitation and wear."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

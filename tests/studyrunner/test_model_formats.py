@@ -1,7 +1,5 @@
 """Studies of models in the formats of other programs, through the front door; files are written after the manuals."""
 
-from __future__ import annotations
-
 import importlib.util
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Studies of finite-element models from their files to a result, on a deck of a few elements."""
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 import subprocess

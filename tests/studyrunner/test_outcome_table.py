@@ -1,7 +1,5 @@
 """Which outcomes came, over wear and excitation."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

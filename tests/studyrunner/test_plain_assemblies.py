@@ -1,7 +1,5 @@
 """Assemblies without cyclic symmetry, from a deck to a worn volume; static forces by equilibrium and closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """What is hardly what was meant: a line for each, on stderr and in the result, and never a refusal."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a user sees while a study runs: a bar on a terminal, a line every half minute elsewhere."""
 
-from __future__ import annotations
-
 import io
 import itertools
 import re

@@ -1,7 +1,5 @@
 """How far a history went that ended early, in words."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

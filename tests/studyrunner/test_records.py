@@ -1,7 +1,5 @@
 """The record of a history: all that its result says, and what stands there without one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

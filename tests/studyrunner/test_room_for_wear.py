@@ -1,7 +1,5 @@
 """A study in gross slip lays its pairs as far as it wears them, and says where they were not laid far enough."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A whole run in this process: exit status, what is printed, and what the solver's histories become."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path

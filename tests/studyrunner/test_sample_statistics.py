@@ -1,7 +1,5 @@
 """Quantiles, probabilities, Sobol' indices and groups of samples against closed forms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A study whose runs all end before any state is found comes to its end, with the same numbers."""
 
-from __future__ import annotations
-
 import pytest
 import xarray as xr
 

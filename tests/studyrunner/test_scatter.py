@@ -1,7 +1,5 @@
 """[scatter]: its sentences, the designs, and the values that samples draw."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Studies with [scatter] from the file to the result."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """For how many harmonics a scene is built, and how many one can be solved with, where their number is automatic."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Axes that are keys of [scene] or [wear]: each point is the one of a study of its own, to the last bit."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Models of several scenes: which rank is sent one, in shared memory or by itself, and how long they are kept."""
 
-from __future__ import annotations
-
 import pytest
 
 from solver.model import ReducedModel

@@ -1,7 +1,5 @@
 """What the result file holds of the scene itself."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The schedule on one rank, and the ranks without MPI."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

@@ -1,7 +1,5 @@
 """Files that lie beside a study and bear the names of modules: no process of the commands ever runs one."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Arrays that several processes share, and how an object gets to all ranks of several machines."""
 
-from __future__ import annotations
-
 import pickle
 import queue
 import signal

@@ -1,7 +1,5 @@
 """Which points share a march, and what each of them is given of it."""
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What is left out because it is the same is the same: a study with shortcuts against one without."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The assumption that wear is small against the width of the contact: where it is not, a run says so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Commit and URL of the software in a result: only where they are known, and no trouble where they are not."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from importlib import metadata

@@ -2,8 +2,6 @@
 for.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random

@@ -1,7 +1,5 @@
 """Terminals that are gone, pipes that nobody reads, full logs: a run goes on, with its result and its own status."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import subprocess

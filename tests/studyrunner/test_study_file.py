@@ -1,7 +1,5 @@
 """Study files: defaults, axes, overrides and the effective study that goes into the result."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A scene file and a result file are each enough to have the same result again."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

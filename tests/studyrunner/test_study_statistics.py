@@ -1,7 +1,5 @@
 """The statistics of a result with samples: labelled, as bands where samples have no value, and in sentences."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from functools import cache

@@ -1,7 +1,5 @@
 """How far a study is, and a replay of many ranks: every march is done once, and the ranks are busy."""
 
-from __future__ import annotations
-
 import pytest
 
 from studyrunner.plan.planning import build_tasks

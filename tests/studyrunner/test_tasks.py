@@ -1,7 +1,5 @@
 """Which tasks a study has, which points share one, and what the plan says of it."""
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from collections.abc import Sequence

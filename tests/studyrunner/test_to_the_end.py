@@ -1,7 +1,5 @@
 """slow_time.cycles = inf, from the study file to the report."""
 
-from __future__ import annotations
-
 import base64
 from pathlib import Path
 

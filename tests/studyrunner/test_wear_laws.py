@@ -1,7 +1,5 @@
 """[wear] of a study: from the file to the result."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two runs with one result file where nothing keeps them apart: neither takes anything for its own that is not."""
 
-from __future__ import annotations
-
 import contextlib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Joints that are worn before their history begins."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

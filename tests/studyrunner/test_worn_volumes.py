@@ -1,7 +1,5 @@
 """The first line of the table at the end: how many worn volumes are known to `rtol`, the worst, and what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

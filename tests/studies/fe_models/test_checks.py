@@ -1,7 +1,5 @@
 """What users get wrong when they export a model is found in the files, and said in one sentence."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Reduced models against dense linear algebra, the bundled dovetail and closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whatever a deck holds: it is read, or refused in one sentence, soon and without much memory."""
 
-from __future__ import annotations
-
 import time
 import tracemalloc
 from pathlib import Path

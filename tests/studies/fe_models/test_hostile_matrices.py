@@ -1,7 +1,5 @@
 """Whatever files with matrices hold: they are read, or refused in one sentence, soon."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

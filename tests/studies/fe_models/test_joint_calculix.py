@@ -1,7 +1,5 @@
 """Glued frequencies of whole models against CalculiX, which reads the same meshes. Needs its command `ccx`."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np

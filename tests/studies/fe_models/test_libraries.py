@@ -1,7 +1,5 @@
 """Files that other libraries read; skipped where the library is not installed."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Matrices come out of the files of the codes as they went in."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

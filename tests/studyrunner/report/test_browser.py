@@ -1,7 +1,5 @@
 """The page in a real headless browser without a network: slider, clicks and lists show the numbers of the file."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections.abc import Iterator

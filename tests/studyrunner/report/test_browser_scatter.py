@@ -1,7 +1,5 @@
 """Samples in a headless browser: a click picks a sample, whose depths, drawn values and history are then shown."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

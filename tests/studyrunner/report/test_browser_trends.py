@@ -1,7 +1,5 @@
 """Trends in a headless browser: the lists change what is drawn, numbers against the file, a click picks the point."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

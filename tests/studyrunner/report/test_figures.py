@@ -1,7 +1,5 @@
 """All figures together: which there are in each case, that none is empty, that axes have units."""
 
-from __future__ import annotations
-
 import matplotlib as mpl
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Figures of the contact pairs: what is drawn are the numbers of the file, each at its place."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

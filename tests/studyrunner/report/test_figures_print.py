@@ -1,7 +1,5 @@
 """Figures on paper: legends cover no curve, nothing is cut off or runs into its neighbour, all text can be read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import combinations
 from pathlib import Path

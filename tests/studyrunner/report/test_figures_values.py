@@ -1,7 +1,5 @@
 """What is drawn are the numbers of the file: data of the artists against the dataset, picked by plain indexing."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Isolines of maps: where they run, what is written at them, and that no label hides another line."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize

@@ -1,7 +1,5 @@
 """What the report says of how well worn volumes are known: bands, bars, marks, sentences; and of older files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

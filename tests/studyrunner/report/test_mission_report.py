@@ -1,7 +1,5 @@
 """Report, page, statistics and joined results of missions."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The page as text: complete in itself, texts of the file harmless, every item in its place."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """The numbers on the page are those of the file, and there are never too many of them."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ Which numbers the artists of a figure hold is compared with the file in `test_fi
 of them, and that this is not old.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import tomllib

@@ -1,7 +1,5 @@
 """Error against run time, on files whose errors are known, against plain loops."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter

@@ -1,7 +1,5 @@
 """What is drawn and listed of error against run time is what was measured."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from xml.etree import ElementTree

@@ -1,7 +1,5 @@
 """The command `study-report`: what it writes, what it says, how it ends."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

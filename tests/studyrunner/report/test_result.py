@@ -1,7 +1,5 @@
 """The result file as the report reads it: opening, shown point, choice of combinations, units."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The root in three dimensions: which faces are in contact, the worn shape, views, patches, fewer faces, figures."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

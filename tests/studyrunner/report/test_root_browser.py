@@ -1,7 +1,5 @@
 """The root in three dimensions in a headless browser: colours, worn shape, view, rotation, slider, points, play."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

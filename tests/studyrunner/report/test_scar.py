@@ -1,7 +1,5 @@
 """The scar of a cylinder and of a sphere, the measured one beside it, and the point that a report shows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

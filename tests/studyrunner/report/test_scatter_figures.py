@@ -1,7 +1,5 @@
 """Figures of samples show the quantiles, probabilities, shares and groups that the drawn values lead to."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

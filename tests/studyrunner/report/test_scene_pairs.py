@@ -1,7 +1,5 @@
 """Figures and maps of pairs show those of one scene; the depth of the last count; coordinates that lie are refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

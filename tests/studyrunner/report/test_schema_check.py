@@ -1,7 +1,5 @@
 """Result files that were made to do harm: one sentence and status 2, or a report that shows text as text."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Trends and maps of studies of several axes: against the file, a parabola in closed form, and what is left out."""
 
-from __future__ import annotations
-
 import base64
 from typing import Any
 

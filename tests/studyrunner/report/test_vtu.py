@@ -1,7 +1,5 @@
 """The root as VTU files: read again they hold the numbers of the result, at the cycle counts of the PVD file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from xml.etree import ElementTree
 
