@@ -11,12 +11,24 @@ import xarray as xr
 from solver.outcome import Outcome
 from studyrunner.mpi import ranks
 from tests.mpi.conftest import OpenMpi
-from tests.mpi.launching import CHEAP, FAKED, PATIENCE, ROOT, SOON, Ended, Running, count_rows, results, watch_to_end
+from tests.mpi.launching import (
+    CHEAP,
+    FAKED,
+    PATIENCE,
+    ROOT,
+    SOON,
+    Ended,
+    Running,
+    count_rows,
+    results,
+    run_to_end,
+    watch_to_end,
+)
 
 N_RANKS = 3
 STUDY = [
     *(*CHEAP, "-o", "out.nc"),
-    *("--set", "axes.frequency={start = 100, stop = 160, num = 13}"),
+    *("--set", "axes.frequency={start = 100, stop = 160, num = 7}"),
     *("--set", "axes.sweep=['up', 'down']"),
     *("--set", "axes.step=[500, 1000]"),
     *("--set", "axes.wear_coefficient=[0, 5e-12, 1e-11]"),
@@ -35,10 +47,8 @@ def run_and_kill(
     study: list[str] = STUDY,
     faked: dict[str, str] = SECONDS,
 ) -> Ended:
-    """A run of which a rank is killed after so many histories; no process outlives it, and it never hangs.
-
-    Rank 0 is killed when some of them are on the disk, too, which takes its time where others use it. What is counted
-    may be of a transaction that is not complete: with the third count those before are.
+    """A run of which a rank is killed after so many histories; rank 0 only when some of them are on the disk, too. What
+    is counted may be of a transaction that is not complete: with the third count those before are.
     """
     counts = set()
 
@@ -62,12 +72,10 @@ def count_noted(folder: Path) -> int:
 
 
 @pytest.fixture(scope="module")
-def whole(open_mpi: OpenMpi, tmp_path_factory: pytest.TempPathFactory) -> tuple[xr.Dataset, int]:
-    """The result of a run of which no rank is killed, and the number of its histories."""
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[xr.Dataset, int]:
+    """The result of one process without a launcher, and the number of its histories."""
     folder = tmp_path_factory.mktemp("whole")
-    done = run_and_kill(open_mpi, folder)
-    assert done.status == 0, done.said
-    assert "lost" not in done.said
+    assert run_to_end(0, [FAKED, *STUDY], folder, {"FAKE_SECONDS": "0.001"}).status == 0
     return results(folder / "out.nc"), count_noted(folder)
 
 
@@ -98,29 +106,24 @@ def test_without_rank_0_all_end_and_the_next_run_goes_on(
     xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)
 
 
-@pytest.mark.parametrize(("number", "rank"), [(signal.SIGUSR1, None), (signal.SIGTERM, 2)])
 def test_a_run_that_is_ended_from_outside_leaves_what_there_is(
-    number: signal.Signals, rank: int | None, open_mpi: OpenMpi, whole: tuple[xr.Dataset, int], tmp_path: Path
+    open_mpi: OpenMpi, whole: tuple[xr.Dataset, int], tmp_path: Path
 ) -> None:
-    """By a signal to the launcher that it passes on, or to a rank."""
+    """By a signal to the launcher that it passes on."""
     expected, n_histories = whole
 
     def end(running: Running) -> None:
         assert running.reaches(lambda: count_noted(tmp_path) >= n_histories // 4), running.said
-        os.kill(running.process.pid if rank is None else running.ranks()[rank], number)
+        os.kill(running.process.pid, signal.SIGUSR1)
 
-    done = watch_to_end(
-        [*open_mpi.launcher(N_RANKS, "--with-ft", "ulfm"), open_mpi.python, FAKED, *STUDY],
-        tmp_path,
-        {**open_mpi.environment, **SECONDS},
-        end,
-    )
+    command = [*open_mpi.launcher(N_RANKS, "--with-ft", "ulfm"), open_mpi.python, FAKED, *STUDY]
+    done = watch_to_end(command, tmp_path, {**open_mpi.environment, **SECONDS}, end)
     assert done.status == 130, done.said
     assert done.said.count("run-study: interrupted: out.nc holds ") == 1
     assert done.seconds < SOON
     left = results(tmp_path / "out.nc").outcome
     assert 0 < int((left == Outcome.NOT_COMPUTED).sum()) < left.size
-    assert run_and_kill(open_mpi, tmp_path).status == 0
+    assert run_to_end(0, [FAKED, *STUDY], tmp_path).status == 0
     xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)
 
 
