@@ -1,6 +1,7 @@
 """Estimated over true errors of worn volumes: bundled dovetail and random small joints, all schemes and steps.
 
     python -m tests.benchmarks.error_bars --mesh 1 2 --random 200
+    python -m tests.benchmarks.error_bars --mesh 1 --diameter 3 7 --frequency -0.25 0.25
     OPENBLAS_CORETYPE=Nehalem python -m tests.benchmarks.error_bars --mesh 2 --frequency 212 --stuck-modes 30
 
 The truth of a dovetail is the adaptive scheme with a tolerance ten times smaller and harmonics given, from the start
@@ -8,7 +9,7 @@ state of a sweep in steps five times as fine; that of a random joint the same wi
 harmonics of its start state are wrong by is an error, too. What is wanted: at least half the true error everywhere, in
 the median not more than ten times it. Where both are below `FLOOR` of the volume nothing is compared: the truth is not
 known better. The responses are compared on the way, too, and at the end the depths of all pairs that have a tenth of
-the deepest.
+the deepest. Frequencies of a travelling wave (`--diameter`) are offsets from the resonance of the glued structure, Hz.
 `--stuck-modes` reduces the structure in another way. `--fixed` takes fixed harmonics instead of automatic ones, and the
 adaptive scheme alone: with three of them a pair of the dovetail at 211.5 Hz locks that slips with five and more.
 
@@ -21,6 +22,7 @@ and 0.02. The same holds for 0.155 and 0.163 mm3 at 212.25 Hz.
 import argparse
 import time
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -29,7 +31,7 @@ from solver.loading_history.start_states import follow_branch
 from solver.model import FloatArray, ReducedModel
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
-from tests.solver.models import branch_states, march_wear, random_model, scene
+from tests.solver.models import branch_states, glued_frequency, march_wear, random_model, scene
 
 WEAR = 1.1e-11  # 1/Pa
 STEPS = (250.0, 500.0, 1000.0, 2000.0)
@@ -38,6 +40,8 @@ FREQUENCIES = {
     2: (211.0, 211.25, 211.375, 211.5, 211.75, 212.0, 212.25, 212.5),
     3: (211.0,),
 }
+OFFSETS = (-0.25, 0.25)  # Hz, from the resonance of the glued structure, of travelling waves
+HARMONICS = 21  # whose nodal diameters the scene holds
 FLOOR = 2e-3
 KINDS = (("3d", "3d"), ("3d", "one_tangent"), ("one_tangent", "one_tangent", "3d"))
 
@@ -196,6 +200,7 @@ def main() -> None:
     """Everything that is asked for."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--mesh", type=int, nargs="*", default=[1])
+    parser.add_argument("--diameter", type=int, nargs="*", default=[0], help="0: blades alike; above: travelling wave")
     parser.add_argument("--stuck-modes", type=int, default=20, help="modes of the glued sector in the reduced model")
     parser.add_argument("--random", type=int, default=0)
     parser.add_argument("--step", type=float, nargs="*", default=list(STEPS))
@@ -203,10 +208,13 @@ def main() -> None:
     parser.add_argument("--frequency", type=float, nargs="*", default=[], help="Hz, those of the mesh by default")
     given = parser.parse_args()
     print(f"{'history':<44} estimated      true   ratio  on the way: volume, response; pairs outside, worst")
-    for mesh in given.mesh:
-        model = scene("dovetail_sector", 21, mesh=mesh, stuck_modes=given.stuck_modes)
-        frequencies, title = tuple(given.frequency or FREQUENCIES[mesh]), f"mesh {mesh}"
-        summarise(title, dovetail(title, model, tuple(given.step), frequencies, tuple(given.fixed)))
+    for mesh, diameter in product(given.mesh, given.diameter):
+        model = scene("dovetail_sector", HARMONICS, mesh=mesh, nodal_diameter=diameter, stuck_modes=given.stuck_modes)
+        frequencies = np.array(given.frequency or (OFFSETS if diameter else FREQUENCIES[mesh]))
+        if diameter:
+            frequencies += glued_frequency(model)
+        title = f"mesh {mesh}, d {diameter}"
+        summarise(title, dovetail(title, model, tuple(given.step), tuple(frequencies.tolist()), tuple(given.fixed)))
     if given.random:
         summarise("random joints", random_joints(given.random))
 
