@@ -13,7 +13,7 @@ import tests.benchmarks
 ROOT = Path(__file__).parents[1]
 
 
-def test_version_and_licence_are_those_of_the_package() -> None:
+def test_version_and_licence_are_those_of_the_package():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     citation = dict(re.findall(r"^(\w+): (.+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE))
     assert citation["version"] == project["version"]

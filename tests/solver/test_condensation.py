@@ -20,7 +20,7 @@ AMPLITUDE = 60.0
 
 
 @pytest.mark.parametrize("n_inner", [0, 1, 6])
-def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_inner: int) -> None:
+def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_inner):
     model = random_model(1, KINDS, n_inner)
     linear = model.linear[0]
     structure = build_structure(model, OMEGA, AMPLITUDE, ORDERS)
@@ -45,7 +45,7 @@ def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_i
 
 @pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(6, 2), (5, 2), (5, 1), (6, 3), (7, 0)])
 @pytest.mark.parametrize("orders", [(1, 3), (1, 3, 5), (1, 2, 5), (1,)])
-def test_any_orders_are_harmonics_of_all_of_them(n_sectors: int, nodal_diameter: int, orders: tuple[int, ...]) -> None:
+def test_any_orders_are_harmonics_of_all_of_them(n_sectors, nodal_diameter, orders):
     # each order sees the nodal diameter of its own, not of its place
     model = cyclic_model(9, KINDS, n_sectors, nodal_diameter, 5)
     every = build_structure(model, OMEGA, AMPLITUDE, (1, 2, 3, 4, 5))
@@ -69,7 +69,7 @@ def test_any_orders_are_harmonics_of_all_of_them(n_sectors: int, nodal_diameter:
     assert some.input_work(displacement_h) == pytest.approx(every.input_work(full_h), rel=1e-12)
 
 
-def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
+def test_a_sector_moves_like_its_whole_ring_in_every_harmonic():
     # Two masses a sector, tied to each other and, unevenly, to the next sector; the ring is assembled directly, and
     # forces that travel with the wave act on the contact displacement 0 of every sector.
     n_sectors, wave, n_harmonics = 5, 2, 4
@@ -81,7 +81,7 @@ def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
         "m": np.zeros((2, 2)),
     }
 
-    def ring(name: str) -> np.ndarray:
+    def ring(name):
         whole = np.zeros((2 * n_sectors, 2 * n_sectors))
         for s in range(n_sectors):
             here, there = slice(2 * s, 2 * s + 2), slice(2 * ((s + 1) % n_sectors), 2 * ((s + 1) % n_sectors) + 2)
@@ -90,7 +90,7 @@ def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
             whole[there, here] += tie[name].T
         return whole
 
-    def sector(name: str, k: int) -> np.ndarray:
+    def sector(name, k):
         turn = np.exp(2j * np.pi * k / n_sectors)
         matrix = own[name] + tie[name] * turn + tie[name].T / turn
         return matrix.real if k == 0 else matrix
@@ -136,7 +136,7 @@ def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
         assert response == pytest.approx(moved[1], rel=1e-9, abs=0.0), f"harmonic {n}"
 
 
-def test_needed_nodal_diameters_are_folded() -> None:
+def test_needed_nodal_diameters_are_folded():
     assert needed_nodal_diameters(3, 47, 3) == (0, 3, 6, 9)
     assert needed_nodal_diameters(20, 47, 3) == (0, 7, 13, 20)  # 40 -> 7, 60 - 47 = 13
     assert needed_nodal_diameters(2, 4, 5) == (0, 2)
@@ -144,7 +144,7 @@ def test_needed_nodal_diameters_are_folded() -> None:
     assert needed_nodal_diameters(4, 0, 9) == (0,)
 
 
-def test_a_structure_that_nothing_holds_is_singular() -> None:
+def test_a_structure_that_nothing_holds_is_singular():
     model = random_model(8)
     linear = model.linear[0]
     free = {name: np.zeros_like(linear.mass) for name in ("mass", "damping", "stiffness")}
@@ -155,7 +155,7 @@ def test_a_structure_that_nothing_holds_is_singular() -> None:
         build_structure(ReducedModel({0: loose}, model.contact, model.response_names), OMEGA, 1.0, (1,))
 
 
-def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(monkeypatch):
     model = scene("dovetail_sector", 5, mesh=1)
     orders = (1, 2, 3, 5)
     each = build_structure(model, OMEGA, AMPLITUDE, orders)
@@ -179,7 +179,7 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
     assert build_structure(bare, OMEGA, AMPLITUDE, orders).apply(displacement_h).shape == expected.shape
 
 
-def only_pairs(linear: LinearModel, n_contact: int) -> LinearModel:
+def only_pairs(linear, n_contact):
     """A structure without displacements other than those of the pairs."""
     n = 3 * n_contact
     square = {name: getattr(linear, name)[:n, :n] for name in ("mass", "damping", "stiffness")}

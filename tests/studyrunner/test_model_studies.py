@@ -17,7 +17,6 @@ from tests.studies.fe_models.decks import SECTOR
 STUDY = """
 [study]
 name = "wear"
-
 [scene]
 model = "sector.inp"
 units = "SI"
@@ -26,15 +25,12 @@ response = {tip = {set = "tip", direction = [0, 2, 0]}}
 preload = [{set = "TIP", direction = [-1, 0, 0], force = 1.1e5}]
 friction_coefficient = 0.1
 nodal_diameter = 3
-
 [axes]
 frequency = 300.0
 excitation_amplitude = 1000.0
-
 [slow_time]
 cycles = 1e4
 outputs = 3
-
 [solver]
 harmonics = 1
 samples = 64
