@@ -25,8 +25,8 @@ _ORDERS = (0.5, 4.0)
 """Orders of convergence, in 1/mesh, with which is extrapolated: 2 for smooth stresses, 1 and less at a sharp edge."""
 _NOT_KNOWN = "errors are those of the reduced model; what another mesh changes is not known"
 _BUNDLED = (
-    "errors are those of the reduced model; another mesh moves worn volumes of the dovetail by some 10 to 40 %,"
-    " far more than most errors: axes.mesh compares meshes"
+    "errors are those of the reduced model; another mesh moves worn volumes of the dovetail by 2 to 30 %:"
+    " axes.mesh compares meshes"
 )
 _REMEDY = "compare frequencies at one distance to the resonance, or bands of [scatter]"
 
