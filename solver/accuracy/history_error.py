@@ -101,8 +101,8 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
     relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
     relative[unknown & (volume > 0.0)] = np.inf
     relative[~reached] = np.nan
-    # no pair is known better than the volume: that one agrees with the reference solution is chance (dovetail, 48 pairs,
-    # 211.25 and 211.375 Hz: without this 5 and 7 of 24 deep pairs are outside of their errors, by seven times)
+    # no pair is known better than the volume: one that agrees with the reference solution does so by chance. Without
+    # this 5 and 7 of 24 deep pairs of the dovetail at 211.25 and 211.375 Hz are outside of their errors, by seven times
     with np.errstate(invalid="ignore"):
         of_pairs = np.fmax(np.fmax(difference, crossing(apart)), np.where(depth > 0.0, relative[:, None] * depth, 0.0))
     of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
