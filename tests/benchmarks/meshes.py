@@ -2,6 +2,7 @@
 
     python -m tests.benchmarks.meshes --mesh 1 2 3
     python -m tests.benchmarks.meshes --mesh 2 --bodies 4
+    python -m tests.benchmarks.meshes --picture studies/pictures/meshes.png
 
 Worn volumes after 1e5 cycles at equal f/f_1, with f_1 the first frequency of the glued sector of each mesh: so the
 frequency of the finite elements does not count. With `--bodies` the pairs of a mesh are compared on the bodies of
@@ -11,16 +12,21 @@ another one in two ways:
   pairs of the coarse mesh, forces and areas are shared accordingly;
 - the coarse mesh under the static forces of the fine one, shared among the coarse pairs in the same way.
 
-If pairs are what matters, the first is like the coarse mesh; if bodies are, it is like the fine one.
+If pairs are what matters, the first is like the coarse mesh; if bodies are, it is like the fine one. The picture shows
+what `meshes.csv` holds of earlier runs; those of meshes 3 and 4 are of version 0.4.0.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from solver.loading_history.start_states import follow_branch
@@ -102,13 +108,36 @@ def histories(model: ReducedModel, shares: list[float]) -> Iterator[tuple[float,
         yield shares[place], history, start.run_time + time.thread_time() - began
 
 
+def draw(path: Path) -> None:
+    """Worn volume over the share of the first frequency, of all models in `meshes.csv`."""
+    with Path(__file__).with_suffix(".csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    figure, axes = plt.subplots(figsize=(7.0, 4.2))
+    for place, (name, group) in enumerate(groupby(rows, key=lambda row: row["model"])):
+        own = list(group)
+        share, volume, told = (np.array([float(row[key] or 0.0) for row in own]) for key in ("share", "volume", "told"))
+        of_one_mesh = "," not in name
+        axes.errorbar(
+            share, volume, volume * told, label=name, capsize=3, color=f"C{place}", alpha=0.8,
+            marker="o" if of_one_mesh else "x", linestyle="-" if of_one_mesh else "none",
+        )  # fmt: skip
+    axes.set(xlabel="excitation over first frequency of the mesh", ylabel="worn volume after 1e5 cycles (mm3)")
+    axes.legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
 def main() -> None:
     """A line for each model and frequency."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--mesh", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--bodies", type=int, nargs="*", default=[], help="finer meshes that lend bodies and forces")
     parser.add_argument("--share", type=float, nargs="+", default=list(SHARES), help="f/f_1")
+    parser.add_argument("--picture", type=Path, help="draw the figures of meshes.csv, compute nothing")
     given = parser.parse_args()
+    if given.picture:
+        draw(given.picture)
+        return
     for mesh in given.mesh:
         coarse = scene("dovetail_sector", HARMONICS, mesh=mesh)
         models = {} if given.bodies else {f"mesh {mesh}": coarse}
@@ -119,7 +148,7 @@ def main() -> None:
         for name, model in models.items():
             forces = static_forces(model)[:, 0] / model.contact.area
             print(
-                f"{name}: {model.contact.n_contact} pairs, f_1 {glued_frequency(model):.4f} Hz, static pressure "
+                f"{name}: {model.contact.n_contact} pairs, f_1 {glued_frequency(model):.4f} Hz, glued at rest "
                 f"{forces.min() / 1e6:.1f} to {forces.max() / 1e6:.1f} MPa",
                 flush=True,
             )
