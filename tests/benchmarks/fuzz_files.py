@@ -8,8 +8,6 @@ changed, and in the last two also whole attributes, values, types and dimensions
 number and the kinds: `1 --first NUMBER` has it again. Prints what is wrong; exit status 1 where anything is.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

@@ -11,8 +11,6 @@ frequency: from the same start, in one process, without start states and referen
 resonance wears more and takes steps of another number.
 """
 
-from __future__ import annotations
-
 import argparse
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Runs of run-study that are watched and disturbed on their way, and what is left of them."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

@@ -1,9 +1,5 @@
 """Missions under mpiexec: blocks with scenes of their own, computed by any number of ranks."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 import xarray as xr
 
@@ -41,7 +37,7 @@ cycles = 2000
 """
 
 
-def test_real_missions_are_the_same_on_any_number_of_ranks(tmp_path: Path) -> None:
+def test_real_missions_are_the_same_on_any_number_of_ranks(tmp_path):
     """Two points with two scenes each: a rank gets both models of a mission with its task."""
     (tmp_path / "missions.toml").write_text(STUDY, encoding="utf-8")
     results = []

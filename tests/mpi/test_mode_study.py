@@ -1,16 +1,13 @@
 """Nonlinear modes on several ranks, killed and gone on."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal
-from pathlib import Path
 
 import pytest
 import xarray as xr
 
-from tests.mpi.launching import Running, count_rows, results, run_to_end
+from tests.mpi.launching import count_rows, results, run_to_end
 
 STUDY = """
 [study]
@@ -27,26 +24,24 @@ pytestmark = [pytest.mark.slow, pytest.mark.mpi]
 
 
 @pytest.fixture(scope="module")
-def arguments(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+def arguments(tmp_path_factory):
     path = tmp_path_factory.mktemp("study") / "modes.toml"
     path.write_text(STUDY, encoding="utf-8")
     return ["-m", "studyrunner.cli", str(path), "-o", "out.nc"]
 
 
 @pytest.fixture(scope="module")
-def alone(arguments: list[str], tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+def alone(arguments, tmp_path_factory):
     """The result of one process without a launcher."""
     folder = tmp_path_factory.mktemp("alone")
     assert run_to_end(0, arguments, folder).status == 0
     return results(folder / "out.nc")
 
 
-def test_a_run_that_is_killed_keeps_its_points_and_goes_on(
-    arguments: list[str], alone: xr.Dataset, tmp_path: Path
-) -> None:
+def test_a_run_that_is_killed_keeps_its_points_and_goes_on(arguments, alone, tmp_path):
     """With the result of one rank, on three, of which one has nothing to do."""
 
-    def kill(running: Running) -> None:
+    def kill(running):
         assert running.reaches(lambda: count_rows("start_states", tmp_path / "out.nc") > 2), running.said
         with contextlib.suppress(ProcessLookupError, KeyError):
             os.kill(running.ranks()[1], signal.SIGKILL)

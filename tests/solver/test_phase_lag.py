@@ -1,7 +1,5 @@
 """States at a given phase lag and at the largest amplitude: derivatives, linear limits, exact motions."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -21,14 +19,14 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.settings import SolverSettings
 from solver.structure.fourier import to_complex
-from solver.structure.joint import Case, build_case
+from solver.structure.joint import build_case
 from tests.solver.models import dovetail, scene
 
 TIGHT = SolverSettings(harmonics=3, samples=64, tolerance=1e-11)
 OMEGA = 2.0 * math.pi * 190.0
 
 
-def slider_state(gain: float = 0.0, damping: float = 20.0, friction: float = 0.5) -> tuple[Case, LaggingState]:
+def slider_state(gain=0.0, damping=20.0, friction=0.5):
     """The slider at 190 Hz. gain: m/J, growth of the depth."""
     model = scene("sdof_slider", damping=damping)
     case = build_case(model, friction, OMEGA, TIGHT)
@@ -42,7 +40,7 @@ def slider_state(gain: float = 0.0, damping: float = 20.0, friction: float = 0.5
 
 
 @pytest.mark.parametrize("gain", [0.0, 2e-3], ids=["fixed depth", "growing depth"])
-def test_a_state_at_its_own_lag_has_its_own_frequency(gain: float) -> None:
+def test_a_state_at_its_own_lag_has_its_own_frequency(gain):
     case, state = slider_state(gain)
     assert (state.at.wear_depth > 0.0) == (gain > 0.0)
     lag = phase_lag(state.balance.joint, state.at)
@@ -54,7 +52,7 @@ def test_a_state_at_its_own_lag_has_its_own_frequency(gain: float) -> None:
 
 
 @pytest.mark.parametrize("gain", [0.0, 2e-3], ids=["fixed depth", "growing depth"])
-def test_the_change_of_the_lag_with_the_frequency_is_that_of_finite_differences(gain: float) -> None:
+def test_the_change_of_the_lag_with_the_frequency_is_that_of_finite_differences(gain):
     """With growing depths this is exact only where the elimination of the depth sees the frequency."""
     case, state = slider_state(gain)
     lags, length = [], 1e-5 * OMEGA
@@ -72,7 +70,7 @@ def test_the_change_of_the_lag_with_the_frequency_is_that_of_finite_differences(
 
 
 @pytest.mark.parametrize("word", ["slider", "dovetail"])
-def test_derivatives_with_the_frequency_are_those_of_finite_differences(word: str) -> None:
+def test_derivatives_with_the_frequency_are_those_of_finite_differences(word):
     if word == "slider":
         case, state = slider_state()
     else:
@@ -93,7 +91,7 @@ def test_derivatives_with_the_frequency_are_those_of_finite_differences(word: st
     assert abs(found.product - product) < 1e-5 * abs(product)
 
 
-def test_a_linear_oscillator_has_its_natural_frequency_and_its_peak_below() -> None:
+def test_a_linear_oscillator_has_its_natural_frequency_and_its_peak_below():
     damping = 100.0  # N s/m: 40 % of the critical damping
     natural, ratio = math.sqrt(1.6e5 / 0.1), damping / (2.0 * math.sqrt(1.6e5 * 0.1))
     case, state = slider_state(damping=damping, friction=0.0)
@@ -111,7 +109,7 @@ def test_a_linear_oscillator_has_its_natural_frequency_and_its_peak_below() -> N
     assert abs(at_peak) < 1e-5 * turn
 
 
-def test_the_rise_of_the_response_is_that_of_finite_differences() -> None:
+def test_the_rise_of_the_response_is_that_of_finite_differences():
     case, state = slider_state()
     rise, _ = rise_of_response(state, JacobianSolver(), 1e-2)
     length, sizes = 1e-5 * OMEGA, []

@@ -1,7 +1,5 @@
 """Input decks for CalculiX from the project's own sector mesh, and readers of its tables. A helper of the tests."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 from dataclasses import dataclass

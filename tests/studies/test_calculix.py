@@ -1,7 +1,5 @@
 """The dovetail sector against CalculiX, which reads the same mesh from a deck. Needs its command `ccx`."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np

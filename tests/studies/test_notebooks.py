@@ -1,7 +1,5 @@
 """Notebooks run from nothing, quietly and quickly, and hold what they say and draw, as a forge shows it."""
 
-from __future__ import annotations
-
 import ast
 import re
 import resource

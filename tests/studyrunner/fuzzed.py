@@ -1,7 +1,5 @@
 """Whole files that are mutated, and processes that read the mutations."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

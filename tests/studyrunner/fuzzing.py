@@ -4,8 +4,6 @@ Kinds: "text" a study file, "scene" its scene file, "result" a result file, all 
 result file under `study-report`; "reader" one that is opened and asked whatever it can be asked.
 """
 
-from __future__ import annotations
-
 import contextlib
 import faulthandler
 import io

@@ -1,7 +1,5 @@
 """Records of histories with given numbers, for what is collected from them at the end of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

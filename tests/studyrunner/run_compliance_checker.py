@@ -11,8 +11,6 @@ Two of its faults cannot be helped by what is in a file:
   its dimension for one, too, and `check_coordinate_variables_strict_monotonicity` breaks off as it subtracts texts.
 """
 
-from __future__ import annotations
-
 import json
 import socket
 import sys

@@ -1,7 +1,5 @@
 """The result file as an archive reads it: compliance-checker, and a header that reads like documentation."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -50,7 +48,7 @@ NOT_OF_THIS_DATA = (
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def result(tmp_path_factory):
     """A result with all that one can have: loops, mesh, group of the scene, text, a point that failed."""
     folder = tmp_path_factory.mktemp("compliance")
     with pytest.MonkeyPatch.context() as patch:
@@ -69,7 +67,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_compliance_checker_passes(result: Path) -> None:
+def test_compliance_checker_passes(result):
     done = subprocess.run([sys.executable, CHECK, str(result)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     as_it_is, mended = json.loads(done.stdout).values()
@@ -98,7 +96,7 @@ def test_compliance_checker_passes(result: Path) -> None:
     assert all("'str'" in message for message in as_it_is["broken"].values())
 
 
-def test_the_header_reads_like_documentation(result: Path) -> None:
+def test_the_header_reads_like_documentation(result):
     with netCDF4.Dataset(result) as file:
         known = {**ASKED, **KEPT, **LOOPS, **COORDINATES}
         known |= {name: entry for entries in SCENE.values() for name, entry in entries.items()}

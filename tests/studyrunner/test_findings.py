@@ -1,11 +1,8 @@
 """Points that failed or are less exact than asked for are named, with cycle and error, and not too many of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from solver.outcome import Outcome
-from studyrunner.plan.sharing import Index
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.findings import MOST_NAMED, Findings
 from tests.studyrunner.fakes import FACTS
@@ -15,18 +12,12 @@ GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=['implicit', 'explic
 INACCURATE, MARCH_FAILED, EXCEPTION = int(Outcome.INACCURATE), int(Outcome.MARCH_FAILED), int(Outcome.EXCEPTION)
 
 
-def lines_of(
-    outcomes: dict[tuple[int, int], int],
-    messages: dict[tuple[int, int], str] | None = None,
-    *overrides: str,
-    largest_harmonics: int | None = None,
-    last_cycle: float = 20_000.0,
-) -> tuple[str, ...]:
+def lines_of(outcomes, messages=None, *overrides, largest_harmonics=None, last_cycle=20_000.0):
     """Findings of a study whose points end as is said by frequency and scheme; all others converge."""
     study = read_study("sdof_slider", overrides or GRID)
     said = messages or {}
 
-    def at(point: Index) -> tuple[int, int]:
+    def at(point):
         return point[0], point[4]
 
     results = results_of(
@@ -49,7 +40,7 @@ def lines_of(
     return lines
 
 
-def test_point_cycle_and_error_are_named() -> None:
+def test_point_cycle_and_error_are_named():
     message = "from cycle 31 000 on the wear rate is known to 2.6 % only"
     assert lines_of({(1, 1): INACCURATE}, {(1, 1): message}) == (
         f"1 x inaccurate: {Outcome.INACCURATE.sentence}",
@@ -57,7 +48,7 @@ def test_point_cycle_and_error_are_named() -> None:
     )
 
 
-def test_how_far_a_point_came_that_ended_early() -> None:
+def test_how_far_a_point_came_that_ended_early():
     assert lines_of({(2, 0): MARCH_FAILED}, last_cycle=12_500.0) == (
         f'1 x march_failed: {Outcome.MARCH_FAILED.sentence} Try scheme = "adaptive" or a smaller step.',
         "  212.5 Hz, implicit: computed up to cycle 12 500 of 20 000, the worn volume there to 2.6 %",
@@ -70,7 +61,7 @@ def test_how_far_a_point_came_that_ended_early() -> None:
     assert line == "  212.5 Hz, implicit: no state was found"
 
 
-def test_points_that_were_computed_otherwise_have_advice_of_their_own() -> None:
+def test_points_that_were_computed_otherwise_have_advice_of_their_own():
     """What was used decides: nothing that the study has, and no step for a scheme that has none."""
     grid = ("axes.frequency=[210, 211]", "axes.scheme=['adaptive', 'explicit']")
     found = lines_of({(0, 0): MARCH_FAILED, (0, 1): MARCH_FAILED, (1, 1): MARCH_FAILED}, None, *grid)
@@ -81,7 +72,7 @@ def test_points_that_were_computed_otherwise_have_advice_of_their_own() -> None:
     ]
 
 
-def test_no_more_than_some_are_named() -> None:
+def test_no_more_than_some_are_named():
     many = "axes.frequency=" + str(list(range(100, 125)))
     outcomes = {(place, 0): INACCURATE for place in range(20)}
     found = lines_of(outcomes, None, many, "axes.scheme=implicit")

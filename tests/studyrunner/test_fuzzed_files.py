@@ -1,10 +1,7 @@
 """Some fuzzed study, scene and result files: no traceback, no hang, at most 1 GB; `fuzz_files` tries thousands."""
 
-from __future__ import annotations
-
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 
@@ -18,7 +15,7 @@ AT_ONCE = 2
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("n_files", "kinds"), [(N_FILES, KINDS), (N_DRAWN, {"report": 0.5, "reader": 0.5})])
-def test_fuzzed_files(n_files: int, kinds: dict[str, float], tmp_path: Path) -> None:
+def test_fuzzed_files(n_files, kinds, tmp_path):
     write_whole_files(tmp_path)
     parts = [range(n_files * part // AT_ONCE, n_files * (part + 1) // AT_ONCE) for part in range(AT_ONCE)]
     with ThreadPoolExecutor(AT_ONCE) as pool:

@@ -1,7 +1,5 @@
 """What a finished task is known by: everything that its result depends on, and nothing else."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import itertools
 import shutil
@@ -14,7 +12,6 @@ from studyrunner.checkpoint.records import record_type
 from studyrunner.plan import identity
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.tasks import TaskPlan
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS
 
@@ -32,7 +29,7 @@ BASE = {
 }
 
 
-def hashes(scene: str = FACTS.digest, **changes: str) -> dict[tuple[float, ...], tuple[str, str]]:
+def hashes(scene=FACTS.digest, **changes):
     """Hashes of the start state and of the history of each point, by frequency, amplitude, coefficient and step."""
     overrides = BASE | {name.replace("__", "."): value for name, value in changes.items()}
     study = read_study("sdof_slider", [f"{name}={value}" for name, value in overrides.items()])
@@ -66,7 +63,7 @@ POINT = (155.0, 10.0, 1e-11, 100.0)
     ],
     ids=str,
 )
-def test_what_changes_a_start_state_changes_all_that_follows(changes: dict[str, str]) -> None:
+def test_what_changes_a_start_state_changes_all_that_follows(changes):
     before, after = hashes()[POINT], hashes(**changes)[POINT]
     assert before[0] != after[0]
     assert before[1] != after[1]
@@ -86,7 +83,7 @@ def test_what_changes_a_start_state_changes_all_that_follows(changes: dict[str, 
     ],
     ids=str,
 )
-def test_what_changes_a_history_only_leaves_its_start_state(changes: dict[str, str]) -> None:
+def test_what_changes_a_history_only_leaves_its_start_state(changes):
     before, after = hashes()[POINT], hashes(**changes)[POINT]
     assert before[0] == after[0]
     assert before[1] != after[1]
@@ -111,12 +108,12 @@ def test_what_changes_a_history_only_leaves_its_start_state(changes: dict[str, s
     ],
     ids=str,
 )
-def test_what_does_not_change_a_result_does_not_change_its_hash(changes: dict[str, str]) -> None:
+def test_what_does_not_change_a_result_does_not_change_its_hash(changes):
     found = set(hashes_of_all(**changes))
     assert hashes()[POINT] in found
 
 
-def hashes_of_all(**changes: str) -> list[tuple[str, str]]:
+def hashes_of_all(**changes):
     """Of all points, also where several have the same frequency, amplitude, coefficient and step."""
     overrides = BASE | {name.replace("__", "."): value for name, value in changes.items()}
     study = read_study("sdof_slider", [f"{name}={value}" for name, value in overrides.items()])
@@ -130,7 +127,7 @@ def hashes_of_all(**changes: str) -> list[tuple[str, str]]:
     ]
 
 
-def test_all_points_have_hashes_of_their_own() -> None:
+def test_all_points_have_hashes_of_their_own():
     changes = {
         "axes__excitation_amplitude": "[9, 10]",
         "axes__wear_coefficient": "[0, 1e-12, 1e-11]",
@@ -145,12 +142,12 @@ def test_all_points_have_hashes_of_their_own() -> None:
     assert len(starts) == 3 * 2 * 3 * 2
 
 
-def plan_and_identities() -> tuple[TaskPlan, Identities]:
+def plan_and_identities():
     study = read_study("sdof_slider", [f"{name}={value}" for name, value in BASE.items()])
     return build_tasks(study, FACTS.n_displacements), Identities(FACTS.digest, "kind")
 
 
-def test_progress_is_known_by_all_that_its_task_gives() -> None:
+def test_progress_is_known_by_all_that_its_task_gives():
     plan, own = plan_and_identities()
     branch = plan.branches[0]
     histories = [own.of_histories(branch, march) for march in plan.marches[0]]
@@ -159,7 +156,7 @@ def test_progress_is_known_by_all_that_its_task_gives() -> None:
     assert all(len(name) == 32 and set(name) <= set("0123456789abcdef") for name in names)
 
 
-def test_another_solver_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_solver_is_another_one(monkeypatch):
     before = hashes()
     identity.solver_digest.cache_clear()
     assert hashes() == before
@@ -172,16 +169,14 @@ def test_another_solver_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_an_edit_anywhere_in_the_solver_makes_all_results_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_edit_anywhere_in_the_solver_makes_all_results_others(tmp_path, monkeypatch):
     """Every source file of a copy is changed in turn, and one is moved."""
     copy = tmp_path / "solver"
     shutil.copytree(Path(solver.__path__[0]), copy, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(solver, "__path__", [str(copy)])
     monkeypatch.setattr(solver.__spec__, "submodule_search_locations", [str(copy)])
 
-    def digest() -> str:
+    def digest():
         identity.solver_digest.cache_clear()
         return identity.solver_digest()
 

@@ -1,7 +1,5 @@
 """What a run finds beside its result: finished results, those of others, files of runs that were killed."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -10,7 +8,7 @@ import xarray as xr
 
 from studyrunner.cli import main
 from studyrunner.netcdf.provenance import POINTS_LEFT
-from tests.studyrunner.faked_runs import SMALL, Solver, Task
+from tests.studyrunner.faked_runs import SMALL
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -20,16 +18,14 @@ LARGER = [*APART, "--set", "axes.frequency=[100, 110, 120]"]
 N_POINTS = 4
 
 
-def interrupt(_: Task, n_results: int) -> None:
+def interrupt(_, n_results):
     if n_results == 3:
         raise KeyboardInterrupt
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [VARIANT, LARGER, [*APART, "--fresh"]], ids=["variant", "larger", "fresh"])
-def test_a_finished_result_is_not_replaced_by_less(
-    command: list[str], solver: Solver, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_finished_result_is_not_replaced_by_less(command, solver, folder, capsys):
     assert main(APART) == 0
     before = Path("out.nc").read_bytes()
     capsys.readouterr()
@@ -49,7 +45,7 @@ def test_a_finished_result_is_not_replaced_by_less(
 
 
 @pytest.mark.slow
-def test_a_variant_leaves_the_work_of_the_first_study(solver: Solver) -> None:
+def test_a_variant_leaves_the_work_of_the_first_study(solver):
     assert main(APART) == 0
     assert main(VARIANT) == 0
     for command in (APART, VARIANT):
@@ -64,18 +60,16 @@ def test_a_variant_leaves_the_work_of_the_first_study(solver: Solver) -> None:
     assert len(solver.tasks) > N_POINTS
 
 
-def make_netcdf(path: Path) -> None:
+def make_netcdf(path):
     xr.Dataset({"measured": ("time", [1.0, 2.0])}).to_netcdf(path)
 
 
-def make_scene(path: Path) -> None:
+def make_scene(path):
     assert main(["sdof_slider", "--write-scene", str(path)]) == 0
 
 
 @pytest.mark.parametrize("make", [make_netcdf, make_scene])
-def test_a_file_of_something_else_is_not_overwritten(
-    make: object, solver: Solver, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_of_something_else_is_not_overwritten(make, solver, capsys):
     assert callable(make)
     make(Path("out.nc"))
     before = Path("out.nc").read_bytes()
@@ -89,7 +83,7 @@ def test_a_file_of_something_else_is_not_overwritten(
     assert solver.tasks == []
 
 
-def test_what_a_killed_run_has_left_of_a_result_goes(solver: Solver, folder: Path) -> None:
+def test_what_a_killed_run_has_left_of_a_result_goes(solver, folder):
     """Also with the number of this process, as in containers, where all have the same."""
     for name in (f".out.nc.{os.getpid()}.partial", ".out.nc.4711.partial", ".out.nc.0123456789ab.partial"):
         Path(name).write_bytes(b"half a result")
@@ -103,7 +97,7 @@ def test_what_a_killed_run_has_left_of_a_result_goes(solver: Solver, folder: Pat
 
 
 @pytest.mark.slow
-def test_a_study_that_starts_over_leaves_the_work_of_another(solver: Solver) -> None:
+def test_a_study_that_starts_over_leaves_the_work_of_another(solver):
     assert main(APART) == 0
     assert main([*VARIANT, "--fresh"]) == 0
     solver.begin_again()

@@ -1,10 +1,5 @@
 """`outputs.scene`: the reduced model of a bundled scene stands in the result, which is then run with it."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from typing import Any
-
 import h5py
 import netCDF4
 import numpy as np
@@ -24,23 +19,23 @@ SLIDER += ["--set", "slow_time.outputs=3", "--set", "outputs.variables=['default
 KEEP = ["--set", "outputs.scene=true"]
 
 
-def contents(path: str) -> xr.Dataset:
+def contents(path):
     with xr.open_dataset(path) as result:
         return result.load().drop_vars("run_time")
 
 
 @pytest.fixture
-def not_built(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+def not_built(monkeypatch):
     """From when it is called on, bundled scenes cannot be built."""
 
-    def refuse(*_: Any) -> None:
+    def refuse(*_):
         raise AssertionError("built again")
 
     return lambda: monkeypatch.setattr(scene_room, "build_scene", refuse)
 
 
 @pytest.mark.slow
-def test_the_result_is_enough(not_built: Callable[[], None]) -> None:
+def test_the_result_is_enough(not_built):
     assert main([*SLIDER, "-o", "plain.nc"]) == 0
     assert main([*SLIDER, *KEEP, "-o", "kept.nc"]) == 0
     plain, kept = contents("plain.nc"), contents("kept.nc")
@@ -60,7 +55,7 @@ def test_the_result_is_enough(not_built: Callable[[], None]) -> None:
 
 
 @pytest.mark.slow
-def test_it_is_the_model_in_the_file_that_is_run(not_built: Callable[[], None], capsys: pytest.CaptureFixture) -> None:
+def test_it_is_the_model_in_the_file_that_is_run(not_built, capsys):
     """Twice all masses, stiffnesses and forces, and half the wear coefficient: the same motion and the same wear."""
     assert main([*SLIDER, *KEEP, "-o", "kept.nc"]) == 0
     with h5py.File("kept.nc", "r+") as file:
@@ -81,7 +76,7 @@ def test_it_is_the_model_in_the_file_that_is_run(not_built: Callable[[], None], 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wave", [(), ("scene.nodal_diameter=3", "scene.n_sectors=20")], ids=["standing", "travelling"])
-def test_a_sector_keeps_all_nodal_diameters_and_its_mesh(wave: tuple[str, ...], not_built: Callable[[], None]) -> None:
+def test_a_sector_keeps_all_nodal_diameters_and_its_mesh(wave, not_built):
     coarse = ("scene.mesh=1", "scene.stuck_modes=5", "axes.frequency=211.5", "slow_time.cycles=0", "outputs.scene=true")
     overrides = ("axes.scheme=implicit", "outputs.loops=[]", "outputs.variables=['worn_volume', 'mesh']")
     study = read_study("dovetail", [*coarse, *overrides, *wave, "solver.harmonics=2", "solver.samples=32"])

@@ -1,14 +1,10 @@
 """Faults of the machine cost no point: the task is done again, elsewhere where there is a choice, or by a later run."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 import xarray as xr
@@ -19,24 +15,24 @@ from studyrunner.cli import main
 from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.plan.cost_model import CostModel
 from studyrunner.plan.tasks import BranchTask, MarchTask
-from tests.studyrunner.faked_runs import SMALL, Solver, Task
+from tests.studyrunner.faked_runs import SMALL
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.processes]
 
 FAULTS = [OSError(122, "Disk quota exceeded"), MemoryError()]
 
 
-def load() -> xr.Dataset:
+def load():
     with xr.open_dataset("out.nc") as result:
         return result.load().drop_vars("run_time")
 
 
-def failing(error: Exception, n_times: int, kind: type[Task]) -> Callable[[Task, int], None]:
+def failing(error, n_times, kind):
     """The first task of a kind breaks off so often."""
     left = [n_times]
     first: list[int] = []
 
-    def disturb(task: Task, _: int) -> None:
+    def disturb(task, _):
         if isinstance(task, kind):
             first.append(task.number)
             if task.number == first[0] and left[0]:
@@ -48,9 +44,7 @@ def failing(error: Exception, n_times: int, kind: type[Task]) -> Callable[[Task,
 
 @pytest.mark.parametrize("error", FAULTS, ids=lambda error: type(error).__name__)
 @pytest.mark.parametrize("kind", [BranchTask, MarchTask])
-def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(
-    error: Exception, kind: type[Task], solver: Solver, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(error, kind, solver, capsys):
     assert main([*SMALL[:-1], "whole.nc"]) == 0
     solver.begin_again()
     solver.disturb = failing(error, 1, kind)
@@ -64,7 +58,7 @@ def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [BranchTask, MarchTask])
-def test_a_fault_that_stays_is_never_a_result(kind: type[Task], solver: Solver) -> None:
+def test_a_fault_that_stays_is_never_a_result(kind, solver):
     assert main([*SMALL[:-1], "whole.nc"]) == 0
     solver.begin_again()
     solver.disturb = failing(FAULTS[0], 2, kind)
@@ -80,13 +74,13 @@ def test_a_fault_that_stays_is_never_a_result(kind: type[Task], solver: Solver) 
 
 
 @pytest.mark.slow
-def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch):
     """With the solver itself, whose histories break off in their midst."""
     from solver.wear.wearing_joint import WearingJoint
 
     own, n_calls = WearingJoint.noted, 0
 
-    def noted(self: WearingJoint, *given: Any) -> object:
+    def noted(self, *given):
         nonlocal n_calls
         n_calls += 1
         if n_calls in (3, 30):
@@ -103,12 +97,12 @@ class Chore:
     cost, n_results, opens_others = 1.0, 1, False
     cost_keys = (("chore",),)
 
-    def cost_of(self, *, first: bool) -> float:
+    def cost_of(self, *, first):
         del first
         return self.cost
 
 
-def test_a_sick_rank_gets_no_more_tasks_unless_all_are() -> None:
+def test_a_sick_rank_gets_no_more_tasks_unless_all_are():
     dispatcher: Dispatcher[Chore] = Dispatcher(3, CostModel(), time.monotonic)
     dispatcher.add([Chore() for _ in range(20)])
     held = [(rank, given.number) for rank, given in dispatcher.assign()]
@@ -141,12 +135,12 @@ print(kernel.double(3.0), len(kernel.double.stats.cache_hits))
 
 
 @pytest.fixture
-def kernel(folder: Path) -> Callable[[], str]:
+def kernel(folder):
     (folder / "kernel.py").write_text(
         "from numba import njit\n@njit(cache=True)\ndef double(x):\n    return 2.0 * x\n", encoding="utf-8"
     )
 
-    def call() -> str:
+    def call():
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
         environment["PYTHONPATH"] = os.pathsep.join([str(folder), str(Path(run.__file__).parents[1])])
         done = subprocess.run(
@@ -158,7 +152,7 @@ def kernel(folder: Path) -> Callable[[], str]:
 
 
 @pytest.mark.slow
-def test_a_damaged_cache_of_kernels_is_built_anew(kernel: Callable[[], str], folder: Path) -> None:
+def test_a_damaged_cache_of_kernels_is_built_anew(kernel, folder):
     assert kernel() == "6.0 0"
     assert kernel() == "6.0 1"
     for suffix in ("*.nbi", "*.nbc"):

@@ -1,7 +1,5 @@
 """Studies of finite-element models from their files to a result, on a deck of a few elements."""
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 import subprocess
@@ -19,7 +17,6 @@ from tests.studies.fe_models.decks import SECTOR
 STUDY = """
 [study]
 name = "wear"
-
 [scene]
 model = "sector.inp"
 units = "SI"
@@ -28,15 +25,12 @@ response = {tip = {set = "tip", direction = [0, 2, 0]}}
 preload = [{set = "TIP", direction = [-1, 0, 0], force = 1.1e5}]
 friction_coefficient = 0.1
 nodal_diameter = 3
-
 [axes]
 frequency = 300.0
 excitation_amplitude = 1000.0
-
 [slow_time]
 cycles = 1e4
 outputs = 3
-
 [solver]
 harmonics = 1
 samples = 64

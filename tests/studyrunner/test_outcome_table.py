@@ -1,12 +1,9 @@
 """Which outcomes came, over wear and excitation."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest
 
-from studyrunner.plan.sharing import Index
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.outcome_table import OutcomeTable
 from tests.studyrunner.results_of import batches, results_of
@@ -19,7 +16,7 @@ GRID = (
 )
 
 
-def rows_of(outcome: dict[tuple[int, int, int], int], *overrides: str, n_left_out: int = 0) -> list[tuple[str, str]]:
+def rows_of(outcome, *overrides, n_left_out=0):
     """By frequency, wear coefficient and excitation; the last histories may be missing."""
     study = read_study("sdof_slider", (*GRID, *overrides))
     results = results_of(
@@ -33,7 +30,7 @@ def rows_of(outcome: dict[tuple[int, int, int], int], *overrides: str, n_left_ou
     return table.rows()
 
 
-def test_a_row_for_each_wear_coefficient_and_a_column_for_each_excitation() -> None:
+def test_a_row_for_each_wear_coefficient_and_a_column_for_each_excitation():
     assert rows_of({(0, 1, 1): 10, (1, 1, 1): 4, (1, 0, 1): 9}) == [
         ("outcomes (known to rtol)", "excitation_amplitude 0.5 N | excitation_amplitude 25 N"),
         ("  wear_coefficient 1e-14 1/Pa", "2 converged (1)            | 1 converged, 1 adrift (0)"),
@@ -41,8 +38,8 @@ def test_a_row_for_each_wear_coefficient_and_a_column_for_each_excitation() -> N
     ]
 
 
-def test_every_point_is_counted_once() -> None:
-    def pick(point: Index) -> int:
+def test_every_point_is_counted_once():
+    def pick(point):
         return sum(point) % 5
 
     outcome = {point: pick(point) for point in itertools.product(range(2), repeat=3)}
@@ -63,7 +60,7 @@ def test_every_point_is_counted_once() -> None:
         ),
     ],
 )
-def test_axes_are_those_that_vary(overrides: tuple[str, ...], heads: list[str]) -> None:
+def test_axes_are_those_that_vary(overrides, heads):
     rows = rows_of({}, *overrides)
     assert [label.strip() for label, _ in rows[1:]] == heads
     assert bool(rows) is bool(heads)

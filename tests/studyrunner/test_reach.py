@@ -1,7 +1,5 @@
 """How far a history went that ended early, in words."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -13,6 +11,6 @@ from studyrunner.plan.point_text import describe_reach
     ("error", "said"),
     [(0.05, "computed up to cycle 2000 of 100 000, the worn volume there to 5 %"), (0.0, ""), (math.inf, "")],
 )
-def test_a_volume_that_is_known_comes_with_its_error(error: float, said: str) -> None:
+def test_a_volume_that_is_known_comes_with_its_error(error, said):
     reached = describe_reach(2000.0, 1e5, error)
     assert reached == (said or "computed up to cycle 2000 of 100 000")

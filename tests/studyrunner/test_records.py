@@ -1,7 +1,5 @@
 """The record of a history: all that its result says, and what stands there without one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +22,7 @@ OVERRIDES = (
 
 
 @pytest.mark.parametrize("more", [(), ("outputs.loops=[1]",), ("outputs.variables=['worn_volume']",)])
-def test_a_record_says_all_that_its_result_does(more: tuple[str, ...]) -> None:
+def test_a_record_says_all_that_its_result_does(more):
     study = read_study("sdof_slider", (*OVERRIDES, *more))
     pairs = list(fake_histories(build_tasks(study, FACTS.n_displacements)))
     assert [(task.number, result.place) for task, result in pairs] == [
@@ -42,7 +40,7 @@ def test_a_record_says_all_that_its_result_does(more: tuple[str, ...]) -> None:
             np.testing.assert_equal(record[name], result.values[name])
 
 
-def test_of_a_point_that_failed_the_record_has_no_numbers_but_says_why() -> None:
+def test_of_a_point_that_failed_the_record_has_no_numbers_but_says_why():
     study = read_study("sdof_slider", OVERRIDES)
     kind = record_type(study, FACTS)
     task = build_tasks(study, FACTS.n_displacements).marches[0][0]
@@ -57,7 +55,7 @@ def test_of_a_point_that_failed_the_record_has_no_numbers_but_says_why() -> None
             assert np.all(np.isnan(there) if there.dtype.kind == "f" else there == 0), name
 
 
-def test_a_record_of_another_study_is_none_of_this() -> None:
+def test_a_record_of_another_study_is_none_of_this():
     study, other = (read_study("sdof_slider", (*OVERRIDES, f"slow_time.outputs={n}")) for n in (3, 4))
     kind = record_type(study, FACTS)
     packed = pack_record(empty_record(kind))

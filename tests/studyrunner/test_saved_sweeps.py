@@ -1,7 +1,5 @@
 """A study whose runs all end before any state is found comes to its end, with the same numbers."""
 
-from __future__ import annotations
-
 import pytest
 import xarray as xr
 
@@ -15,19 +13,19 @@ STUDY = [
 ]
 
 
-def load(name: str) -> xr.Dataset:
+def load(name):
     with xr.open_dataset(name) as result:
         return result.load().drop_vars("run_time")
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("folder")
-def test_runs_that_end_at_their_second_save_come_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_that_end_at_their_second_save_come_to_the_end(monkeypatch):
     assert main([*STUDY, "-o", "whole.nc"]) == 0
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", -1.0)
     keep_progress, n_saves = Store.keep_progress, 0
 
-    def keep_and_end(*given: object, **named: object) -> None:
+    def keep_and_end(*given, **named):
         nonlocal n_saves
         keep_progress(*given, **named)  # type: ignore[arg-type]
         n_saves += 1
