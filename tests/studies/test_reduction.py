@@ -18,6 +18,7 @@ def test_combined_shapes_give_what_condensed_forms_give(monkeypatch):
     condensed = build(parameters, 1).linear[nodal_diameter]
     # As if every boundary were a large one.
     monkeypatch.setattr(projection, "_LARGE", 0)
+    monkeypatch.setattr(projection, "_LARGE_FOR_EACH", 0.0)
     combined = build(parameters, 1).linear[nodal_diameter]
     for name in ("mass", "damping"):
         own, reference = getattr(combined, name), getattr(condensed, name)
