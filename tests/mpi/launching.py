@@ -165,7 +165,7 @@ def watch_to_end(
         return Ended(status, running.said, seconds)
 
 
-def results(path: Path) -> xr.Dataset:
+def results(path: Path | str = "out.nc") -> xr.Dataset:
     """A result file without what depends on the machine."""
     with xr.open_dataset(path) as opened:
         return opened.load().drop_vars("run_time")
