@@ -18,6 +18,8 @@ from typing import IO
 import pytest
 import xarray as xr
 
+from studyrunner.cli import main
+
 FAKED = str(Path(__file__).with_name("run_faked.py"))
 ROOT = Path(__file__).parents[2]
 
@@ -163,6 +165,13 @@ def watch_to_end(
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(pid, signal.SIGKILL)
         return Ended(status, running.said, seconds)
+
+
+def run_here(arguments: Sequence[str], folder: Path) -> xr.Dataset:
+    """The result of a run in this process, which has loaded everything already."""
+    with contextlib.chdir(folder):
+        assert main([*arguments, "-o", "out.nc"]) in (0, 3)
+        return results()
 
 
 def results(path: Path | str = "out.nc") -> xr.Dataset:
