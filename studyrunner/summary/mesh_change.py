@@ -57,8 +57,8 @@ class MeshChange:
         scene, text = self._study.scene, ""
         if self._study.cycles_kept[-1] == 0.0:
             return []
-        if _MESH in self._names:
-            text = self._compare()
+        if len(self._study.dimensions.get(_MESH, ())) > 1:
+            text = self._compare() if self._volumes else ""
         elif names_model(scene.model):
             text = _NOT_KNOWN
         elif scene.is_bundled and hasattr(scene.parameters, _MESH):

@@ -27,6 +27,7 @@ def test_a_scene_with_a_mesh_says_what_its_errors_are_not():
     ((label, text),) = said("", {2.0: [1.0, 1.0]})
     assert label == "mesh"
     assert text.startswith("errors are those of the reduced model; another mesh moves worn volumes")
+    assert said("[2]", {2.0: [1.0, 1.0]}) == [(label, text)]
     assert MeshChange(read_study("sdof_slider", ())).rows() == []
     assert MeshChange(read_study("dovetail", ("slow_time.cycles=0",))).rows() == []
 
