@@ -7,8 +7,6 @@ Without arguments all rows of the table (`ROWS`). The bundled dovetail sector ne
 busy simulated ranks are says `tests.benchmarks.scheduling`.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tempfile
