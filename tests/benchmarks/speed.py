@@ -7,8 +7,6 @@ samples, 1584 unknowns; the unit is one `numpy.linalg.solve` of as many. Medians
 simulated ranks are says `tests.benchmarks.scheduling`.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """The elimination front by front in both of its ways, and modes of a singular mass against a dense solution."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import linalg
