@@ -16,8 +16,6 @@ If pairs are what matters, the first is like the coarse mesh; if bodies are, it 
 what `meshes.csv` holds of earlier runs; those of meshes 3 and 4 are of version 0.4.0.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import time

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
-from tests.mpi.launching import CHEAP, FAKED, PATIENCE, ROOT, SOON, launcher, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, PATIENCE, SOON, launcher, run_to_end
 
 GRID = [
     *CHEAP,
@@ -45,30 +45,6 @@ def test_result_does_not_depend_on_the_number_of_ranks(tmp_path):
     for n_ranks in (1, 3):
         xr.testing.assert_identical(results[n_ranks], results[0])
     assert tables == {results[0].attrs["certificate_summary"]}
-
-
-def test_real_tasks_give_the_same_for_any_number_of_ranks(tmp_path):
-    arguments = [
-        *("-m", "studyrunner.cli", "dovetail"),
-        *("--set", "axes.frequency=212.5"),
-        *("--set", "axes.scheme=['explicit', 'adaptive']"),
-        *("--set", "scene.mesh=1"),
-        *("--set", "solver.harmonics=3"),
-        *("--set", "solver.samples=64"),
-        *("--set", "slow_time.cycles=3000"),
-        *("--set", "slow_time.outputs=3"),
-        *("--set", "outputs.loops=[0, 5]"),
-    ]
-    results = []
-    for n_ranks in (0, 2):
-        done = start(n_ranks, [*arguments, "-o", f"{n_ranks}.nc"], tmp_path, {"PYTHONPATH": str(ROOT)})
-        assert done.returncode in (0, 3), done.stderr
-        with xr.open_dataset(tmp_path / f"{n_ranks}.nc") as result:
-            results.append(result.load().drop_vars("run_time"))
-    assert (results[0].worn_volume.isel(cycle=-1) > 0.0).any()
-    assert results[0].loop_force.notnull().any(["cycle", "phase", "component"]).sum() == 2 * 2
-    assert "mesh_quad" in results[0]
-    xr.testing.assert_identical(results[1], results[0])
 
 
 def test_marches_are_done_while_their_branch_goes_on(tmp_path):

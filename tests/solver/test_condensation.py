@@ -9,6 +9,7 @@ from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nod
 from solver.structure import condensation
 from solver.structure.condensation import build_structure, relative_indices
 from solver.structure.fourier import change_orders, from_complex, to_complex
+from solver.structure.frequency_slope import frequency_slope
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 from solver.structure.options import STRUCTURE
 from tests.solver.models import MASS, OMEGA, STIFFNESS, cyclic_model, definite, random_model, scene
@@ -67,6 +68,22 @@ def test_any_orders_are_harmonics_of_all_of_them(n_sectors, nodal_diameter, orde
         theirs_h = change_orders(theirs, (1, 2, 3, 4, 5), orders)
         assert ours == pytest.approx(theirs_h, rel=1e-12, abs=1e-12 * np.abs(theirs_h).max())
     assert some.input_work(displacement_h) == pytest.approx(every.input_work(full_h), rel=1e-12)
+
+
+@pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(5, 2), (6, 3), (7, 0)])
+def test_the_slope_with_the_frequency_is_that_of_differences(n_sectors, nodal_diameter):
+    model, orders = cyclic_model(9, KINDS, n_sectors, nodal_diameter, 5), (1, 3, 5)
+    relative, _ = relative_indices(model.contact)
+    u = np.random.default_rng(11).normal(size=(relative.size, 2 * len(orders) + 1))
+    slope = frequency_slope(model, OMEGA, AMPLITUDE, orders, u)
+    length, values = 1e-5 * OMEGA, []
+    for omega in (OMEGA - length, OMEGA + length):
+        there = build_structure(model, omega, AMPLITUDE, orders)
+        product = there.drive @ to_complex(u)[:, 0] + there.drive_offset
+        values.append((there.apply(u) - there.force_h(), product, to_complex(there.response_h(u))[:, 0]))
+    for found, one, other in zip((slope.force, slope.product, slope.response), *values, strict=True):
+        expected = (other - one) / (2.0 * length)
+        assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
 
 
 def test_a_sector_moves_like_its_whole_ring_in_every_harmonic():

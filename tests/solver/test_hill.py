@@ -85,10 +85,18 @@ def test_two_right_sides_are_solved_as_one_by_one():
         tangent = balance.linearise(balance.evaluate(predicted))
         first, second, noise = np.random.default_rng(5).normal(size=(3, *predicted.shape))
         solver = JacobianSolver()
+        row = noise / np.linalg.norm(noise)
+
+        def change_of(step, by_parameter, row=row):
+            return (0.3 - float(np.vdot(row, step))) / float(np.vdot(row, by_parameter))
+
         # a second side near the one before, equal to it, and far from it
         for other in (second, second + 1e-2 * noise, second + 1e-2 * noise, noise):
-            for right, step in zip((first, other), solver.solve_with_parameter(tangent, first, other), strict=True):
-                assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
+            step, change = solver.solve_with_parameter(tangent, first, other, change_of)
+            assert np.linalg.norm(tangent.apply(step) - first - change * other) < 4e-3 * np.linalg.norm(first)
+            assert np.vdot(row, step) == pytest.approx(0.3, rel=1e-9)
+            near = solver.solve_by_parameter(tangent, other, 1e-2)
+            assert np.linalg.norm(tangent.apply(near) - other) < 2e-2 * np.linalg.norm(other)
         for right, step in zip((first, second), solver.solve_all(tangent, (first, second)), strict=True):
             assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
 

@@ -1,21 +1,17 @@
 """Natural continuation along a parameter, and the history that its states leave."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
-from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from tests.solver.models import OMEGA, first_point, random_model, scene
 
-BalanceAt = Callable[[float, FloatArray], Balance]
 TOLERANCE = 1e-9
 WALL_OMEGA = 1.2  # rad/s; without the wall the mass reaches it at 0.1 |1 - 1.2^2 + 0.06i| = 0.0444 N
 GRAZING = 0.1 * abs(1 - WALL_OMEGA**2 + 0.05j * WALL_OMEGA)

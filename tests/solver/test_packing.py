@@ -136,12 +136,14 @@ def test_a_sweep_over_a_fold_goes_on_to_the_same_numbers():
         if not isinstance(progress, str):
             kept.append((frozenset(whole), progress))
 
-    for index, start in follow_branch(model, 0.0, 0.02, frequencies, "up", AUTO, keep=keep):
+    for index, start in follow_branch(model, 0.0, 0.02, frequencies, "up", SolverSettings(7, 64), keep=keep):
         whole[index] = start
     assert [whole[index].branch for index in (0, 1)] == [0, 1]
     for done, progress in (kept[0], kept[-1]):
         left = [index for index in range(frequencies.size) if index not in done]
-        for place, start in follow_branch(model, 0.0, 0.02, frequencies[left], "up", AUTO, resume=progress):
+        for place, start in follow_branch(
+            model, 0.0, 0.02, frequencies[left], "up", SolverSettings(7, 64), resume=progress
+        ):
             wanted = whole[left[place]]
             assert_same(replace(start, state=None, reference=None), replace(wanted, state=None, reference=None))
             assert_same(start.state, wanted.state)

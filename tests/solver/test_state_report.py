@@ -128,23 +128,11 @@ def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds, seed):
 
 @pytest.mark.parametrize("kinds", KINDS)
 @pytest.mark.parametrize("seed", [1, 2])
-def test_every_sample_of_a_periodic_state_obeys_the_contact_law(kinds, seed):
+def test_every_sample_of_a_periodic_state_is_what_the_plain_law_says(kinds, seed):
+    """That samples obey Signorini and Coulomb is in `test_properties`."""
     at = periodic(kinds, seed)[1].evaluation
-    normal = at.force_t[:, 0]
-    assert (normal >= 0).all()
-    assert (np.hypot(at.force_t[:, 1], at.force_t[:, 2]) <= FRICTION * normal * (1 + 1e-15)).all()
-    # pressed: no opening left in the predicted force; open: no force at all
-    assert np.array_equal(normal, np.maximum(at.predicted_t[:, 0], 0.0))
-    assert not at.force_t[:, 1:][np.repeat((normal == 0)[:, None], 2, axis=1)].any()
-    # slip along the friction force; none while it is below the limit
-    slip = np.diff(at.state_t)
-    along = np.einsum("pcn,pcn->pn", slip, at.force_t[:, 1:])
-    sizes = np.hypot(slip[:, 0], slip[:, 1]) * np.hypot(at.force_t[:, 1], at.force_t[:, 2])
-    assert along == pytest.approx(sizes, abs=1e-9 * max(sizes.max(), 1.0))
-    assert not slip[:, :][np.repeat((at.status_t == 1)[:, None], 2, axis=1)].any()
-    # what the state repeats, and what the statuses mean
-    assert at.periodicity_error <= 1e-9 * max(float(normal.max()), 1.0)
-    for pair in range(normal.shape[0]):
+    assert at.periodicity_error <= 1e-9 * max(float(at.force_t[:, 0].max()), 1.0)
+    for pair in range(len(at.force_t)):
         expected = status(at.predicted_t[pair], FRICTION, at.state_t[pair, :, :-1])
         assert np.array_equal(at.status_t[pair], expected)
 

@@ -124,13 +124,12 @@ def test_a_joint_without_grip_ends_within_bounded_effort():
     """Two masses on a structure that friction alone keeps in place: no state stays, and the search for one ends."""
     model = scene("two_masses")
     loose = replace(model.linear[0], stiffness=np.array([[0.5, -1.0], [-1.0, 1.0]]))
-    for amplitude in (5.0, 200.0):
-        found = follow_branch(replace(model, linear={0: loose}), 0.5, amplitude, np.array([0.1]), "up", AUTOMATIC)
-        ((_, start),) = found
-        assert start.state is None
-        assert start.outcome in (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
-        # to begin the sweep, to begin it anew, and at the point; each ends with one solve under way
-        assert start.newton_iterations < 4 * LOADING.first_iterations
+    found = follow_branch(replace(model, linear={0: loose}), 0.5, 5.0, np.array([0.1]), "up", AUTOMATIC)
+    ((_, start),) = found
+    assert start.state is None
+    assert start.outcome in (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
+    # to begin the sweep, to begin it anew, and at the point; each ends with one solve under way
+    assert start.newton_iterations < 4 * LOADING.first_iterations
 
 
 def test_a_first_state_that_more_harmonics_refuse_begins_no_sweep(monkeypatch):

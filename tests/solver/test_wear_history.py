@@ -102,17 +102,6 @@ def test_adaptive_steps_are_of_second_order():
     assert -0.5 < slope < -0.3
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_wear_never_falls(scheme):
-    history = march(8000.0, scheme, FINE_OUTPUT)
-    assert (np.diff(history.wear_depth, axis=0) > 0).all()
-    assert (np.diff(history.worn_volume) > 0).all()
-    assert history.worn_volume == pytest.approx(history.wear_depth[:, 0] * AREA, rel=1e-14, abs=0.0)
-    assert history.worn_volume[0] == 0.0
-    assert np.array_equal(history.cycles, FINE_OUTPUT)
-    assert np.isnan(history.jump_cycle)
-
-
 @pytest.mark.slow
 def test_the_largest_depth_rule_is_of_first_order():
     histories = [march(1.0, "explicit", np.array([0.0, END]), largest_depth=largest) for largest in (4e-6, 2e-6, 1e-6)]

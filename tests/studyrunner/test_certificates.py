@@ -5,12 +5,12 @@ import itertools
 import numpy as np
 import pytest
 
-from studyrunner.checkpoint.records import record_of, record_type
 from studyrunner.plan.planning import build_tasks
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.certificates import CertificateTable
 from studyrunner.variables import CERTIFICATE
 from tests.studyrunner.fakes import FACTS, changed, fake_histories, without_values
+from tests.studyrunner.results_of import told
 
 GRID = (
     "axes.frequency=[160, 150, 155]",
@@ -38,18 +38,8 @@ def study_with_results(overrides=GRID):
     return study, results
 
 
-def summarise_certificates(study, results):
-    """The table of results that come in some at a time."""
-    table = CertificateTable(study, FACTS)
-    for some in (results[:1], results[1:6], results[6:]):
-        kind = record_type(study, FACTS)
-        records = np.concatenate([np.empty(0, kind), *(record_of(kind, result) for result in some)])
-        table.add([result.points for result in some], records)
-    return table.format()
-
-
 def table_of(study, results):
-    lines = summarise_certificates(study, results).splitlines()
+    lines = told(CertificateTable.format, lambda: CertificateTable(study, FACTS), study, results).splitlines()
     width = len(lines[0]) - len(lines[0].split("  ")[-1].lstrip())
     return {line[:width].strip(): line[width:].strip() for line in lines}
 
@@ -81,16 +71,6 @@ def test_worst_of_all_converged_points_and_where(name):
     place = next(index for index, result in enumerate(results) if np.nanmax(result.values[name]) > 0.8)
     results[place] = without_values(results[place], 4)
     assert table_of(study, results)[CERTIFICATE[name]] == worst_by_plain_loop(study, results, name)
-
-
-def test_order_of_the_results_does_not_matter():
-    study, results = study_with_results()
-    for place, jump in ((3, 700.0), (5, 700.0), (9, 900.0)):
-        results[place] = changed(results[place], jump_cycle=jump, fold_frequency=150.0 + place, oscillates=True)
-    forwards = summarise_certificates(study, results)
-    assert summarise_certificates(study, results[::-1]) == forwards
-    shuffled = [results[place] for place in np.random.default_rng(1).permutation(len(results))]
-    assert summarise_certificates(study, shuffled) == forwards
 
 
 def test_jumps_oscillation_and_unstable_states_are_counted():

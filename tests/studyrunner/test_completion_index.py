@@ -101,7 +101,17 @@ def test_a_run_that_stopped_anywhere_goes_on_there(n_tasks, folder):
         ("axes.frequency=[110, 120]", (0, 0)),
         ("axes.sweep=['up', 'ramp']", (3, 6)),
         ("solver.time_limit=100", (0, 0)),
-        ("solver.tolerance=1e-9", (6, 12)),
+        *((f"solver.{key}", (6, 12)) for key in ("tolerance=1e-9", "harmonics=5", "samples=128", "rtol=1e-3")),
+        ("scene.friction_coefficient=0.4", (6, 12)),
+        ("axes.scheme=['explicit']", (0, 12)),
+        ("axes.scheme=['adaptive']", (0, 6)),
+        ("outputs.loops=[0]", (0, 12)),
+        ("slow_time.cycles=2000", (0, 12)),
+        ("slow_time.outputs=[0, 400, 1000]", (0, 12)),
+        *((change, (0, 0)) for change in ("study.title='another'", "axes.frequency=[120, 100, 110]")),
+        *((f"axes.{change}", (0, 0)) for change in ("wear_coefficient=[1e-11, 5e-12]", "sweep=['down', 'up']")),
+        ("axes.excitation_amplitude=[9, 10]", (6, 12)),
+        ("axes.harmonics=['auto', 3]", (6, 12)),
     ],
 )
 def test_a_changed_study_computes_only_what_changed(change, expected, finished):
@@ -112,6 +122,19 @@ def test_a_changed_study_computes_only_what_changed(change, expected, finished):
     # and what it was before is still there, until a run of the changed one is finished
     with completion_of(finished) as completion:
         assert compute(completion) == (0, 0)
+
+
+def test_all_tasks_have_names_of_their_own(folder):
+    axes = ("axes.excitation_amplitude=[9, 10]", "axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.step=[10, 100]")
+    words = (
+        "axes.scheme=['implicit', 'explicit', 'adaptive']",
+        "axes.sweep=['up', 'down', 'ramp']",
+        "axes.harmonics=[3, 5]",
+    )
+    with completion_of(folder, *axes, *words) as completion:
+        n_marches = sum(len(line) for line in completion.plan.marches)
+        assert compute(completion) == (3 * 2 * 3 * 2, n_marches)
+        assert completion.n_points_finished == completion.plan.n_points == 648
 
 
 def test_points_that_failed_are_tried_again_where_asked_for_only(folder):

@@ -61,23 +61,3 @@ def test_a_date_changes_nothing_else(solver):
     assert main(SMALL) == 0
     assert attributes() == without
     assert solver.n_results == 0 < n_results
-
-
-def test_a_run_that_goes_on_has_the_date_of_its_end(solver, monkeypatch):
-    monkeypatch.setattr("studyrunner.cli.take_endings", lambda: None)
-
-    def end(_, number):
-        if number == 3:
-            raise KeyboardInterrupt
-
-    solver.disturb = end
-    assert main([*SMALL, "--date=2026-11-23"]) == 130
-    part, done = attributes(), solver.n_results - 1
-    assert part["date_created"] == "2026-11-23"
-    assert part["points_not_computed"] > 0  # type: ignore[operator]
-    solver.begin_again()
-    assert main([*SMALL, "--date=2026-11-24"]) == 0
-    whole = attributes()
-    assert whole["date_created"] == "2026-11-24"
-    assert whole["id"] == part["id"]
-    assert done + solver.n_results == 6

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from studyrunner.mpi import dispatch
-from studyrunner.mpi.dispatch import AHEAD_SECONDS, Dispatcher
+from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.plan.cost_model import CostModel
 
 
@@ -40,43 +40,6 @@ def make(n_ranks, *jobs):
 
 def handed_out(dispatcher):
     return [(rank, assignment.number) for rank, assignment in dispatcher.assign()]
-
-
-def test_openers_then_the_longest():
-    jobs = [Job("a", 5.0), Job("a", 7.0), Job("b", 3.0), Job("b", 9.0), Job("c", 0.5, 2, True)]
-    dispatcher, _ = make(1, *jobs)
-    order = []
-    for _ in jobs:
-        ((rank, number),) = handed_out(dispatcher)
-        order.append(number)
-        for _ in range(jobs[number].n_results):
-            dispatcher.deliver(rank, number, jobs[number].cost / jobs[number].n_results)
-    assert order == [4, 3, 1, 0, 2]
-    assert dispatcher.done
-
-
-def test_every_task_is_handed_out_once_and_no_rank_holds_more_than_two():
-    jobs = [Job(str(place % 7), 0.01 if place % 3 else 1.0) for place in range(200)]
-    dispatcher, clock = make(5, *jobs)
-    holds: dict[int, list[int]] = {rank: [] for rank in range(5)}
-    seen: list[int] = []
-    while not dispatcher.done:
-        for rank, number in handed_out(dispatcher):
-            holds[rank].append(number)
-            seen.append(number)
-        assert all(1 <= len(held) <= 2 for held in holds.values()) or len(seen) == len(jobs)
-        rank = max(holds, key=lambda rank: len(holds[rank]))
-        clock.now += 0.1
-        number = holds[rank].pop(0)
-        assert dispatcher.deliver(rank, number, jobs[number].cost) is jobs[number]
-    assert sorted(seen) == list(range(200))
-
-
-def test_nothing_waits_behind_a_long_task_or_a_row_of_results():
-    long, short, row = Job("a", 2.0 * AHEAD_SECONDS), Job("b", 0.5 * AHEAD_SECONDS), Job("c", 0.1, 5, True)
-    for job, n_held in ((long, 1), (short, 2), (row, 1)):
-        dispatcher, _ = make(1, job, *([short] * 5 if job is short else [long] * 5))
-        assert len(handed_out(dispatcher)) == n_held
 
 
 def test_what_waits_is_bounded(monkeypatch):

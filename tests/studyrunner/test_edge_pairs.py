@@ -11,7 +11,7 @@ from studyrunner.scene.edge_pairs import edge_pairs
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.edge_wear import EdgeWear
 from tests.studyrunner.fakes import FACTS
-from tests.studyrunner.results_of import batches, results_of
+from tests.studyrunner.results_of import results_of, told
 
 
 def contact_at(position, surface=None):
@@ -82,14 +82,7 @@ def row_of(depths, edge=BY_SIX.edge, **outcome):
         return np.asarray(1e-6 * np.outer(np.linspace(0.0, 1.0, n), last))
 
     results = results_of(study, wear_depth=depth, outcome=lambda point: outcome.get("at", 0) if point[0] == 1 else 0)
-    found = set()
-    for given in (results, results[::-1]):
-        wear = EdgeWear(study, facts)
-        for points, records in batches(study, given, facts=facts):
-            wear.add(points, records)
-        found.add(tuple(wear.rows()))
-    (rows,) = found
-    return list(rows)
+    return told(EdgeWear.rows, lambda: EdgeWear(study, facts), study, results, facts)
 
 
 LABEL = "wear at the edge of the contact"

@@ -91,16 +91,36 @@ def test_the_same_study_with_other_values_goes_on(solver):
     assert main([*FINER, "-o", "again.nc"]) == 0
 
 
+def a_text(path):
+    path.write_bytes(b"a text")
+
+
+def a_broken_file(path):
+    path.write_bytes(b"\x89HDF\r\n\x1a\nand no more")
+
+
+def a_netcdf_file(path):
+    xr.Dataset({"measured": ("time", [1.0, 2.0])}).to_netcdf(path)
+
+
+def a_scene(path):
+    assert main(["sdof_slider", "--write-scene", str(path)]) == 0
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("content", [b"a text", b"\x89HDF\r\n\x1a\nand no more"])
-def test_what_is_no_result_is_not_replaced_at_all(content, solver, capsys):
-    Path("out.nc").write_bytes(content)
+@pytest.mark.parametrize("make", [a_text, a_broken_file, a_netcdf_file, a_scene])
+def test_what_is_no_result_is_not_replaced_at_all(make, solver, capsys):
+    make(Path("out.nc"))
+    before = Path("out.nc").read_bytes()
+    capsys.readouterr()
     for more in ([], ["--overwrite"], ["--fresh"]):
         assert main([*SMALL, *more]) == 2
-        assert "it is no result of run-study" in capsys.readouterr().err
-    assert main(["sdof_slider", "--write-scene", "out.nc"]) == 2
-    assert "this is no scene file, and is left as it is" in capsys.readouterr().err
-    assert Path("out.nc").read_bytes() == content
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith('run-study: command line: -o = "')
+        assert ": remove the file or give another name: it is no result of run-study" in line
+    assert make is a_scene or main(["sdof_slider", "--write-scene", "out.nc"]) == 2
+    assert make is a_scene or "this is no scene file, and is left as it is" in capsys.readouterr().err
+    assert Path("out.nc").read_bytes() == before
     assert not solver.tasks
     assert list(Path().iterdir()) == [Path("out.nc")]
 

@@ -7,7 +7,6 @@ import pytest
 import xarray as xr
 
 from studyrunner.cli import main
-from studyrunner.plan.planning import build_tasks
 from studyrunner.report.drawing import Drawing
 from studyrunner.report.figures.excitation import draw_excitation
 from studyrunner.report.reading.result import Result
@@ -15,6 +14,7 @@ from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.studyrunner.test_scene_axes import arguments, compute
 
+pytestmark = pytest.mark.usefixtures("folder")
 SLIDER = {
     "axes.frequency": "resonance",
     "axes.wear_coefficient": [1.1e-11, 5.5e-12],
@@ -28,11 +28,6 @@ SLIDER = {
     "solver.samples": 64,
 }
 SAMPLES = {"scatter.frequency": {"scatter.samples": 3}}
-
-
-@pytest.fixture(autouse=True)
-def _in_folder(folder):
-    """Results go to a folder of their own."""
 
 
 def computed(path, **more):
@@ -121,16 +116,6 @@ def test_the_effective_study_is_the_same_study():
     again = read_study("again.toml")
     assert again.follow == study.follow
     assert format_study(again) == text
-
-
-def test_a_task_says_what_it_follows():
-    for word in ("resonance", "peak"):
-        study = read_study("sdof_slider", {**SLIDER, "axes.frequency": word})
-        plan = build_tasks(study, 2)
-        follows = [task.follow for task in (*plan.branches, *plan.marches[0])]
-        assert follows == [study.follow] * 2
-        assert study.follow is not None
-        assert (study.follow.of, study.follow.low, study.follow.high) == (word, 180.0, 230.0)
 
 
 @pytest.mark.parametrize(

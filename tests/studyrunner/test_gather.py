@@ -103,16 +103,6 @@ def test_all_variables_with_their_dimensions_and_units(opened):
     assert all(opened[name].attrs["units"] for name in opened.variables)
 
 
-def test_outcome_is_a_flag_variable(opened):
-    attributes = opened.outcome.attrs
-    assert opened.outcome.dtype == np.int8
-    assert attributes["flag_values"].dtype == np.int8
-    assert attributes["flag_values"].tolist() == list(Outcome)
-    assert attributes["flag_meanings"].split()[0] == "converged"
-    assert len(attributes["flag_meanings"].split()) == len(Outcome)
-    assert attributes["sentences"].splitlines() == [ending.sentence for ending in Outcome]
-
-
 def test_a_point_that_failed_opens_as_nan_and_0(tmp_path):
     results = fake_results()
     results[0] = without_values(results[0], 6)

@@ -15,7 +15,7 @@ from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.mpi import schedule
 from studyrunner.plan.tasks import BranchTask, MarchTask
-from tests.mpi.launching import count_rows
+from tests.mpi.launching import count_rows, results
 from tests.studyrunner.faked_runs import SMALL
 from tests.studyrunner.fakes import fake_branch
 
@@ -25,16 +25,11 @@ N_POINTS, N_RESULTS = 8, 4 + 8
 TWO_WAYS = [*SMALL[:-2], "--set", "axes.sweep=['up', 'down']", *SMALL[-2:]]
 
 
-def load(name="out.nc"):
-    with xr.open_dataset(name) as result:
-        return result.load().drop_vars("run_time")
-
-
 def whole(solver):
     """The result of a run that nothing disturbs."""
     assert main([*TWO_WAYS[:-1], "whole.nc"]) == 0
     solver.begin_again()
-    return load("whole.nc")
+    return results("whole.nc")
 
 
 def assert_partial(found, expected):
@@ -60,14 +55,14 @@ def test_an_interrupt_in_any_task(at, solver, capsys):
     solver.disturb = interrupt
     capsys.readouterr()
     assert main(TWO_WAYS) == 130
-    n_there = assert_partial(load(), expected)
+    n_there = assert_partial(results(), expected)
     said = capsys.readouterr().err.splitlines()[-1]
     assert said == f"run-study: interrupted: out.nc holds {n_there} of {N_POINTS} points, the same command goes on"
     n_first = solver.n_results - 1
     solver.begin_again()
     assert main(TWO_WAYS) == 0
     assert n_first + solver.n_results == N_RESULTS
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)
     again = capsys.readouterr().err
     assert (f"{n_there} of {N_POINTS} points are there from an earlier run" in again) == (n_there > 0)
 
@@ -94,9 +89,9 @@ def test_an_interrupt_anywhere_in_the_main_thread(where, at, solver, monkeypatch
         changed.setattr(Store, where, called)
         status = main(TWO_WAYS)
     assert status == (130 if n_calls >= at else 0)
-    assert_partial(load(), expected)
+    assert_partial(results(), expected)
     assert main(TWO_WAYS) == 0
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)
 
 
 @pytest.mark.slow
@@ -110,7 +105,7 @@ def test_an_exception_is_one_bad_point(solver, capsys):
     solver.disturb = fail
     assert main(TWO_WAYS) == 3
     assert "1 x exception: The computation ended with an unexpected error" in capsys.readouterr().out
-    found = load()
+    found = results()
     bad = {"frequency": 100.0, "sweep": "down", "wear_coefficient": 1e-11}
     assert found.outcome.sel(bad).item() == 11
     line = str(found.message.sel(bad).item())
@@ -122,22 +117,11 @@ def test_an_exception_is_one_bad_point(solver, capsys):
     solver.begin_again()
     assert main(TWO_WAYS) == 3
     assert solver.tasks == []
-    xr.testing.assert_identical(load(), found)
+    xr.testing.assert_identical(results(), found)
     # unless it is asked to
     assert main([*TWO_WAYS, "--retry-failed"]) == 0
     assert len(solver.tasks) == 1
-    xr.testing.assert_identical(load(), expected)
-
-
-def test_an_earlier_run_is_forgotten_where_asked_for(solver, capsys):
-    expected = whole(solver)
-    assert main(TWO_WAYS) == 0
-    n_tasks = len(solver.tasks)
-    solver.begin_again()
-    assert main([*TWO_WAYS, "--fresh"]) == 0
-    assert len(solver.tasks) == n_tasks
-    assert "from an earlier run" not in capsys.readouterr().err
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)
 
 
 def test_a_second_run_of_the_same_study_is_refused(solver, capsys, monkeypatch):
@@ -177,7 +161,7 @@ def test_progress_is_gone_on_from(solver, monkeypatch):
     marches = [task for task in solver.tasks if isinstance(task, MarchTask)]
     assert len(marches) == 8
     assert all(task.resume == Packed("half of it", (np.array([task.number]),)) for task in marches)
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)
     assert count_rows("under_way") == 0
 
 
@@ -207,7 +191,7 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver, monkeypatch):
     with contextlib.closing(sqlite3.connect("out.nc.progress")) as database, database:
         database.execute("DELETE FROM start_states")
     assert main(TWO_WAYS) == 0
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)
 
 
 @pytest.mark.slow
@@ -240,7 +224,7 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
     with monkeypatch.context() as slow:
         slow.setattr(newton, "computing_time", clock)
         assert main([*study, "--set", "solver.time_limit=1e6"]) == 3
-        reached = load().last_cycle.item()
+        reached = results().last_cycle.item()
         assert 0.0 < reached < 100_000.0
         # without being asked it is not tried again
         assert main([*study, "--set", "solver.time_limit=1e6"]) == 3
@@ -248,7 +232,7 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
     assert main([*study, "--retry-failed", "--set", "solver.time_limit=2e6"]) == 0
     assert [resume is not None for resume in begun] == [False, True]
     # but for the limit, which stands in their attributes
-    xr.testing.assert_equal(load(), load("whole.nc"))
+    xr.testing.assert_equal(results(), results("whole.nc"))
     assert count_rows("under_way") == 0
 
 
@@ -270,4 +254,4 @@ def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver):
     assert main([*TWO_WAYS, "--retry-failed"]) == 0
     assert [type(task) for task in solver.tasks][:1] == [BranchTask]
     assert solver.n_results == 1 + 2 or solver.n_results == 1
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)

@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Protocol
 
 import h5py
 import pytest
@@ -68,12 +67,6 @@ def folder(made, tmp_path, monkeypatch):
     (tmp_path / "s.nc").rename(tmp_path / "result")
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-class Refused(Protocol):
-    """Runs the command and returns its one line; time and memory are within the limits."""
-
-    def __call__(self, arguments, allowed=False): ...
 
 
 @pytest.fixture

@@ -11,17 +11,13 @@ from studyrunner.cli import main
 from studyrunner.scene import scene as scene_room
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
+from tests.mpi.launching import results
 
 pytestmark = pytest.mark.usefixtures("reader", "folder")
 
 SLIDER = ["sdof_slider", "--set", "axes.frequency=[150, 160]", "--set", "slow_time.cycles=2000"]
 SLIDER += ["--set", "slow_time.outputs=3", "--set", "outputs.variables=['default', 'exact']"]
 KEEP = ["--set", "outputs.scene=true"]
-
-
-def contents(path):
-    with xr.open_dataset(path) as result:
-        return result.load().drop_vars("run_time")
 
 
 @pytest.fixture
@@ -38,7 +34,7 @@ def not_built(monkeypatch):
 def test_the_result_is_enough(not_built):
     assert main([*SLIDER, "-o", "plain.nc"]) == 0
     assert main([*SLIDER, *KEEP, "-o", "kept.nc"]) == 0
-    plain, kept = contents("plain.nc"), contents("kept.nc")
+    plain, kept = results("plain.nc"), results("kept.nc")
     assert {name for name in kept.attrs if kept.attrs[name] != plain.attrs[name]} == {"study", "id"}
     xr.testing.assert_identical(kept.drop_attrs(), plain.drop_attrs())
     with netCDF4.Dataset("plain.nc") as file:
@@ -46,7 +42,7 @@ def test_the_result_is_enough(not_built):
 
     not_built()
     assert main(["kept.nc", "-o", "again.nc"]) == 0
-    xr.testing.assert_identical(contents("again.nc"), kept)
+    xr.testing.assert_identical(results("again.nc"), kept)
     with netCDF4.Dataset("kept.nc") as one, netCDF4.Dataset("again.nc") as other:
         assert one["scene/stiffness"][:].tolist() == other["scene/stiffness"][:].tolist()
         assert set(one["scene"].groups) == {"contact", "load", "response"}
@@ -64,11 +60,11 @@ def test_it_is_the_model_in_the_file_that_is_run(not_built, capsys):
             values[...] = 2.0 * values[...]
     not_built()
     capsys.readouterr()
-    one = contents("kept.nc")
+    one = results("kept.nc")
     half = ["--set", f"axes.wear_coefficient={0.5 * one.wear_coefficient.item()!r}"]
     assert main(["kept.nc", *half, "-o", "twice.nc"]) == 0
     assert "another scene" in capsys.readouterr().err
-    twice = contents("twice.nc")
+    twice = results("twice.nc")
     assert float(one.worn_volume.max()) > 0.0
     for name, factor in (("response_amplitude", 1.0), ("worn_volume", 1.0), ("mean_pressure", 2.0)):
         np.testing.assert_allclose(twice[name].values, factor * one[name].values, rtol=1e-6)

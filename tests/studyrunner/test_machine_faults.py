@@ -15,16 +15,13 @@ from studyrunner.cli import main
 from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.plan.cost_model import CostModel
 from studyrunner.plan.tasks import BranchTask, MarchTask
+from tests.mpi.launching import results
 from tests.studyrunner.faked_runs import SMALL
+from tests.studyrunner.test_dispatch import Job
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.processes]
 
 FAULTS = [OSError(122, "Disk quota exceeded"), MemoryError()]
-
-
-def load():
-    with xr.open_dataset("out.nc") as result:
-        return result.load().drop_vars("run_time")
 
 
 def failing(error, n_times, kind):
@@ -49,8 +46,7 @@ def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(error, kind,
     solver.begin_again()
     solver.disturb = failing(error, 1, kind)
     assert main(SMALL) == 0
-    with xr.open_dataset("whole.nc") as whole:
-        xr.testing.assert_identical(load(), whole.load().drop_vars("run_time"))
+    xr.testing.assert_identical(results(), results("whole.nc"))
     said = capsys.readouterr().err
     assert said.count(f"rank 0: {type(error).__name__}") == 1
     assert "a fault of the machine; the task is tried once more" in said
@@ -63,14 +59,13 @@ def test_a_fault_that_stays_is_never_a_result(kind, solver):
     solver.begin_again()
     solver.disturb = failing(FAULTS[0], 2, kind)
     assert main(SMALL) == 3
-    outcomes = set(load().outcome.values.flat)
+    outcomes = set(results().outcome.values.flat)
     assert Outcome.NOT_COMPUTED in outcomes
     assert outcomes <= {0, Outcome.NOT_COMPUTED}
     # the same command goes on, and nothing of it is left
     solver.begin_again()
     assert main(SMALL) == 0
-    with xr.open_dataset("whole.nc") as whole:
-        xr.testing.assert_identical(load(), whole.load().drop_vars("run_time"))
+    xr.testing.assert_identical(results(), results("whole.nc"))
 
 
 @pytest.mark.slow
@@ -90,21 +85,12 @@ def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch):
     monkeypatch.setattr(WearingJoint, "noted", noted)
     assert main([*SMALL, "--set", "solver.harmonics=3", "--set", "solver.samples=32"]) == 0
     assert n_calls > 30
-    assert (load().outcome == 0).all()
-
-
-class Chore:
-    cost, n_results, opens_others = 1.0, 1, False
-    cost_keys = (("chore",),)
-
-    def cost_of(self, *, first):
-        del first
-        return self.cost
+    assert (results().outcome == 0).all()
 
 
 def test_a_sick_rank_gets_no_more_tasks_unless_all_are():
-    dispatcher: Dispatcher[Chore] = Dispatcher(3, CostModel(), time.monotonic)
-    dispatcher.add([Chore() for _ in range(20)])
+    dispatcher: Dispatcher[Job] = Dispatcher(3, CostModel(), time.monotonic)
+    dispatcher.add([Job("chore", 1.0) for _ in range(20)])
     held = [(rank, given.number) for rank, given in dispatcher.assign()]
     ranks: list[int] = []
     while held:
@@ -118,7 +104,7 @@ def test_a_sick_rank_gets_no_more_tasks_unless_all_are():
     assert dispatcher.done
     assert set(ranks) == {1}
     dispatcher.shun(1)
-    dispatcher.add([Chore()])
+    dispatcher.add([Job("chore", 1.0)])
     assert [rank for rank, _ in dispatcher.assign()] == [1]
     # where the others are lost a sick one is better than none
     dispatcher.add_lost([task for task, _ in dispatcher.lose(1)])

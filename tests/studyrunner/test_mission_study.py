@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 
 from solver import Block, Outcome, Passage, integrate_mission
-from solver.settings import SolverSettings
 from studies import build_scene
 from studyrunner.api import run_study
 from studyrunner.mpi import schedule
@@ -302,10 +301,3 @@ def test_samples_draw_what_all_blocks_have(study_file, blocks):
         assert loads["cruise"] == load
         assert loads["heavy"] == pytest.approx(12.0 + load - 10.0)
     assert len(set(result.worn_volume.isel(mission=-1).values.ravel())) == 3
-
-
-@pytest.mark.slow
-def test_settings_of_a_mission_are_those_of_the_study(study_file, blocks):
-    run(study_file, overrides={"axes.frequency": 160, "axes.sweep": "up", "axes.rtol": [1e-2, 1e-3]})
-    assert {case.mission.settings.rtol for case in blocks.flown} == {1e-2, 1e-3}
-    assert isinstance(blocks.flown[0].settings, SolverSettings)

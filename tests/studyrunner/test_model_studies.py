@@ -113,14 +113,6 @@ def test_what_is_wrong_is_said_in_a_sentence(overrides, expected, folder):
     assert expected in message(*overrides)
 
 
-def test_wrong_decks_end_with_one_line(folder, capsys):
-    (folder / "sector.inp").write_bytes(b"*NODE\n1, 0., nan, 1e999\n\xff\x00")
-    assert main(["wear.toml", "--plan"]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert error.startswith("run-study: wear.toml: scene.model: sector.inp")
-
-
 def test_check_says_what_the_model_is(folder, capsys):
     assert main(["wear.toml", "--check"]) == 0
     shown = capsys.readouterr().out

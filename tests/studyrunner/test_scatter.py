@@ -106,12 +106,6 @@ def test_designs_fill_the_cube_and_further_columns_change_none(method):
         assert not np.array_equal(unit_design(method, 4, 256, 4), design)
 
 
-@pytest.mark.parametrize("method", ["sobol", "random", "saltelli"])
-def test_more_samples_go_on_from_those_there_are(method):
-    few, many = unit_design(method, 1, 64, 3), unit_design(method, 1, 128, 3)
-    np.testing.assert_array_equal(many[: len(few)], few)
-
-
 def test_a_scrambled_sobol_sequence_is_a_digital_net():
     """128 points, of the first two columns: one in each cell of 2^-k times 2^-(7-k), as without scrambling."""
     design = unit_design("sobol", 7, 128, 2)

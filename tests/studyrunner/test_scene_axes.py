@@ -14,9 +14,11 @@ from studyrunner.plan.planning import build_tasks
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
+from tests.mpi.launching import results
 from tests.studies.fe_models.decks import SECTOR
 from tests.studyrunner.test_model_studies import STUDY as SECTOR_STUDY
 
+pytestmark = pytest.mark.usefixtures("folder")
 CHEAP = (
     *("axes.frequency=160", "axes.scheme=implicit", "axes.step=1000", "solver.harmonics=3", "solver.samples=32"),
     *("slow_time.cycles=2000", "slow_time.outputs=3"),
@@ -32,8 +34,7 @@ def arguments(study, output, *overrides):
 def compute(study, output, *overrides):
     """A result without what depends on the machine."""
     assert main(arguments(study, output, *overrides)) == 0
-    with xr.open_dataset(output) as opened:
-        return opened.load().drop_vars("run_time")
+    return results(output)
 
 
 def same_values(one, other):
@@ -41,11 +42,6 @@ def same_values(one, other):
     assert set(one.data_vars) == set(other.data_vars)
     for name in one.data_vars:
         np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=str(name), strict=True)
-
-
-@pytest.fixture(autouse=True)
-def _in_folder(folder):
-    """Results go to a folder of their own."""
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 import sys
 import threading
 import time
-from dataclasses import dataclass
 
 import pytest
 
@@ -12,22 +11,7 @@ from studyrunner.mpi.launcher import LauncherError, launcher_rank, launcher_size
 from studyrunner.mpi.ranks import Alone, start_ranks
 from studyrunner.mpi.schedule import Handlers, _Delivery, serve_tasks
 from studyrunner.plan.cost_model import CostModel
-
-
-@dataclass(frozen=True)
-class Job:
-    name: str
-    cost: float
-    n_results: int = 1
-    opens_others: bool = False
-
-    def cost_of(self, *, first):
-        del first
-        return self.cost / self.n_results
-
-    @property
-    def cost_keys(self):
-        return (("job", self.name),)
+from tests.studyrunner.test_dispatch import Job
 
 
 def take_nothing(job, result):
@@ -44,11 +28,11 @@ def test_long_tasks_go_first_and_results_make_new_ones():
     done: list[tuple[str, object]] = []
 
     def run(job):
-        yield job.name.upper()
+        yield job.kind.upper()
 
     def take(job, result):
-        done.append((job.name, result))
-        return [Job("a1", 1e5), Job("a2", 1e6)] if job.name == "a" else []
+        done.append((job.kind, result))
+        return [Job("a1", 1e5), Job("a2", 1e6)] if job.kind == "a" else []
 
     serve([Job("b", 10.0), Job("a", 1.0, opens_others=True)], run, take)
     assert done == [("a", "A"), ("a2", "A2"), ("a1", "A1"), ("b", "B")]
@@ -134,12 +118,12 @@ def test_tasks_of_a_lost_rank_are_given_to_others():
     backs: list[tuple[int, list[tuple[str, int]]]] = []
 
     def take(job, result):
-        taken.append((job.name, result))
+        taken.append((job.kind, result))
         return []
 
     def take_back(rank, lost):
-        backs.append((rank, [(job.name, n_left) for job, n_left in lost]))
-        return [Job(f"{job.name} again", job.cost, n_left) for job, n_left in lost]
+        backs.append((rank, [(job.kind, n_left) for job, n_left in lost]))
+        return [Job(f"{job.kind} again", job.cost, n_left) for job, n_left in lost]
 
     def run(job, keep):
         for _ in range(job.n_results):
@@ -151,5 +135,5 @@ def test_tasks_of_a_lost_rank_are_given_to_others():
     ((rank, [(name, n_left)]),) = backs
     assert (rank, n_left) == (2, 2)
     assert sorted(taken) == sorted(
-        [(job.name, "done") for job in jobs if job.name != name for _ in range(2)] + [(f"{name} again", "done")] * 2
+        [(job.kind, "done") for job in jobs if job.kind != name for _ in range(2)] + [(f"{name} again", "done")] * 2
     )

@@ -14,6 +14,7 @@ from studyrunner.cli import main
 from studyrunner.netcdf import provenance
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
+from tests.mpi.launching import results
 
 pytestmark = pytest.mark.usefixtures("reader")
 
@@ -85,12 +86,6 @@ def slider(made, folder):
     return Path(shutil.copy(made / "slider.nc", folder))
 
 
-def contents(path):
-    """All that the file holds but what differs from run to run."""
-    with xr.open_dataset(path) as result:
-        return result.load().drop_vars("run_time")
-
-
 def groups(path):
     """What the group of the scene holds."""
     found: dict[str, object] = {}
@@ -114,7 +109,7 @@ def test_a_written_scene_gives_the_same_result(folder):
     assert main(["dovetail", "--write-scene", "files/scene.h5", *options(*COARSE, *OUTPUTS)]) == 0
     Path("s.toml").write_text(STUDY, encoding="utf-8")
     assert main(["s.toml", "-o", "file.nc"]) == 0
-    own, file = contents("own.nc"), contents("file.nc")
+    own, file = results("own.nc"), results("file.nc")
     assert "mesh_quad" in own
     assert list(own.variables) == list(file.variables)
     differing = {name for name in own.attrs if own.attrs[name] != file.attrs[name]}
@@ -127,7 +122,7 @@ def test_a_written_scene_gives_the_same_result(folder):
     shutil.move("file.nc", "elsewhere/moved.nc")
     shutil.rmtree("files")
     assert main(["elsewhere/moved.nc", "-o", "again.nc"]) == 0
-    xr.testing.assert_identical(contents("again.nc"), contents("elsewhere/moved.nc"))
+    xr.testing.assert_identical(results("again.nc"), results("elsewhere/moved.nc"))
     assert groups("again.nc") == groups("elsewhere/moved.nc")
 
 
@@ -165,7 +160,7 @@ def test_a_result_of_a_bundled_scene_runs_again(folder, capsys):
     capsys.readouterr()
     assert main(["renamed.nc"]) == 0
     assert "scene_sha256" not in capsys.readouterr().err
-    xr.testing.assert_identical(contents("sdof_slider.nc"), contents("renamed.nc"))
+    xr.testing.assert_identical(results("sdof_slider.nc"), results("renamed.nc"))
 
 
 @pytest.mark.slow

@@ -54,21 +54,6 @@ def test_tasks_that_run_count_for_the_time_left_and_are_named():
     assert 0.2e6 <= alone.look([(march, 1, 1e6)]).seconds_left <= 0.5e6
 
 
-def test_finished_marches_are_kept_with_their_results():
-    plan = plan_of()
-    completion = MemoryIndex(plan)
-    progress = TaskProgress(completion)
-    for branch in plan.branches:
-        for started in fake_branch(branch):
-            for task in progress.take(branch, started):
-                progress.take(task, fake_march(task))
-    kept = [(task.number, result.points) for task, result in completion.histories]
-    assert sorted(kept) == [(task.number, task.points) for line in plan.marches for task in line]
-    assert [(branch.number, start.position) for branch, start in completion.starts] == [
-        (branch.number, position) for branch in plan.branches for position in branch.order
-    ]
-
-
 @pytest.mark.parametrize("n_ranks", [1, 3, 1000])
 def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks):
     """Equal costs and no overheads: the time is that of the work, or of a branch and a march."""

@@ -11,6 +11,7 @@ from studyrunner.checkpoint.database import RESULTS
 from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
+from tests.mpi.launching import results
 from tests.studyrunner.faked_runs import Solver
 from tests.studyrunner.test_store import assert_same, entries_of, fill, kept, key, put
 
@@ -85,24 +86,21 @@ def test_two_studies_with_one_result_file_do_not_mix(at, monkeypatch):
     expected = {}
     for name, command in (("first.nc", SMALL), ("second.nc", VARIANT)):
         assert main([*command[:-1], name] if command is SMALL else [*command, "-o", name]) == 0
-        with xr.open_dataset(name) as result:
-            expected[name] = result.load().drop_vars("run_time")
+        expected[name] = results(name)
     status: list[int] = []
 
     def run_the_other(_, n_results):
         if n_results == at and not status:
             status.append(-1)
             status[0] = main(VARIANT)
-            with xr.open_dataset("out.nc") as result:
-                xr.testing.assert_identical(result.load().drop_vars("run_time"), expected["second.nc"])
+            xr.testing.assert_identical(results(), expected["second.nc"])
 
     solver.begin_again()
     solver.disturb = run_the_other
     monkeypatch.setattr("studyrunner.cli.take_endings", lambda: None)
     assert main(SMALL) == 0
     assert status == [0]
-    with xr.open_dataset("out.nc") as result:
-        xr.testing.assert_identical(result.load().drop_vars("run_time"), expected["first.nc"])
+    xr.testing.assert_identical(results(), expected["first.nc"])
 
 
 @pytest.mark.slow
@@ -126,5 +124,4 @@ def test_a_result_that_goes_during_the_run_is_no_result(change, monkeypatch):
         assert int(there.sum()) == there.size // 2
         xr.testing.assert_equal(result.worn_volume.where(there), whole.worn_volume.where(there))
     assert main(SMALL) == 0
-    with xr.open_dataset("out.nc") as result, xr.open_dataset("whole.nc") as whole:
-        xr.testing.assert_identical(result.load().drop_vars("run_time"), whole.load().drop_vars("run_time"))
+    xr.testing.assert_identical(results(), results("whole.nc"))

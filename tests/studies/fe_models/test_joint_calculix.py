@@ -1,5 +1,6 @@
 """Glued frequencies of whole models against CalculiX, which reads the same meshes. Needs its command `ccx`."""
 
+import re
 import shutil
 
 import numpy as np
@@ -9,13 +10,25 @@ from studies.fe_models.nodal_matrices import order_by_nodes
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.finite_element.joint_model import ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
-from tests.studies.calculix_deck import read_frequencies
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
 from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, node_set, read_export, run_ccx
 
 pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 
 N_MODES = 4
+
+
+def read_frequencies(table, n_modes):
+    """The lowest n_modes different natural frequencies, Hz, of a step with cyclic symmetry.
+
+    CalculiX finds each twice, as the real and the imaginary part of a rotating wave, nodal diameter 0 included: a step
+    has to ask for 2 n_modes.
+    """
+    number = r"(-?\d\.\d+E[+-]\d+)"
+    rows = re.findall(rf"^ +\d+ +\d+ +{number} +{number} +{number} +{number} *$", table, re.MULTILINE)
+    values = np.sort([float(row[2]) for row in rows])
+    different = values[np.append(True, np.diff(values) > 1e-5 * values[1:])]
+    return np.asarray(different[:n_modes])
 
 
 def surface_lines(name, elements, faces):

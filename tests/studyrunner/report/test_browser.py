@@ -1,53 +1,32 @@
 """The page in a real headless browser without a network: slider, clicks and lists show the numbers of the file."""
 
-import re
-import shutil
 from typing import Any
 
 import numpy as np
 import pytest
+from selenium.webdriver.common.keys import Keys
 
-from studyrunner.report.page.page import write_page
-from tests.studyrunner.report.page_cases import SENTENCES, as_result, build_file
+from tests.studyrunner.report.browsing import (
+    DESKTOP,
+    FACTORS,
+    MARKS,
+    PHONE,
+    choose,
+    click_at,
+    load,
+    map_pairs,
+    map_values,
+    messages,
+    numbers,
+    press,
+    selected,
+    write,
+)
+from tests.studyrunner.report.page_cases import SENTENCES, build_file
 
-CHROMIUM, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
-]
-
+pytestmark = MARKS
 EVIL = "</script><img src=x onerror='window.hurt=1'><script>window.hurt=2</script>"
-FACTORS = {"mm": 1e3, "µm": 1e6, "nm": 1e9, "mm³": 1e9, "µm³": 1e18, "mm³ per kcycle": 1e12, "kPa": 1e-3, "Pa": 1.0}
-FACTORS |= {"%": 100.0, "mPa": 1e3, "mN": 1e3, "m": 1.0, "N": 1.0, "mm³ per cycle": 1e9, "µm³ per cycle": 1e18, "": 1.0}
 FAILED = 5
-DESKTOP, PHONE = (1400, 1000), (400, 800)
-PATIENCE = 120.0  # s
-
-
-@pytest.fixture(scope="module")
-def browser():
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for argument in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-dev-shm-usage",
-        "--host-resolver-rules=MAP * ~NOTFOUND",
-        "--enable-unsafe-swiftshader",  # draws in three dimensions without a graphics card
-        f"--window-size={DESKTOP[0]},{DESKTOP[1]}",
-    ):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
-    driver.set_script_timeout(PATIENCE)
-    driver.set_page_load_timeout(PATIENCE)
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +46,6 @@ def address(dataset, tmp_path_factory):
 @pytest.fixture
 def page(browser, address, dataset):
     """The page as it looks at first, without errors to the end; loaded only where another one was: that takes time."""
-    from selenium.webdriver.common.keys import Keys
 
     if browser.current_url != address:
         load(browser, address)
@@ -80,114 +58,6 @@ def page(browser, address, dataset):
     press(browser, Keys.END)
     yield browser
     assert messages(browser) == []
-
-
-def messages(browser):
-    """What the browser has to say of the page, but for hints on the speed of drawing."""
-    return [each for each in browser.get_log("browser") if each["source"] != "rendering"]
-
-
-def write(dataset, folder):
-    write_page(as_result(dataset, folder / "some.nc"), [], folder / "index.html")
-    return (folder / "index.html").as_uri()
-
-
-def load(browser, address):
-    browser.get(address)
-    assert messages(browser) == []
-    assert browser.execute_script("return document.getElementById('explore-failed').hidden")
-    assert not browser.execute_script("return document.getElementById('explore').hidden")
-
-
-def map_values(page):
-    script = "return document.getElementById('map-plot').data.map(trace => trace.z)"
-    found: list[list[list[float]]] = page.execute_script(script)
-    return found
-
-
-def map_pairs(page):
-    script = "return document.getElementById('map-plot').data.map(trace => trace.customdata)"
-    found: list[list[list[int]]] = page.execute_script(script)
-    return found
-
-
-def numbers(page):
-    """The list beside the plots, back in the units of the file."""
-    rows = "[...document.querySelectorAll('#readout div')]"
-    found = {}
-    for name, text in page.execute_script(f"return {rows}.map(row => [row.dataset.name, row.children[1].title])"):
-        number, unit = re.fullmatch(r"(\S+?)(?:\s(.*))?", re.sub(r"(?<=\d)\s(?=\d{3}\b)", "", text)).groups()  # type: ignore[union-attr]
-        try:
-            found[name] = float(number) / FACTORS.get(unit or "", 1.0)
-        except ValueError:
-            found[name] = np.nan
-    return found
-
-
-def choose(page, name, index):
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.support.select import Select
-
-    Select(page.find_element(By.CSS_SELECTOR, f"select[name='{name}']")).select_by_index(index)
-
-
-def press(page, *keys):
-    from selenium.webdriver.common.by import By
-
-    page.find_element(By.ID, "cycle").send_keys(*keys)
-    wait_for_frame(page)
-
-
-def wait_for_frame(page):
-    page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(() => arguments[0]()))")
-
-
-def click_at(page, point, name="response-plot"):
-    """A press of the mouse on the pixel at which a plot shows a point; the point is picked afterwards."""
-    from selenium.webdriver import ActionChains
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.support.wait import WebDriverWait
-
-    script = """
-    const plot = document.getElementById(arguments[1]);
-    plot.scrollIntoView({block: "center", behavior: "instant"});
-    const box = plot.getBoundingClientRect();
-    for (const trace of plot.data) {
-      const at = (trace.customdata || []).indexOf(arguments[0]);
-      if (at < 0 || !Number.isFinite(trace.y[at])) continue;
-      const { xaxis, yaxis } = plot._fullLayout;
-      const x = xaxis._offset + xaxis.d2p(trace.x[at]), y = yaxis._offset + yaxis.d2p(trace.y[at]);
-      return [x - box.width / 2, y - box.height / 2];
-    }"""
-    plot = page.find_element(By.ID, name)
-    # behind the listener of the page
-    page.execute_script(
-        """
-        const plot = arguments[0];
-        plot.clicked = null;
-        plot.listens ??= plot.on("plotly_click", (event) => { plot.clicked = event.points[0].customdata; });
-        """,
-        plot,
-    )
-
-    def hover(_):
-        # a click is one on what the plot has found under the mouse before, which it does in its own time
-        x, y = page.execute_script(script, point, name)
-        actions = ActionChains(page).move_to_element_with_offset(plot, round(x) - 3, round(y) + 2)
-        actions.move_by_offset(3, -2).perform()
-        wait_for_frame(page)
-        found = page.execute_script("return (arguments[0]._hoverdata || []).map((each) => each.customdata)", plot)
-        return point in found
-
-    wait = WebDriverWait(page, PATIENCE, poll_frequency=0.1)
-    wait.until(hover)
-    ActionChains(page).click().perform()
-    wait.until(lambda _: page.execute_script("return arguments[0].clicked", plot) == point)
-
-
-def selected(page):
-    text: str = page.execute_script("return document.getElementById('selected').textContent")
-    return text
 
 
 def assert_maps_are(page, dataset, name, point, cycle):
@@ -244,7 +114,6 @@ def test_texts_of_the_file_do_nothing(page, dataset):
 
 
 def test_the_slider_turns_the_maps_to_another_cycle(page, dataset):
-    from selenium.webdriver.common.keys import Keys
 
     point = shown_point(dataset)
     assert_maps_are(page, dataset, "mean_pressure", point, 4)
@@ -259,7 +128,6 @@ def test_the_slider_turns_the_maps_to_another_cycle(page, dataset):
 
 
 def test_the_response_is_that_of_the_cycle_with_the_first_as_ghost(page, dataset):
-    from selenium.webdriver.common.keys import Keys
 
     press(page, Keys.HOME, Keys.ARROW_RIGHT)
     data = "document.getElementById('response-plot').data"
@@ -322,7 +190,6 @@ def test_a_point_that_ended_early_is_shown_as_far_as_it_went(browser, tmp_path):
     (crosses,) = [x for meta, x, _ in browser.execute_script(script.format("response-plot")) if meta == "failed"]
     assert crosses == [dataset["frequency"].values[place[0]]]
     assert map_values(browser) == []
-    from selenium.webdriver.common.keys import Keys
 
     press(browser, Keys.HOME)
     assert map_values(browser) != []

@@ -3,25 +3,10 @@
 import numpy as np
 import pytest
 
+from tests.studyrunner.report.browsing import MARKS, choose, click_at, load, map_values, messages, selected, write
 from tests.studyrunner.report.scatter_cases import N_SAMPLES, sample_file
-from tests.studyrunner.report.test_browser import (  # noqa: F401 - the fixture is used by its name
-    CHROMIUM,
-    DRIVER,
-    browser,
-    choose,
-    click_at,
-    load,
-    map_values,
-    messages,
-    selected,
-    write,
-)
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
-]
+pytestmark = MARKS
 
 SAMPLE = 7
 
@@ -32,7 +17,7 @@ def dataset():
 
 
 @pytest.fixture(scope="module")
-def page(browser, dataset, tmp_path_factory):  # noqa: F811
+def page(browser, dataset, tmp_path_factory):
     load(browser, write(dataset, tmp_path_factory.mktemp("samples")))
     yield browser
     assert messages(browser) == []

@@ -5,27 +5,21 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from selenium.webdriver.support.wait import WebDriverWait
 
-from tests.studyrunner.report.page_cases import AXES, SENTENCES, build_file
-from tests.studyrunner.report.test_browser import (  # noqa: F401 - the fixture is used by its name
-    CHROMIUM,
-    DRIVER,
+from tests.studyrunner.report.browsing import (
+    MARKS,
     PATIENCE,
-    browser,
     choose,
+    click_at,
     load,
     messages,
-    press,
     selected,
-    wait_for_frame,
     write,
 )
+from tests.studyrunner.report.page_cases import AXES, SENTENCES, build_file
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
-]
+pytestmark = MARKS
 
 FOUR = {**AXES, "wear_coefficient": (5e-12, 1e-12, 5e-11), "excitation_amplitude": (0.5, 1.5)}
 SHAPE = (4, 3, 2, 1, 2, 1)
@@ -56,7 +50,7 @@ def address(dataset, tmp_path_factory):
 
 
 @pytest.fixture
-def page(browser, address):  # noqa: F811
+def page(browser, address):
     """The page with the first point picked and the lists as at first."""
     if browser.current_url != address:
         load(browser, address)
@@ -151,49 +145,13 @@ def test_a_failed_point_is_a_cross_that_says_why(page, dataset):
     assert missing.sum() == 1
 
 
-def click(page, plot, meta, point):
-    """A press of the mouse where a plot shows a point."""
-    from selenium.webdriver import ActionChains
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.support.wait import WebDriverWait
-
-    script = """
-    const [plot, meta, point] = arguments;
-    plot.scrollIntoView({block: "center", behavior: "instant"});
-    const trace = plot.data.find((each) => each.meta === meta);
-    const { xaxis, yaxis } = plot._fullLayout;
-    const box = plot.getBoundingClientRect();
-    let [x, y] = [null, null];
-    if (trace.z) {
-      trace.customdata.forEach((line, row) => { if (line.includes(point)) [x, y] = [line.indexOf(point), row]; });
-    } else {
-      const at = trace.customdata.indexOf(point);
-      [x, y] = [trace.x[at], trace.y[at]];
-    }
-    return [xaxis._offset + xaxis.d2p(x) - box.width / 2, yaxis._offset + yaxis.d2p(y) - box.height / 2];
-    """
-    element = page.find_element(By.ID, plot)
-
-    def hover(_):
-        x, y = page.execute_script(script, element, meta, point)
-        actions = ActionChains(page).move_to_element_with_offset(element, round(x) - 3, round(y) + 2)
-        actions.move_by_offset(3, -2).perform()
-        wait_for_frame(page)
-        found = page.execute_script("return (arguments[0]._hoverdata || []).map((each) => each.customdata)", element)
-        return point in found
-
-    WebDriverWait(page, PATIENCE, poll_frequency=0.1).until(hover)
-    ActionChains(page).click().perform()
-
-
 @pytest.mark.parametrize(
     ("plot", "meta", "place"),
     [("trend-plot", "trend", (1, 1, 1, 0, 0, 0)), ("trend-map-plot", "map", (1, 0, 0, 0, 0, 0))],
 )
 def test_a_click_picks_the_point_for_the_whole_page(page, plot, meta, place):
-    from selenium.webdriver.support.wait import WebDriverWait
 
-    click(page, plot, meta, int(np.ravel_multi_index(place, SHAPE)))
+    click_at(page, int(np.ravel_multi_index(place, SHAPE)), plot, meta)
     scheme, frequency = FOUR["scheme"][place[4]], FOUR["frequency"][place[0]]
     WebDriverWait(page, PATIENCE).until(lambda _: f"scheme {scheme}: {SENTENCES[0]}" in selected(page))
     assert selected(page).startswith(f"frequency {frequency:g}\u00a0Hz, ")

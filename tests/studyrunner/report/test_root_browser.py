@@ -4,28 +4,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from selenium.webdriver import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
 
+from tests.studyrunner.report.browsing import FACTORS, MARKS, PATIENCE, choose, load, messages, press, write
 from tests.studyrunner.report.page_cases import build_file
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs
-from tests.studyrunner.report.test_browser import (  # noqa: F401 - the fixture is used by its name
-    CHROMIUM,
-    DRIVER,
-    FACTORS,
-    PATIENCE,
-    browser,
-    choose,
-    load,
-    messages,
-    press,
-    shown_point,
-    write,
-)
+from tests.studyrunner.report.test_browser import shown_point
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
-]
+pytestmark = MARKS
 
 PLOT = "document.getElementById('root-plot')"
 CAMERA = f"return {PLOT}._fullLayout.scene._scene.getCamera()"
@@ -37,14 +26,13 @@ def dataset():
 
 
 @pytest.fixture(scope="module")
-def page(browser, dataset, tmp_path_factory):  # noqa: F811
+def page(browser, dataset, tmp_path_factory):
     load(browser, write(dataset, tmp_path_factory.mktemp("root")))
     return browser
 
 
 @pytest.fixture(autouse=True)
 def clean(page):
-    from selenium.webdriver.common.keys import Keys
 
     for name in ("root colour", "root view", "root shape"):
         choose(page, name, 1 if name == "root colour" else 0)
@@ -84,7 +72,6 @@ def assert_root_is(page, dataset, name, point, cycle):
 
 
 def pixels(page):
-    from selenium.webdriver.common.by import By
 
     picture: bytes = page.find_element(By.ID, "root-plot").screenshot_as_png
     return picture
@@ -103,9 +90,6 @@ def test_the_menu_changes_what_colours_the_root(page, dataset):
 
 
 def test_a_drag_of_the_mouse_rotates_and_the_slider_keeps_it(page):
-    from selenium.webdriver import ActionChains
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.common.keys import Keys
 
     plot = page.find_element(By.ID, "root-plot")
     page.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'})", plot)
@@ -128,8 +112,6 @@ def test_a_drag_of_the_mouse_rotates_and_the_slider_keeps_it(page):
 
 
 def test_play_runs_through_the_cycles_and_stops_at_the_last(page):
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.support.wait import WebDriverWait
 
     page.execute_script(
         """
@@ -158,7 +140,7 @@ def test_play_runs_through_the_cycles_and_stops_at_the_last(page):
     assert page.execute_script("return state.cycle") == stopped
 
 
-def test_a_browser_without_webgl_says_so(browser, tmp_path):  # noqa: F811
+def test_a_browser_without_webgl_says_so(browser, tmp_path):
     address = browser.current_url
     patch = """
     const getContext = HTMLCanvasElement.prototype.getContext;

@@ -119,15 +119,6 @@ def test_the_root_of_one_scene_is_written(kind, n_files, request, tmp_path):
     assert np.nanmax(mesh.point_data["wear_depth (m)"]) == np.nanmax(expected)
 
 
-def test_drawn_values_are_taken():
-    checked = check_dataset(sample_file(), "samples.nc")
-    assert {name for name in map(str, checked.coords) if name.startswith("sample_")} == {
-        "sample_friction_coefficient",
-        "sample_wear_coefficient",
-        "sample_gap",
-    }
-
-
 @pytest.mark.parametrize(
     "wrong",
     [
