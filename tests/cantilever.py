@@ -5,8 +5,6 @@ force inside and with constant normal load at the tip. The friction element is r
 or on a massless displacement that a spring ties to it, as a reduction with residual flexibility gives it. SI units.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ place while it sticks is history). Every phase of such a motion is linear in the
 are the forces of the pair and its slip velocity: rows that are multiplied by the state. Shares no code with the solver.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

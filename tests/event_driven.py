@@ -8,8 +8,6 @@ is discretised, the results are exact to round-off. The only grid is the one on 
 The period map is closed by Newton's method after a transient. Made for textbook systems: a handful of unknowns.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -5,8 +5,6 @@ at constant depth. Each state leaves its tangential history to the next one by t
 the equations for the frequency is used.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

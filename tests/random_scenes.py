@@ -20,8 +20,6 @@ What it may not be, because there physics itself gives no periodic answer (never
   motion of the period of the excitation.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

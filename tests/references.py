@@ -3,8 +3,6 @@
 All of them are general in their parameters, in SI units, and share no code with the solver.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Literal
 

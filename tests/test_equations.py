@@ -1,7 +1,5 @@
 """Which equations of the paper the solver cites, and whether the page of the physics says rightly where each one is."""
 
-from __future__ import annotations
-
 import io
 import re
 import tokenize
@@ -20,7 +18,7 @@ _CITATION = re.compile(rf"\bEqs?\.\s+{_NUMBER}(?:(?:\s*(?:,|-|to|and|or)\s*)+{_N
 _RANGE = re.compile(rf"{_NUMBER}\s*(?:-|to)\s*(?={_NUMBER})")
 
 
-def cited_in(text: str) -> set[int]:
+def cited_in(text):
     """Numbers of the equations that a text cites; those between the ends of a range as well."""
     found: set[int] = set()
     for citation in _CITATION.finditer(text):
@@ -28,7 +26,7 @@ def cited_in(text: str) -> set[int]:
     return found
 
 
-def numbers_of(text: str) -> set[int]:
+def numbers_of(text):
     """Numbers in a list such as (7), (11)-(15) or (24) to (26)."""
     found = {int(number) for number in re.findall(_NUMBER, text)}
     for first, last in _RANGE.findall(text):
@@ -36,20 +34,20 @@ def numbers_of(text: str) -> set[int]:
     return found
 
 
-def words_of(path: Path) -> str:
+def words_of(path):
     """Docstrings and comments of a source file, each as one line of text."""
     kinds = (tokenize.COMMENT, tokenize.STRING)
     tokens = tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline)
     return "\n".join(" ".join(token.string.strip("#").split()) for token in tokens if token.type in kinds)
 
 
-def test_every_equation_of_the_paper_is_cited_or_has_a_reason() -> None:
+def test_every_equation_of_the_paper_is_cited_or_has_a_reason():
     cited = set().union(*(cited_in(words_of(path)) for path in FOLDER.rglob("*.py")))
     assert cited <= EQUATIONS
     assert EQUATIONS - cited == set(NOT_CITED), "equations that nothing cites"
 
 
-def test_the_page_of_the_physics_says_where_each_equation_is() -> None:
+def test_the_page_of_the_physics_says_where_each_equation_is():
     page = (FOLDER / "PHYSICS.md").read_text(encoding="utf-8")
     rows = [line.split("|")[1:4] for line in page.split("\n## 7. ")[1].splitlines() if line.startswith("| (")]
     told: set[int] = set()

@@ -1,7 +1,5 @@
 """No file on disk is a pickle: nothing that reads or writes one can run what somebody has put into it."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 
@@ -17,7 +15,7 @@ READERS = {"load", "save", "savez", "savez_compressed"}
 """Of numpy: they write objects as pickles unless they are told not to."""
 
 
-def offences(source: str) -> list[str]:
+def offences(source):
     """What a module does that has to do with pickles."""
     found = []
     for node in ast.walk(ast.parse(source)):
@@ -36,13 +34,13 @@ def offences(source: str) -> list[str]:
     return found
 
 
-def test_no_module_reads_or_writes_pickles() -> None:
+def test_no_module_reads_or_writes_pickles():
     assert len(SOURCES) > 80
     searched = [path for path in SOURCES if path != IN_MEMORY]
     assert {str(path): found for path in searched if (found := offences(path.read_text(encoding="utf-8")))} == {}
 
 
-def test_shared_memory_is_no_file() -> None:
+def test_shared_memory_is_no_file():
     source = IN_MEMORY.read_text(encoding="utf-8")
     assert offences(source) == ["pickle"]
     opened = [

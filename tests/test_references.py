@@ -1,14 +1,11 @@
 """The references against each other, against closed forms and against a general integrator."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from tests.references import (
     NoPeriodicMotionError,
-    Orbit,
     StopsOccurError,
     coulomb_orbit,
     den_hartog_amplitude,
@@ -22,13 +19,13 @@ TWO_MASSES = ([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1
 VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
 
 
-def phases(orbit: Orbit) -> set[str]:
+def phases(orbit):
     return {segment.phase for segment in orbit.segments}
 
 
 @pytest.mark.parametrize("ratio", [0.3, 0.55, 0.8, 0.95, 1.05, 1.5, 2.3])
 @pytest.mark.parametrize("friction", [0.05, 0.3, 0.6, 0.9])
-def test_den_hartog_and_the_event_driven_slider_agree_on_amplitude_and_on_stops(ratio: float, friction: float) -> None:
+def test_den_hartog_and_the_event_driven_slider_agree_on_amplitude_and_on_stops(ratio, friction):
     mass, stiffness, force = 0.1, 1.6e5, 10.0
     omega = ratio * np.sqrt(stiffness / mass)
     orbit = slider_orbit(mass, 0.0, stiffness, force, friction * force, omega)
@@ -42,25 +39,25 @@ def test_den_hartog_and_the_event_driven_slider_agree_on_amplitude_and_on_stops(
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1 / 3, 0.2])
-def test_den_hartog_refuses_singular_frequencies(ratio: float) -> None:
+def test_den_hartog_refuses_singular_frequencies(ratio):
     with pytest.raises(StopsOccurError, match="singular"):
         den_hartog_amplitude(1.0, 1.0, 1.0, 0.1, ratio)
 
 
-def test_without_friction_the_slider_is_a_linear_oscillator() -> None:
+def test_without_friction_the_slider_is_a_linear_oscillator():
     linear = slider_amplitude(2.0, 0.3, 5.0, 1.5, 0.0, 1.3)
     assert linear == pytest.approx(1.5 / abs(5.0 - 2.0 * 1.3**2 + 0.39j))
     assert slider_amplitude(2.0, 0.3, 5.0, 1.5, 1e-9, 1.3) == pytest.approx(linear, rel=1e-8)
 
 
-def test_a_force_below_the_friction_never_moves_the_slider() -> None:
+def test_a_force_below_the_friction_never_moves_the_slider():
     orbit = slider_orbit(1.0, 0.1, 1.0, 1.0, 1.1, 0.9)
     assert phases(orbit) == {"stick"}
     assert orbit.harmonic(0) == 0
 
 
 @pytest.mark.parametrize("case", [(0.7, 0.1, 0.6), (0.4, 0.02, 0.5), (1.2, 0.3, 0.3)])
-def test_slider_with_damping_balances_its_energy(case: tuple[float, float, float]) -> None:
+def test_slider_with_damping_balances_its_energy(case):
     omega, damping, friction = case
     orbit = slider_orbit(1.0, damping, 1.0, 1.0, friction, omega)
     # Work of cos(omega t) on Re(X exp(i omega t)) in a period is -pi Im X.
@@ -71,7 +68,7 @@ def test_slider_with_damping_balances_its_energy(case: tuple[float, float, float
 
 
 @pytest.mark.parametrize(("omega", "first", "second"), [(0.4, 25.21813, 31.60782), (0.6, 139.0437, 217.1278)])
-def test_two_masses_have_the_known_first_harmonics(omega: float, first: float, second: float) -> None:
+def test_two_masses_have_the_known_first_harmonics(omega, first, second):
     orbit = coulomb_orbit(*TWO_MASSES, omega)
     assert orbit.residual <= 1e-12
     assert abs(orbit.harmonic(0)) == pytest.approx(first, rel=3e-7)
@@ -79,7 +76,7 @@ def test_two_masses_have_the_known_first_harmonics(omega: float, first: float, s
     assert abs(orbit.harmonic(1, 0)) < 1e-9 * second
 
 
-def test_friction_on_any_mass_of_a_chain_with_a_load_out_of_phase() -> None:
+def test_friction_on_any_mass_of_a_chain_with_a_load_out_of_phase():
     mass = np.diag([1.0, 2.0, 1.5])
     stiffness = np.array([[3.0, -1, 0], [-1, 2, -1], [0, -1, 2]])
     damping = 0.02 * stiffness + 0.01 * mass
@@ -94,12 +91,12 @@ def test_friction_on_any_mass_of_a_chain_with_a_load_out_of_phase() -> None:
 
 
 @pytest.mark.parametrize(("omega", "known"), [(1.2, 0.1146716), (1.5, 0.1889205)])
-def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega: float, known: float) -> None:
+def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega, known):
     orbit = vibro_impact_orbit(*VIBRO_IMPACT, omega, sweep_start=0.85)
     assert phases(orbit) == {"open", "closed"}
     assert abs(orbit.harmonic(0)) == pytest.approx(known, rel=3e-7)
 
-    def rate(time: float, y: np.ndarray) -> list[float]:
+    def rate(time, y):
         return [y[1], 0.02 * np.cos(omega * time) - 0.05 * y[1] - y[0] - 100 * max(y[0] - 0.1, 0.0)]
 
     start = orbit.sample(1)[:, 0]
@@ -108,7 +105,7 @@ def test_vibro_impact_has_the_known_first_harmonic_on_the_upper_branch(omega: fl
     assert end == pytest.approx(start, rel=1e-7)
 
 
-def test_wear_with_den_hartog_has_its_closed_solution() -> None:
+def test_wear_with_den_hartog_has_its_closed_solution():
     # X = A sqrt(1 - b^2 N^2) makes N' = -c N sqrt(1 - b^2 N^2): artanh(sqrt(1 - b^2 N^2)) grows linearly in cycles.
     mass, stiffness, force, friction = 0.1, 1.6e5, 10.0, 0.5
     omega = 2 * np.pi * 160
@@ -130,7 +127,7 @@ def test_wear_with_den_hartog_has_its_closed_solution() -> None:
 
 
 @pytest.mark.slow
-def test_no_periodic_motion_is_said() -> None:
+def test_no_periodic_motion_is_said():
     # At resonance without damping, friction below pi/4 of the force cannot bound the motion.
     with pytest.raises(NoPeriodicMotionError):
         slider_orbit(1.0, 0.0, 1.0, 1.0, 0.3, 1.0)

@@ -1,23 +1,17 @@
 """The plain time integration of the benchmarks: against closed forms, and nonlinear modes against its free decay."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from solver import backbone, build_model
-from solver.model import FloatArray, ReducedModel
 from tests.benchmarks.time_integration import (
-    Motion,
-    Structure,
     advance,
     at_rest,
     build,
     first_harmonic,
     fitted_weights,
-    graded,
     one_period,
     settle,
     wear,
@@ -29,7 +23,7 @@ MASS, STIFFNESS, FREQUENCY, FORCE = 0.1, 1.6e5, 160.0, 10.0
 OMEGA = 2.0 * np.pi * FREQUENCY
 
 
-def test_the_differences_are_exact_for_the_excitation() -> None:
+def test_the_differences_are_exact_for_the_excitation():
     weights = fitted_weights(3.0, 0.02)
     times = 0.7 - 0.02 * np.arange(3)
     assert weights @ np.cos(3.0 * times) == pytest.approx(-3.0 * np.sin(2.1), rel=1e-9)
@@ -39,7 +33,7 @@ def test_the_differences_are_exact_for_the_excitation() -> None:
 
 
 @pytest.mark.slow
-def test_a_mass_on_rigid_ground_moves_as_in_den_hartogs_closed_form() -> None:
+def test_a_mass_on_rigid_ground_moves_as_in_den_hartogs_closed_form():
     """Of first order, with some noise: the mass turns on whole steps."""
     model = scene("sdof_slider", normal_stiffness=0.0)
     path = 4.0 * den_hartog_amplitude(MASS, STIFFNESS, FORCE, 5.0, OMEGA)
@@ -58,16 +52,15 @@ def test_a_mass_on_rigid_ground_moves_as_in_den_hartogs_closed_form() -> None:
 
 
 @pytest.mark.slow
-def test_wear_of_a_slider_follows_its_differential_equation() -> None:
+def test_wear_of_a_slider_follows_its_differential_equation():
     model = scene("sdof_slider", damping=8.0)
     structure = build(model, 0.5, FREQUENCY, FORCE, 400)
-    gap, jumps = model.contact.gap, graded(2e4, 1e5, 0.1)
-    assert jumps.sum() == pytest.approx(1e5)
+    gap = model.contact.gap
     motion, _ = settle(structure, at_rest(model, structure, gap), gap, work_change=5e-3)
     # the mount of the closing displacement is massless
     for part in (np.full(1, 0.0), np.full(1, 1e-9)):
         assert at_rest(model, structure, part).force[0] == pytest.approx(10.0 - 1e5 * part[0], rel=1e-6)
-    *_, (cycle, depth, _, _) = wear(model, structure, motion, 1.1e-11, jumps, work_change=5e-3)
+    *_, (cycle, depth, _) = wear(model, structure, motion, 1.1e-11, 600.0, 1e5)
     exact = slider_wear_depth(
         np.array([0.0, 1e5]),
         wear_coefficient=1.1e-11,
@@ -81,7 +74,7 @@ def test_wear_of_a_slider_follows_its_differential_equation() -> None:
     assert depth[0] == pytest.approx(exact[-1], rel=1e-2)
 
 
-def free_decay(structure: Structure, motion: Motion, gap: FloatArray, periods: int) -> FloatArray:
+def free_decay(structure, motion, gap, periods):
     """Displacements (n_times, n), m, without excitation from a motion on, in the steps of the structure."""
     n_steps = round(2.0 * np.pi / (structure.omega * structure.step))
     loads = np.repeat(structure.static[None], n_steps, axis=0)
@@ -92,7 +85,7 @@ def free_decay(structure: Structure, motion: Motion, gap: FloatArray, periods: i
     return np.concatenate(seen)
 
 
-def decay_of(signal: FloatArray, step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def decay_of(signal, step):
     """Amplitude, frequency, Hz, and damping ratio of each cycle of a decaying signal (n_times,).
 
     From its peaks up and down, each by a parabola through three samples: amplitude over half a cycle to both sides.
@@ -109,9 +102,7 @@ def decay_of(signal: FloatArray, step: float) -> tuple[FloatArray, FloatArray, F
     return heights[1:-1], 1.0 / span, rate / np.hypot(2.0 * np.pi, rate)
 
 
-def decaying(
-    model: ReducedModel, place: int, pull: float, frequency: float, periods: int
-) -> tuple[Structure, tuple[FloatArray, ...]]:
+def decaying(model, place, pull, frequency, periods):
     """Free decay of a displacement that is let go at `pull`, m: amplitude, frequency, Hz, damping ratio by cycle."""
     structure = build(model, 0.5, frequency, 0.0, 400)
     rest = at_rest(model, structure, model.contact.gap)
@@ -121,7 +112,7 @@ def decaying(
     return structure, decay_of(signal, structure.step)
 
 
-def test_a_mass_on_rigid_ground_loses_four_limits_in_each_cycle() -> None:
+def test_a_mass_on_rigid_ground_loses_four_limits_in_each_cycle():
     model, limit = scene("sdof_slider", normal_stiffness=0.0), 5.0 / STIFFNESS
     natural = np.sqrt(STIFFNESS / MASS) / (2.0 * np.pi)
     _, (amplitude, frequency, damping) = decaying(model, 0, 30.0 * limit, natural, 6)
@@ -132,7 +123,7 @@ def test_a_mass_on_rigid_ground_loses_four_limits_in_each_cycle() -> None:
 
 
 @pytest.mark.slow
-def test_a_nonlinear_mode_is_what_its_free_decay_shows_at_three_amplitudes() -> None:
+def test_a_nonlinear_mode_is_what_its_free_decay_shows_at_three_amplitudes():
     """As far as a mode of periodic motion describes a decay: the amplitude changes within a cycle."""
     # of the stiffness of the tip a twelfth goes over the foot, which sticks up to 25 N
     model = build_model(

@@ -101,10 +101,10 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
     relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
     relative[unknown & (volume > 0.0)] = np.inf
     relative[~reached] = np.nan
-    # the rest of the error of the volume is shared by the pairs in proportion to their depth
-    rest = relative - np.divide(difference @ area, volume, out=np.zeros_like(volume), where=volume > 0.0)
+    # no pair is known better than the volume: one that agrees with the reference solution does so by chance. Without
+    # this 5 and 7 of 24 deep pairs of the dovetail at 211.25 and 211.375 Hz are outside of their errors, by seven times
     with np.errstate(invalid="ignore"):
-        of_pairs = np.fmax(difference + np.where(depth > 0.0, rest[:, None] * depth, 0.0), crossing(apart))
+        of_pairs = np.fmax(np.fmax(difference, crossing(apart)), np.where(depth > 0.0, relative[:, None] * depth, 0.0))
     of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
     # an unworn state has errors of its own, from states with more harmonics
     unworn = (counts == 0.0) | (volume <= 0.0)

@@ -7,22 +7,27 @@ freedom with the damping ratio zeta the frequency is then omega_0 sqrt(1 - 2 zet
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import replace
 
 import numpy as np
 
 from solver.continuation.options import CONTINUATION
-from solver.continuation.phase_lag import LaggingState, excitation_product, frequency_derivative, solve_at_lag
+from solver.continuation.phase_lag import (
+    LaggingState,
+    excitation_product,
+    first_response,
+    frequency_derivative,
+    product_change,
+    solve_at_lag,
+)
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget
 from solver.options import COMMON
 from solver.structure.fourier import to_complex
-from solver.structure.joint import Case, Joint
+from solver.structure.joint import Case
 
 
 def solve_at_peak(
@@ -33,7 +38,6 @@ def solve_at_peak(
     solver: JacobianSolver,
     budget: Budget,
     most: int | None = None,
-    near: Joint | None = None,
 ) -> tuple[LaggingState, float] | None:
     """The state of the largest amplitude near a phase lag, rad, and its lag; None where it is not found.
 
@@ -43,10 +47,10 @@ def solve_at_peak(
     below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
     before: tuple[float, float] | None = None
     for _ in range(CONTINUATION.attempts):
-        found = solve_at_lag(case, balance, start, lag, solver, budget, most, near)
+        found = solve_at_lag(case, balance, start, lag, solver, budget, most)
         if found is None:
             return None
-        rise, turn = rise_of_response(case, found, solver)
+        rise, turn = rise_of_response(found, solver, accuracy)
         # where the lag falls with the frequency there is no resonance
         if not (turn > 0.0 and math.isfinite(rise)):
             return None
@@ -60,7 +64,7 @@ def solve_at_peak(
         step = float(np.clip(-rise / min(slope, -COMMON.negligible), -largest, largest))
         before = lag, rise
         lag = lag + step if below < lag + step < above else 0.5 * (below + above)
-        balance, start, near = found.balance, found.at.predicted_h, balance.joint
+        balance, start = found.balance, found.at.predicted_h
     return None
 
 
@@ -69,8 +73,10 @@ def accepted_rise(rtol: float) -> float:
     return CONTINUATION.peak_rise * rtol
 
 
-def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) -> tuple[float, float]:
+def rise_of_response(state: LaggingState, solver: JacobianSolver, accuracy: float) -> tuple[float, float]:
     """Changes along the frequency at fixed wear depth and tangential history, both s/rad.
+
+    accuracy: rise over the turn that does not count.
 
     Returns
     -------
@@ -79,20 +85,12 @@ def rise_of_response(case: Case, state: LaggingState, solver: JacobianSolver) ->
     turn : float
         Of the lag.
     """
-    held = Balance.frozen(state.balance.joint, state.at.history, state.at.wear_depth)
-    state = replace(state, balance=held)
-    by_frequency, tangent, joint = frequency_derivative(case, state), held.linearise(state.at), held.joint
-    # well below the largest rise that is accepted
-    rtol = min(NEWTON.forcing, 0.1 * accepted_rise(case.settings.rtol))
-    step = solver.solve(tangent, -by_frequency.residual, rtol)
-    moved = state.at.displacement_h + by_frequency.length * tangent.transmit(step)[0]
-    if joint.penalty.inertial.any():
-        ahead = replace(held, joint=by_frequency.ahead).evaluate(state.at.predicted_h)
-        moved = moved + ahead.displacement_h - state.at.displacement_h
-    values = [
-        (to_complex(at.structure.response_h(at.to_relative(motion)))[0, 0], excitation_product(at, motion))
-        for at, motion in ((joint, state.at.displacement_h), (by_frequency.ahead, moved))
-    ]
-    (response, product), (response_ahead, product_ahead) = values
-    rise = math.log(abs(response_ahead) / abs(response)) / by_frequency.length
-    return rise, -cmath.phase(product_ahead / product) / by_frequency.length
+    joint, at = state.balance.joint, state.at
+    held = Balance.frozen(joint, at.history, at.wear_depth)
+    tangent, by_frequency = held.linearise(at), frequency_derivative(replace(state, balance=held))
+    step = solver.solve_by_parameter(tangent, -by_frequency.residual, 0.1 * accuracy)
+    moved = tangent.transmit(step)[0]
+    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
+    rise = (by_frequency.response + first_response(joint, moved)) / response
+    product = by_frequency.product + product_change(joint, moved)
+    return rise.real, -(product / excitation_product(joint, at.displacement_h)).imag

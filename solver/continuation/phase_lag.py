@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import ComplexArray, FloatArray
 from solver.newton.iteration import solve_newton
 from solver.newton.linear_solver import JacobianSolver
@@ -29,6 +29,7 @@ from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget
 from solver.options import COMMON
 from solver.structure.fourier import to_complex
+from solver.structure.frequency_slope import frequency_slope
 from solver.structure.joint import Case, Joint
 
 
@@ -80,7 +81,6 @@ def solve_at_lag(
     solver: JacobianSolver,
     budget: Budget,
     most: int | None = None,
-    near: Joint | None = None,
 ) -> LaggingState | None:
     """The state with a given lag; None where Newton's method fails.
 
@@ -96,8 +96,6 @@ def solve_at_lag(
         rad, between 0 and pi.
     solver, budget, most
         As in `solve_balance`.
-    near : Joint, optional
-        Joint at a frequency near the first one, for the derivative by the frequency.
     """
     shape, unit, amplitude = start.shape, cmath.exp(1j * lag), balance.joint.excitation_amplitude
     tolerance = case.settings.tolerance
@@ -110,22 +108,28 @@ def solve_at_lag(
         at = here.evaluate(unknown[:-1].reshape(shape))
         return LaggingState(here, at, error(excitation_product(here.joint, at.displacement_h)))
 
-    turn, before = math.nan, near
+    turn = math.nan
 
     def direction(state: LaggingState) -> FloatArray:
-        nonlocal turn, before
         budget.check_time()
         rtol = max(NEWTON.forcing, 0.1 * tolerance / max(state.scaled_residual(), tolerance))
-        tangent, by_frequency = state.balance.linearise(state.at), frequency_derivative(case, state, before)
-        before = state.balance.joint
-        steps = solver.solve_with_parameter(tangent, -state.at.residual, -by_frequency.residual, rtol)
-        own, with_frequency = (_product_change(tangent, step) for step in steps)
+        tangent, by_frequency = state.balance.linearise(state.at), frequency_derivative(state)
         product = excitation_product(state.balance.joint, state.at.displacement_h)
-        # the equation times |F^H x|, whose derivative is linear in the motion
-        slope = (unit * (with_frequency + by_frequency.product)).imag
-        change = -(unit * (product + own)).imag / slope if slope != 0.0 else math.inf
-        turn = -slope / max(abs(product), 1e-300)
-        step = np.append((steps[0] + change * steps[1]).ravel(), change)
+
+        def change_of(step: FloatArray, by_omega: FloatArray) -> float:
+            nonlocal turn
+            own, with_frequency = (
+                product_change(state.balance.joint, tangent.transmit(part)[0]) for part in (step, by_omega)
+            )
+            # the equation times |F^H x|, whose derivative is linear in the motion
+            slope = (unit * (with_frequency + by_frequency.product)).imag
+            turn = -slope / max(abs(product), 1e-300)
+            return -(unit * (product + own)).imag / slope if slope != 0.0 else math.inf
+
+        moved, change = solver.solve_with_parameter(
+            tangent, -state.at.residual, -by_frequency.residual, change_of, rtol
+        )
+        step = np.append(moved.ravel(), change)
         largest = CONTINUATION.largest_frequency_change * state.omega
         return np.asarray(step * min(1.0, largest / max(abs(change), 1e-300)))
 
@@ -138,43 +142,40 @@ def solve_at_lag(
 class FrequencyDerivative:
     """Derivatives with respect to the frequency at a fixed predicted force.
 
-    residual (n_rel, 2H+1): N s/rad. product: of `F^H x`, N m s/rad.
-    ahead: joint at the frequency of the difference. length: difference of the frequencies, rad/s.
+    residual (n_rel, 2H+1): N s/rad. product: of `F^H x`, N m s/rad. response: of the first response in the first
+    harmonic, m s/rad.
     """
 
     residual: FloatArray
     product: complex
-    ahead: Joint
-    length: float
+    response: complex
 
 
-def frequency_derivative(case: Case, state: LaggingState, near: Joint | None = None) -> FrequencyDerivative:
-    """Derivatives at a state, by differences; the motion of masses on rigid ground depends on the frequency, too.
-
-    near: the joint at another frequency, where its condensation is known: for a direction of Newton's method.
-    """
+def frequency_derivative(state: LaggingState) -> FrequencyDerivative:
+    """Derivatives at a state; those of masses on rigid ground by differences."""
     joint, at = state.balance.joint, state.at
-    length = COMMON.difference * joint.omega
-    ahead = near
-    if ahead is None or abs(ahead.omega - joint.omega) < length:
-        ahead = case.joint(joint.omega + length, joint.excitation_amplitude)
-    length = ahead.omega - joint.omega
-    moved = at.displacement_h
+    amplitude, orders, u = joint.excitation_amplitude, joint.basis.orders, joint.to_relative(at.displacement_h)
+    slope = frequency_slope(joint.model, joint.omega, amplitude, orders, u)
+    residual, product, response = slope.force, slope.product, complex(slope.response[0])
     if joint.penalty.inertial.any():
-        other = replace(state.balance, joint=ahead).evaluate(at.predicted_h)
-        moved, residual = other.displacement_h, other.residual
-    else:
-        structure = ahead.structure
-        residual = structure.apply(joint.to_relative(moved)) + joint.to_relative(at.force_h) - structure.force_h()
-    product = excitation_product(ahead, moved) - excitation_product(joint, at.displacement_h)
-    return FrequencyDerivative((residual - at.residual) / length, product / length, ahead, length)
+        length = COMMON.difference * joint.omega
+        ahead = replace(state.balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
+        motion = (ahead.displacement_h - at.displacement_h) / length
+        residual = residual + (ahead.residual - at.residual) / length
+        product += product_change(joint, motion)
+        response += first_response(joint, motion)
+    return FrequencyDerivative(residual, product, response)
+
+
+def first_response(joint: Joint, motion_h: FloatArray) -> complex:
+    """First harmonic of the first response, m, to a motion (n_contact, 3, 2H+1), m, alone, without the excitation."""
+    return complex(joint.structure.dynamic_response[0, 0] @ _first(joint, motion_h))
 
 
 def _first(joint: Joint, motion_h: FloatArray) -> ComplexArray:
     return to_complex(joint.to_relative(motion_h))[:, 0]
 
 
-def _product_change(tangent: Linearisation, step: FloatArray) -> complex:
-    """Change of `F^H x`, N m, for a step (n_rel, 2H+1) of the predicted force, N."""
-    joint = tangent.joint
-    return complex(joint.structure.drive @ _first(joint, tangent.transmit(step)[0]))
+def product_change(joint: Joint, motion_h: FloatArray) -> complex:
+    """Change of `F^H x`, N m, with a change of the motion (n_contact, 3, 2H+1), m."""
+    return complex(joint.structure.drive @ _first(joint, motion_h))

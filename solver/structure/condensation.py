@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import cast
+from functools import lru_cache
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, HarmonicStiffness, share_matrices
+from solver.structure.identity import Identity
 from solver.structure.options import STRUCTURE
 from solver.structure.rough_forms import multiply_roughly
 
@@ -113,10 +115,11 @@ def build_structure(
     """
     relative, _ = relative_indices(model.contact)
     still = model.linear[0]
-    static = condense(np.real(still.stiffness), relative, still.load_static)
+    static = _static(Identity(still), tuple(relative.tolist()))
     first = model.harmonic_structure(1)[0] if orders else still
     n_bytes = 16 * len(orders) * relative.size**2
-    if n_bytes > STRUCTURE.dense_bytes and first is still and _is_real(still) and not model.nodal_diameter:
+    small = n_bytes <= max(STRUCTURE.dense_bytes, _shared_bytes(len(still.mass), relative.size, len(orders)))
+    if not small and first is still and _is_real(still) and not model.nodal_diameter:
         moving = _condense_shared(still, relative, omega * np.array(orders, np.float64), excitation_amplitude)
     else:
         moving = _condense_each(model, relative, omega, excitation_amplitude, orders)
@@ -127,6 +130,19 @@ def build_structure(
         static_offset=np.real(still.response @ static.held_motion),
         **vars(moving),
     )
+
+
+def _shared_bytes(n: int, n_rel: int, n_harmonics: int) -> int:
+    """Bytes that a product with a `SharedStiffness` reads: many where much lies behind the joint."""
+    behind = n - n_rel
+    return 24 * (n + behind) * n_rel + 16 * n_harmonics * behind**2
+
+
+@lru_cache(maxsize=2)
+def _static(structure: Identity, relative: tuple[int, ...]) -> Condensed:
+    """Static condensation of a linear model, which is the same at all frequencies."""
+    linear = cast("LinearModel", structure.objects[0])
+    return condense(np.real(linear.stiffness), np.array(relative, np.intp), linear.load_static)
 
 
 @dataclass(frozen=True)
@@ -150,22 +166,24 @@ def _condense_each(
     response = np.empty((len(orders), n_response, relative.size), complex)
     force, offset = np.zeros(relative.size, complex), np.zeros(n_response, complex)
     drive, drive_offset = np.zeros(relative.size, complex), 0.0 + 0.0j
-    for (linear, conjugate), places in _by_structure(model, orders):
+    for (linear, conjugate), places in by_structure(model, orders):
+        every = relative_first(len(linear.mass), relative)
         # a folded nodal diameter has conjugate matrices, not the conjugate of the sum: damping remains positive
         mass, damping, elastic, shape, rows = (
-            part.conj() if conjugate else part
+            (part.conj() if conjugate else part)[..., every]
             for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, linear.response)
         )
         harmonics = np.array(orders)[places]
-        frequency = omega * harmonics[:, None, None]
-        full = elastic + 1j * frequency * damping - frequency**2 * mass
-        moving = condense(full, relative, np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * shape)
+        full = dynamic_stiffness(elastic[every], damping[every], mass[every], omega * harmonics)
+        load = np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * shape
+        moving = _condense_ordered(full, relative.size, load)
         stiffness[places] = moving.stiffness
-        response[places] = rows @ moving.motion
+        of_pairs, of_others = rows[:, : relative.size], rows[:, relative.size :]
+        response[places] = of_pairs - of_others @ moving.behind
         if harmonics[0] == 1:
-            force, offset = moving.force[0], rows @ moving.held_motion[0]
-            load = excitation_amplitude * shape.conj()
-            drive, drive_offset = load @ moving.motion[0], complex(load @ moving.held_motion[0])
+            force, offset = moving.force[0], of_others @ moving.held[0]
+            drive = load[0, : relative.size].conj() - load[0, relative.size :].conj() @ moving.behind[0]
+            drive_offset = complex(load[0, relative.size :].conj() @ moving.held[0])
     return _Moving(DenseStiffness(stiffness), force, response, offset, drive, drive_offset)
 
 
@@ -200,11 +218,21 @@ def _condense_shared(
     )
 
 
+def dynamic_stiffness(stiffness: Matrix, damping: Matrix, mass: Matrix, rates: FloatArray) -> ComplexArray:
+    """`K + i r C - r^2 M` (H, n, n) at the rates r (H,), rad/s."""
+    rate = rates[:, None, None]
+    if any(np.iscomplexobj(part) for part in (stiffness, damping, mass)):
+        return cast("ComplexArray", stiffness + 1j * rate * damping - rate**2 * mass)
+    full = np.empty((rates.size, *stiffness.shape), complex)
+    full.real, full.imag = stiffness - rate**2 * mass, rate * damping
+    return full
+
+
 def _is_real(linear: LinearModel) -> bool:
     return not any(np.iscomplexobj(part) for part in (linear.mass, linear.damping, linear.stiffness, linear.response))
 
 
-def _by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[tuple[LinearModel, bool], IntArray]]:
+def by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[tuple[LinearModel, bool], IntArray]]:
     """Each linear model (and whether its conjugate is meant) with the indices of its harmonics in `orders`."""
     seen = [model.harmonic_structure(harmonic) for harmonic in orders]
     for number, (linear, conjugate) in enumerate(seen):
@@ -246,18 +274,45 @@ def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
     numpy.linalg.LinAlgError
         The block of the other displacements is singular.
     """
-    n = full.shape[-1]
-    internal = np.setdiff1d(np.arange(n), relative)
+    every = relative_first(full.shape[-1], relative)
+    ordered = _condense_ordered(full[..., every[:, None], every], relative.size, load[..., every])
     motion = cast("Matrix", np.zeros((*full.shape[:-1], relative.size), full.dtype))
     motion[..., relative, np.arange(relative.size)] = 1.0
-    held_motion = np.zeros((*full.shape[:-2], n), np.result_type(full, load))
-    stiffness: Matrix = full[..., relative[:, None], relative]
-    force: Matrix = load[..., relative]
-    if internal.size:
-        right = np.concatenate([full[..., internal[:, None], relative], load[..., internal, None]], axis=-1)
-        solved = np.linalg.solve(full[..., internal[:, None], internal], right)
-        motion[..., internal, :], held_motion[..., internal] = -solved[..., :-1], solved[..., -1]
-        coupling = full[..., relative[:, None], internal]
-        stiffness = stiffness + coupling @ motion[..., internal, :]
-        force = force - (coupling @ held_motion[..., internal, None])[..., 0]
-    return Condensed(stiffness, force, motion, held_motion)
+    motion[..., every[relative.size :], :] = -ordered.behind
+    held_motion = np.zeros((*full.shape[:-2], full.shape[-1]), ordered.held.dtype)
+    held_motion[..., every[relative.size :]] = ordered.held
+    return Condensed(ordered.stiffness, ordered.force, motion, held_motion)
+
+
+def relative_first(n: int, relative: IntArray) -> IntArray:
+    """Indices (n,) of all displacements, the relative ones first."""
+    others = np.ones(n, bool)
+    others[relative] = False
+    return np.concatenate([relative, np.flatnonzero(others)])
+
+
+class _Ordered(NamedTuple):
+    """Condensation of matrices whose first displacements are the relative ones.
+
+    - stiffness, force: as in `Condensed`.
+    - behind (..., n_i, n_rel): the other displacements for a unit u, with the sign reversed.
+    - held (..., n_i): the other displacements under the load with u = 0, m.
+    """
+
+    stiffness: Matrix
+    force: Matrix
+    behind: Matrix
+    held: Matrix
+
+
+def _condense_ordered(full: Matrix, n_rel: int, load: Matrix) -> _Ordered:
+    """As `condense`, of matrices whose first n_rel displacements are the relative ones."""
+    right = np.concatenate([full[..., n_rel:, :n_rel], load[..., n_rel:, None]], axis=-1)
+    solved = cast("Matrix", np.linalg.solve(full[..., n_rel:, n_rel:], right))
+    back = full[..., :n_rel, n_rel:] @ solved
+    return _Ordered(
+        full[..., :n_rel, :n_rel] - back[..., :-1],
+        load[..., :n_rel] - back[..., -1],
+        solved[..., :-1],
+        solved[..., -1],
+    )

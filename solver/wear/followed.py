@@ -47,17 +47,17 @@ def end_at_resonance(
         As in `solve_balance`.
     """
     found: LaggingState | None
-    lag, near = state.lag, case.joint(state.omega, balance.joint.excitation_amplitude)
+    lag = state.lag
     if follow.of == "peak":
-        peak = solve_at_peak(case, balance, start, lag, solver, budget, most, near)
+        peak = solve_at_peak(case, balance, start, lag, solver, budget, most)
         found, lag = (None, lag) if peak is None else peak
     else:
-        found = solve_at_lag(case, balance, start, lag, solver, budget, most, near)
+        found = solve_at_lag(case, balance, start, lag, solver, budget, most)
     if found is None:
         return None
     turn = abs(found.turn)
     if math.isnan(turn) and state.half_width == 0.0:
-        turn = abs(rise_of_response(case, found, solver)[1])
+        turn = abs(rise_of_response(found, solver, accepted_rise(case.settings.rtol))[1])
     half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
     point = PathPoint(0.0, found.at, final_history(found.balance, found.at))
     return Reached(point, found.omega, lag, half_width)

@@ -16,6 +16,7 @@ from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.summary.edge_wear import EdgeWear
 from studyrunner.summary.followed_frequency import FollowedFrequencies
+from studyrunner.summary.mesh_change import MeshChange
 from studyrunner.summary.outcome_table import OutcomeTable
 from studyrunner.summary.plausibility import Doubts, doubts_of_study
 from studyrunner.summary.small_wear import SmallWear
@@ -63,6 +64,7 @@ class CertificateTable:
         self._small = SmallWear(study, facts)
         self._edge = EdgeWear(study, facts)
         self._frequencies = FollowedFrequencies(study)
+        self._mesh = MeshChange(study)
         self._outcomes = OutcomeTable(study)
         self._doubts = Doubts(study, facts)
         self._n_complete = 0
@@ -75,8 +77,8 @@ class CertificateTable:
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Adds records (n,), and the points of each record."""
-        collections = (self._volumes, self._small, self._edge, self._frequencies, self._outcomes, self._doubts)
-        for collected in collections:
+        lines = (self._small, self._edge, self._frequencies, self._mesh, self._outcomes, self._doubts)
+        for collected in (self._volumes, *lines):
             collected.add(points, records)
         complete = np.isin(records["outcome"], list(COMPLETE))
         first = [min(of_one) for of_one in points]
@@ -96,12 +98,15 @@ class CertificateTable:
         self._note("unstable", points, complete & np.any((records["stable"] == 0) & there, axis=1))
 
     def format(self) -> str:
-        """Table in lines: how well the worn volume is known, whether wear is small, how much of it is at the edge,
-        outcomes where loads and wear vary; the largest value of each certificate over all points computed to the end,
-        with its place, then how many folds, jumps, too long steps, oscillating wear rates and unstable states there
-        are.
+        """Table in lines.
+
+        How well the worn volume is known, what another mesh changes, whether wear is small, how much of it is at the
+        edge, and outcomes where loads and wear vary. Then the largest value of each certificate over all points
+        computed to the end, with its place, and how many folds, jumps, too long steps, oscillating wear rates and
+        unstable states there are.
         """
-        rows = [("worn volume", self._volumes.format()), ("small-wear assumption", self._small.format())]
+        rows = [("worn volume", self._volumes.format()), *self._mesh.rows()]
+        rows.append(("small-wear assumption", self._small.format()))
         rows.extend(self._edge.rows())
         rows.extend(self._frequencies.rows())
         rows.extend(self._outcomes.rows())

@@ -14,6 +14,7 @@ from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.summary.edge_wear import EdgeWear
+from studyrunner.summary.mesh_change import MeshChange
 from studyrunner.summary.outcome_table import OutcomeTable
 from studyrunner.summary.plausibility import doubts_of_study
 from studyrunner.summary.small_wear import SmallWear
@@ -29,6 +30,7 @@ class MissionTable:
         self._volumes = WornVolumes(study)
         self._small = SmallWear(study, facts)
         self._edge = EdgeWear(study, facts)
+        self._mesh = MeshChange(study)
         self._outcomes = OutcomeTable(study)
         self._most: tuple[float, Index, NDArray[np.float64]] | None = None
         self._lives: list[tuple[float, float, Index]] = []
@@ -36,7 +38,7 @@ class MissionTable:
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Adds records (n,), and the points of each record."""
-        for collected in (self._volumes, self._small, self._edge, self._outcomes):
+        for collected in (self._volumes, self._small, self._edge, self._mesh, self._outcomes):
             collected.add(points, records)
         for row in np.flatnonzero(np.isin(records["outcome"], list(COMPLETE))).tolist():
             record, first = records[row], min(points[row])
@@ -51,7 +53,7 @@ class MissionTable:
 
     def format(self) -> str:
         """Table in lines."""
-        rows = [("worn volume", self._volumes.format()), ("wear by block", self._blocks())]
+        rows = [("worn volume", self._volumes.format()), *self._mesh.rows(), ("wear by block", self._blocks())]
         if self._study.until is not None:
             rows.append((f"missions to {self._study.until.quantity}", self._life()))
         rows.append(("small-wear assumption", self._small.format()))

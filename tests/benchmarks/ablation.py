@@ -11,8 +11,6 @@ those without the change. Fields without any effect are listed at the end: what 
 they are not needed.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import re

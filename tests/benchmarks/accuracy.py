@@ -9,8 +9,6 @@ mark an error above the tolerance or above twice its estimate. At last, for minu
 cantilever with rigid friction at its tip, each over rtol, and the estimate of both.
 """
 
-from __future__ import annotations
-
 import sys
 
 from solver.settings import SolverSettings

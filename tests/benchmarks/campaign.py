@@ -8,8 +8,6 @@ without a reference (no motion with the period of the force); the outcomes of th
 rtol, the smallest estimate over error, and the seeds of what went wrong.
 """
 
-from __future__ import annotations
-
 import sys
 from collections import Counter
 

@@ -19,8 +19,6 @@ At 212.5 Hz the truth is one of three. Two pairs of mesh 2 come to rest at 15 00
 and 0.02. The same holds for 0.155 and 0.163 mm3 at 212.25 Hz.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from dataclasses import dataclass, replace
@@ -33,8 +31,7 @@ from solver.loading_history.start_states import follow_branch
 from solver.model import FloatArray, ReducedModel
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
-from tests.benchmarks.travelling_waves import HARMONICS, OFFSETS, glued_resonance
-from tests.solver.models import branch_states, march_wear, random_model, scene
+from tests.solver.models import branch_states, glued_frequency, march_wear, random_model, scene
 
 WEAR = 1.1e-11  # 1/Pa
 STEPS = (250.0, 500.0, 1000.0, 2000.0)
@@ -43,6 +40,8 @@ FREQUENCIES = {
     2: (211.0, 211.25, 211.375, 211.5, 211.75, 212.0, 212.25, 212.5),
     3: (211.0,),
 }
+OFFSETS = (-0.25, 0.25)  # Hz, from the resonance of the glued structure, of travelling waves
+HARMONICS = 21  # whose nodal diameters the scene holds
 FLOOR = 2e-3
 KINDS = (("3d", "3d"), ("3d", "one_tangent"), ("one_tangent", "one_tangent", "3d"))
 
@@ -213,7 +212,7 @@ def main() -> None:
         model = scene("dovetail_sector", HARMONICS, mesh=mesh, nodal_diameter=diameter, stuck_modes=given.stuck_modes)
         frequencies = np.array(given.frequency or (OFFSETS if diameter else FREQUENCIES[mesh]))
         if diameter:
-            frequencies += glued_resonance(model)
+            frequencies += glued_frequency(model)
         title = f"mesh {mesh}, d {diameter}"
         summarise(title, dovetail(title, model, tuple(given.step), tuple(frequencies.tolist()), tuple(given.fixed)))
     if given.random:

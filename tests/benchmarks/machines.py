@@ -7,8 +7,6 @@ size 1e-13 is put on the matrices of the scene. Printed are the outcome of every
 first variant over the sum of both errors: at most 1 is wanted.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -9,8 +9,6 @@ of their own. Without names all are run, in a folder of their own. Two runs on o
 CPU times of `error_against_run_time`: nothing is kept of when, where and by which version of Python they ran.
 """
 
-from __future__ import annotations
-
 import argparse
 import base64
 import os

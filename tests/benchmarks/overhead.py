@@ -10,8 +10,6 @@ that compute and of the disk together. Under mpiexec with 4 ranks it is shared w
 the cores of this machine.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -10,8 +10,6 @@ report draws them, and `numbers.json`: the study, what the artists of each figur
 that are computed anew: a picture that is older than the solver, the study or the report is noticed.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

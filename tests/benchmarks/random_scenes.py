@@ -7,8 +7,6 @@ the largest numbers of the certificates, the seeds of those that fail with what 
 keeps one JSON line a scene.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import signal

@@ -5,8 +5,6 @@
 Arguments go to `run-study`. The runs take turns, after one that fills the caches: the ratio is one of this machine now.
 """
 
-from __future__ import annotations
-
 import resource
 import subprocess
 import sys

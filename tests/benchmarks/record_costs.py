@@ -9,8 +9,6 @@ it took, and whether anything moves there. `scatter`: a line for each sample, wi
 and of its history. A few minutes on one core each.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 

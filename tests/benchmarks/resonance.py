@@ -1,16 +1,18 @@
 """A followed resonance of the dovetail root against the responses around its states, and what following costs.
 
-    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.resonance
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.resonance [states | cost] [--mesh 1]
 
 For each tenth of 1e5 cycles: frequency of the history with its error, and the frequency that the responses around this
 state have in quadrature with the excitation, or where they are largest (`tests.followed_states`). A sweep of its own to
 the worn joint would have another friction history than the joint that has worn: after 1e4 cycles both differ by 0.01 Hz
 and 1 %, later by more than any error. At a given frequency they differ by as much.
-Then the CPU time and the Newton iterations of a history with followed frequency over those at the first frequency, from
-the same start, in one process, without start states and reference solutions.
+Then the CPU time of a history with followed frequency, and of one of its accepted steps, over those at the first
+frequency: from the same start, in one process, without start states and reference solutions. A history that follows the
+resonance wears more and takes steps of another number.
 """
 
-from __future__ import annotations
+import argparse
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from solver.model import ReducedModel
 from solver.results.history import StartState
 from solver.settings import FOLLOWED, Followed, FollowedFrequency, Scheme, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.solutions import SlowTime, Solutions
+from solver.wear.solutions import Ended, SlowTime, Solutions
 from studies import build_scene
 from tests.followed_states import at_maximum, followed_states, in_quadrature, responses_around
 
@@ -29,13 +31,35 @@ LOAD, FRICTION, WEAR = 0.5, 0.5, 1.1e-11  # N, 1, 1/Pa
 STEPS = 100  # of 1e5 cycles
 
 
+@dataclass(frozen=True)
+class Measured:
+    """A joint whose cost is measured: load, N, range of the frequency, Hz, cycles and length of an implicit step."""
+
+    name: str
+    model: ReducedModel
+    load: float
+    between: tuple[float, float]
+    cycles: float
+    step: float
+
+
 def main() -> None:
     """Print both tables."""
-    model = build_scene("dovetail_sector", mesh=1)
-    for word in FOLLOWED:
-        print_brute_force(model, word)
-    for scheme in ("adaptive", "implicit"):
-        print_cost(model, scheme)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", nargs="?", choices=("states", "cost"), help="one of both tables; default: both")
+    parser.add_argument("--mesh", type=int, default=1, help="of the dovetail root whose cost is measured")
+    given = parser.parse_args()
+    if given.what != "cost":
+        for word in FOLLOWED:
+            print_brute_force(build_scene("dovetail_sector", mesh=1), word)
+    if given.what != "states":
+        root = build_scene("dovetail_sector", mesh=given.mesh)
+        for joint in (
+            Measured(f"dovetail, mesh {given.mesh}", root, LOAD, BETWEEN, 1e4, 250.0),
+            Measured("slider", build_scene("sdof_slider", damping=20.0), 10.0, (180.0, 230.0), 4e4, 1000.0),
+        ):
+            for scheme in ("adaptive", "implicit"):
+                print_cost(joint, scheme)
 
 
 def print_brute_force(model: ReducedModel, word: Followed) -> None:
@@ -59,35 +83,37 @@ def print_brute_force(model: ReducedModel, word: Followed) -> None:
         )
 
 
-def print_cost(model: ReducedModel, scheme: Scheme) -> None:
-    """CPU time and iterations of 1e4 cycles with followed frequency over those at the first frequency."""
-    settings, resonance = SolverSettings(), FollowedFrequency("resonance", *BETWEEN)
-    ((_, followed),) = follow_branch(model, FRICTION, LOAD, resonance, "up", settings)
+def print_cost(joint: Measured, scheme: Scheme) -> None:
+    """CPU time of a history with followed frequency, and of a step, over those at the first frequency."""
+    settings, resonance = SolverSettings(), FollowedFrequency("resonance", *joint.between)
+    ((_, followed),) = follow_branch(joint.model, FRICTION, joint.load, resonance, "up", settings)
     assert followed.state is not None
     at = np.array([followed.state.omega / (2.0 * np.pi)])
-    ((_, fixed),) = follow_branch(model, FRICTION, LOAD, at, "up", settings)
+    ((_, fixed),) = follow_branch(joint.model, FRICTION, joint.load, at, "up", settings)
     given: list[tuple[str, StartState, FollowedFrequency | None]] = [("fixed", fixed, None)]
-    given += [(word, followed, FollowedFrequency(word, *BETWEEN)) for word in FOLLOWED]
+    given += [(word, followed, FollowedFrequency(word, *joint.between)) for word in FOLLOWED]
     first = None
     for word, start, follow in given:
-        spent, iterations = zip(*(_spent(model, start, scheme, follow) for _ in range(3)), strict=True)
-        first = first or (min(spent), iterations[0])
+        spent, ended = zip(*(_spent(joint, start, scheme, follow) for _ in range(4)), strict=True)
+        # the first run compiles
+        whole, n_steps = min(spent[1:]), len(ended[0].output.course.ends) - 1
+        step = whole / n_steps
+        first = first or (whole, step)
         print(
-            f"{scheme} {word}: {min(spent):.2f} s, {min(spent) / first[0]:.2f} of fixed;"
-            f" {iterations[0]} iterations, {iterations[0] / first[1]:.2f} of fixed",
+            f"{joint.name}, {scheme}, {word}: {whole:.2f} s, {whole / first[0]:.2f} of fixed; {n_steps} steps of"
+            f" {1e3 * step:.1f} ms, {step / first[1]:.2f} of fixed; {ended[0].iterations} iterations",
             flush=True,
         )
 
 
-def _spent(
-    model: ReducedModel, start: StartState, scheme: Scheme, follow: FollowedFrequency | None
-) -> tuple[float, int]:
-    """CPU time, s, and Newton iterations of a history."""
-    case = build_case(model, FRICTION, start.penalty_omega, SolverSettings(), start.resolution)
-    asked = SlowTime(WEAR, scheme, np.array([0.0, 1e4]), 250.0, follow=follow)
+def _spent(joint: Measured, start: StartState, scheme: Scheme, follow: FollowedFrequency | None) -> tuple[float, Ended]:
+    """CPU time of a history, s, and the history."""
+    case = build_case(joint.model, FRICTION, start.penalty_omega, SolverSettings(), start.resolution)
+    step = np.inf if scheme == "adaptive" else joint.step
+    asked = SlowTime(WEAR, scheme, np.array([0.0, joint.cycles]), step, follow=follow)
     began = computing_time()
     ended = Solutions(case, start, asked).history()
-    return computing_time() - began, ended.iterations
+    return computing_time() - began, ended
 
 
 if __name__ == "__main__":

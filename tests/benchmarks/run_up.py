@@ -5,8 +5,6 @@ as |df/dt| / (zeta f)^2. The time integration is that of `time_integration`: the
 frequency, up or down, and the slip work is summed at constant depth.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from dataclasses import replace

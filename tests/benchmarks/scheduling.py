@@ -14,8 +14,6 @@ only in part: the rank correlation with its unknowns, which the cost model uses,
 run time of the sweep it is below 0.1.
 """
 
-from __future__ import annotations
-
 import csv
 import sys
 import time

@@ -4,8 +4,6 @@ Only the computing and the messages are simulated. Which rank gets which task, w
 result makes possible is decided by `studyrunner.mpi.dispatch`, `plan.cost_model` and `task_progress`.
 """
 
-from __future__ import annotations
-
 import heapq
 import itertools
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """PNG files of drawings in few colours: a third of the size, the same to the eye."""
 
-from __future__ import annotations
-
 from io import BytesIO
 
 from PIL import Image

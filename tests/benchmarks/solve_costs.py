@@ -7,8 +7,6 @@ number of unknowns and of directions of slip, and for each way the time in ms an
 1e9 operations a second. Equal numbers in all columns are a perfect prediction.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

@@ -5,8 +5,6 @@ reduction). C: a cylinder in gross slip, measured and computed by McColl, Ding a
 E: the final state by the scheme "final" against that of a march to the end, and what both take.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from dataclasses import dataclass, replace

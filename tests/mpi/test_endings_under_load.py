@@ -1,14 +1,11 @@
 """Runs whose tasks keep the interpreter for seconds, as long calls of C do, end all the same, and soon."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal
 import time
-from pathlib import Path
 
-from tests.mpi.launching import CHEAP, FAKED, SOON, Running, results, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, SOON, results, run_to_end
 
 STUDY = [
     *(FAKED, *CHEAP),
@@ -24,17 +21,17 @@ ENVIRONMENT = {"FAKE_STEPS": "2", "FAKE_SECONDS": "0.02", "FAKE_HOLDS": str(HOLD
 N_SIGNALS = 200
 
 
-def wait_for_a_march(running: Running, folder: Path) -> None:
+def wait_for_a_march(running, folder):
     """Until the branch has taken its steps; what is computed then holds the interpreter."""
     steps = folder / "steps.txt"
     assert running.reaches(lambda: steps.exists() and steps.stat().st_size >= 2 * len("step\n")), running.said
     time.sleep(1.0)
 
 
-def test_two_hundred_signals_end_it_with_a_result(tmp_path: Path) -> None:
+def test_two_hundred_signals_end_it_with_a_result(tmp_path):
     began = []
 
-    def terminate(running: Running) -> None:
+    def terminate(running):
         wait_for_a_march(running, tmp_path)
         rank_0 = running.ranks()[0]
         began.append(time.monotonic())
@@ -52,8 +49,8 @@ def test_two_hundred_signals_end_it_with_a_result(tmp_path: Path) -> None:
     assert seconds < SOON < HOLDS
 
 
-def test_the_launcher_is_gone_with_a_rank(tmp_path: Path) -> None:
-    def kill(running: Running) -> None:
+def test_the_launcher_is_gone_with_a_rank(tmp_path):
+    def kill(running):
         wait_for_a_march(running, tmp_path)
         memory.update(running.shared_memory())
         os.kill(running.ranks()[1], signal.SIGKILL)
@@ -84,13 +81,13 @@ sys.exit(main())
 """
 
 
-def test_one_more_signal_ends_a_run_that_cannot_end(tmp_path: Path) -> None:
+def test_one_more_signal_ends_a_run_that_cannot_end(tmp_path):
     """A disk that does not answer, for one."""
     script = tmp_path / "stuck.py"
     script.write_text(STUCK, encoding="utf-8")
     sent = []
 
-    def end_twice(running: Running) -> None:
+    def end_twice(running):
         for seconds in (0.0, 0.2, 2.0):
             running.wait_for("hangs")
             time.sleep(seconds)

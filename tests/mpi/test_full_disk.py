@@ -1,10 +1,7 @@
 """A full disk: one line says so, what was finished is kept, and the run goes on when there is room."""
 
-from __future__ import annotations
-
 import os
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,7 +18,7 @@ STUDY = [
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
+def small_disk(tmp_path):
     """A file system of 12 MB; a start state of the stand-in takes 0.8 MB."""
     folder = tmp_path / "disk"
     folder.mkdir()
@@ -34,7 +31,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
         subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
-def test_a_full_disk_costs_nothing_that_was_finished(small_disk: Path, tmp_path: Path) -> None:
+def test_a_full_disk_costs_nothing_that_was_finished(small_disk, tmp_path):
     environment = {"FAKE_SECONDS": "0.005", "FAKE_STEPS": "2"}
     target = str(small_disk / "out.nc")
     ended = run_to_end(2, [*STUDY, "-o", target], tmp_path, environment)

@@ -1,25 +1,21 @@
 """A run that is killed or ended at any time goes on, and ends with the result of one that was not disturbed."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random
 import shutil
 import signal
 import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
 from studyrunner.mpi.schedule import SECONDS_TO_PROGRESS
-from tests.mpi.launching import CHEAP, FAKED, SOON, Running, results, run_to_end
-from tests.mpi.losses import all_losses, find_losses, note_end, note_kill
+from tests.mpi.launching import CHEAP, FAKED, SOON, results, run_to_end
+from tests.mpi.losses import PROMISED, ages_of_losses, note
 
 AT_ONCE = 4  # runs side by side: they sleep as long as they compute
 MOST_RUNS = 8
@@ -86,7 +82,7 @@ REAL_STUDY = Disturbed(
 )
 
 
-def wait_a_while(running: Running, study: Disturbed, folder: Path, chance: random.Random) -> None:
+def wait_a_while(running, study, folder, chance):
     """Until some time after the run has begun to compute."""
     before = count_steps(folder)
     # a line of its progress
@@ -99,30 +95,30 @@ def wait_a_while(running: Running, study: Disturbed, folder: Path, chance: rando
         time.sleep(chance.uniform(0.0, study.latest))
 
 
-def count_steps(folder: Path) -> int:
+def count_steps(folder):
     """Those that all runs of the stand-in in this folder have noted."""
     path = folder / "steps.txt"
     return path.stat().st_size // len("step\n") if path.exists() else 0
 
 
-def kill_one(study: Disturbed, folder: Path, chance: random.Random) -> Callable[[Running], None]:
+def kill_one(study, folder, chance):
     """One of the ranks or the launcher is killed: mostly while they compute, now and then before."""
 
-    def disturb(running: Running) -> None:
+    def disturb(running):
         if chance.random() < 0.8:
             wait_a_while(running, study, folder, chance)
         else:
             time.sleep(chance.uniform(0.0, study.latest))
         victims = [running.process.pid, *running.ranks().values()]
         if running.process.poll() is None:
-            note_kill(folder)
+            note(folder, "kill")
             with contextlib.suppress(ProcessLookupError):
                 os.kill(chance.choice(victims), signal.SIGKILL)
 
     return disturb
 
 
-def kill_and_go_on(study: Disturbed, folder: Path, seed: int) -> str:
+def kill_and_go_on(study, folder, seed):
     """What the run that ended by itself was like, after one that was killed, or several."""
     chance = random.Random(seed)
     n_killed = 0
@@ -133,7 +129,7 @@ def kill_and_go_on(study: Disturbed, folder: Path, seed: int) -> str:
         disturb = kill_one(study, folder, chance) if kills else lambda _: None
         n_ranks = (0, 2, 2, 3)[seed % 4] if attempt == 0 else chance.choice([0, 2])
         ended = run_to_end(n_ranks, [*study.arguments, "-o", "out.nc"], folder, study.environment, disturb)
-        note_end(folder)
+        note(folder, "end")
         if ended.status == 0 and n_killed == 0:
             # it was faster than the one that was to kill it
             shutil.rmtree(folder)
@@ -146,27 +142,26 @@ def kill_and_go_on(study: Disturbed, folder: Path, seed: int) -> str:
     return "did not end"
 
 
-@pytest.mark.parametrize(("study", "n_trials"), [(SHORT_STUDY, 4), (REAL_STUDY, 1)], ids=["faked", "real"])
-def test_a_run_that_is_killed_goes_on_to_the_same_result(study: Disturbed, n_trials: int, tmp_path: Path) -> None:
+def test_a_run_that_is_killed_goes_on_to_the_same_result(tmp_path):
+    study = SHORT_STUDY
     assert run_to_end(0, [*study.arguments, "-o", "whole.nc"], tmp_path, study.environment).status == 0
     assert count_steps(tmp_path) == study.n_steps
     expected = results(tmp_path / "whole.nc")
     # alone and on two and three ranks, most of them killed in the midst of a task
-    seeds = range(5, 5 + n_trials)
+    seeds = range(5, 9)
     with ThreadPoolExecutor(AT_ONCE) as pool:
         found = list(pool.map(lambda seed: kill_and_go_on(study, tmp_path / str(seed), seed), seeds))
     for seed, how in zip(seeds, found, strict=True):
         assert how.startswith("killed"), how
         xr.testing.assert_identical(results(tmp_path / str(seed) / "out.nc"), expected)
-    assert sum(int(how.split()[1]) for how in found) >= n_trials
-    assert all_losses(find_losses(tmp_path / str(seed)) for seed in seeds).broken.total() == 0
-    if study.n_steps:
-        resumed = "".join(path.read_text(encoding="utf-8") for path in tmp_path.glob("*/resumed.txt")).splitlines()
-        assert "march" in {line.split()[0] for line in resumed}
+    assert sum(int(how.split()[1]) for how in found) >= len(seeds)
+    assert max((age for seed in seeds for age in ages_of_losses(tmp_path / str(seed))), default=0.0) <= PROMISED
+    resumed = "".join(path.read_text(encoding="utf-8") for path in tmp_path.glob("*/resumed.txt")).splitlines()
+    assert "march" in {line.split()[0] for line in resumed}
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+def whole(tmp_path_factory):
     """The result of the stand-in where it is not disturbed."""
     folder = tmp_path_factory.mktemp("whole")
     arguments = [*FAKED_STUDY.arguments, "-o", "whole.nc"]
@@ -175,13 +170,11 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
 
 
 @pytest.mark.parametrize(("n_ranks", "number"), [(0, signal.SIGINT), (2, signal.SIGTERM)])
-def test_a_run_that_is_ended_leaves_a_result_and_goes_on(
-    n_ranks: int, number: signal.Signals, whole: xr.Dataset, tmp_path: Path
-) -> None:
+def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks, number, whole, tmp_path):
     study = FAKED_STUDY
     arguments = [*study.arguments, "-o", "out.nc"]
 
-    def end(running: Running) -> None:
+    def end(running):
         # about half of the points are there
         assert running.reaches(lambda: count_steps(tmp_path) >= study.n_steps // 2), running.said
         running.process.send_signal(number)
@@ -203,12 +196,12 @@ def test_a_run_that_is_ended_leaves_a_result_and_goes_on(
 
 
 @pytest.mark.parametrize("rank_0_too", [False, True])
-def test_a_rank_that_is_ended_ends_the_run_in_good_order(rank_0_too: bool, tmp_path: Path) -> None:
+def test_a_rank_that_is_ended_ends_the_run_in_good_order(rank_0_too, tmp_path):
     """The launcher tells all ranks, some earlier than others: rank 0 may be writing by then. Some other program may
     tell one."""
     study = FAKED_STUDY
 
-    def terminate(running: Running) -> None:
+    def terminate(running):
         assert running.reaches(lambda: count_steps(tmp_path) >= study.n_steps // 4), running.said
         ranks = running.ranks()
         os.kill(ranks[1], signal.SIGTERM)

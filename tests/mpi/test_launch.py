@@ -1,18 +1,14 @@
 """Launching it wrong says so: one line, one exit status, no hang; and what only rank 0 need see."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import xarray as xr
 
-from tests.mpi.conftest import OpenMpi
 from tests.mpi.launching import FAKED, PATIENCE, ROOT, launcher, mpiexec, results
 
 STUDY = ["sdof_slider", "-o", "out.nc", "--set", "axes.frequency={start = 100, stop = 160, num = 5}"]
@@ -29,9 +25,7 @@ CANNOT_SEE = 'mount -t tmpfs none "$HIDDEN" && exec "$0" "$@"'
 """Started with a view of its own of the file system, in which the folder HIDDEN is empty."""
 
 
-def run(
-    command: list[str], folder: Path, environment: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
+def run(command, folder, environment=None):
     """Never hangs."""
     variables = {**os.environ, "PYTHONPATH": str(ROOT), **(environment or {})}
     return subprocess.run(
@@ -46,7 +40,7 @@ def run(
     )
 
 
-def assert_refused(done: subprocess.CompletedProcess[str], *said: str) -> None:
+def assert_refused(done, *said):
     assert done.returncode == 2, done.stderr
     assert done.stdout == ""
     (line,) = [line for line in done.stderr.splitlines() if "run-study" in line]
@@ -55,13 +49,13 @@ def assert_refused(done: subprocess.CompletedProcess[str], *said: str) -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_launcher_of_open_mpi_and_library_of_mpich(open_mpi: OpenMpi, tmp_path: Path) -> None:
+def test_launcher_of_open_mpi_and_library_of_mpich(open_mpi, tmp_path):
     done = run([*open_mpi.launcher(2), sys.executable, FAKED, *STUDY], tmp_path)
     assert_refused(done, "2 processes were started that cannot talk", "the launcher is that of Open MPI")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_launcher_of_mpich_and_library_of_open_mpi(open_mpi: OpenMpi, tmp_path: Path) -> None:
+def test_launcher_of_mpich_and_library_of_open_mpi(open_mpi, tmp_path):
     done = run([mpiexec(), "-n", "2", open_mpi.python, FAKED, *STUDY], tmp_path, open_mpi.environment)
     assert_refused(done, "2 processes were started, but MPI knows of 1 only", "mpiexec of the environment")
     assert list(tmp_path.iterdir()) == []
@@ -75,7 +69,7 @@ def test_launcher_of_mpich_and_library_of_open_mpi(open_mpi: OpenMpi, tmp_path: 
     ],
     ids=["another source", "one that does not answer"],
 )
-def test_ranks_with_different_software(change: str, said: list[str], tmp_path: Path) -> None:
+def test_ranks_with_different_software(change, said, tmp_path):
     program = tmp_path / "other.py"
     program.write_text(OTHER_VERSION.format(root=str(ROOT), faked=FAKED, change=change), encoding="utf-8")
     if "report" in change:
@@ -87,7 +81,7 @@ def test_ranks_with_different_software(change: str, said: list[str], tmp_path: P
     assert [path.name for path in tmp_path.iterdir()] == ["other.py"]
 
 
-def test_only_rank_0_sees_study_scene_and_output(tmp_path: Path) -> None:
+def test_only_rank_0_sees_study_scene_and_output(tmp_path):
     if os.geteuid() != 0 or subprocess.run(["unshare", "-m", "true"], capture_output=True, check=False).returncode:
         pytest.skip("a view of its own of the file system is for root only")
     folder, elsewhere = tmp_path / "of rank 0", tmp_path / "elsewhere"
@@ -110,7 +104,7 @@ def test_only_rank_0_sees_study_scene_and_output(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def read_only(tmp_path: Path) -> Iterator[Path]:
+def read_only(tmp_path):
     """A folder that not even root can write to."""
     folder = tmp_path / "read-only"
     folder.mkdir()
@@ -123,7 +117,7 @@ def read_only(tmp_path: Path) -> Iterator[Path]:
         subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
-def test_an_output_that_cannot_be_written(read_only: Path, tmp_path: Path) -> None:
+def test_an_output_that_cannot_be_written(read_only, tmp_path):
     command = [*launcher(2), sys.executable, FAKED, *STUDY, "-o", str(read_only / "out.nc")]
     done = run(command, tmp_path)
     assert done.returncode == 2
@@ -143,12 +137,12 @@ exec ip netns exec PREFIX$number unshare --mount --uts --ipc --pid --fork --kill
 """
 
 
-def tool(*command: str) -> None:
+def tool(*command):
     subprocess.run(command, check=True, capture_output=True)
 
 
 @pytest.fixture
-def hosts() -> Iterator[str]:
+def hosts():
     """Two hosts on one network, each with its own processes, names and memory; what their names begin with."""
     prefix = f"fw{os.getpid() % 100000}h"
     if shutil.which("ip") is None or shutil.which("unshare") is None or os.geteuid() != 0:
@@ -174,7 +168,7 @@ def hosts() -> Iterator[str]:
         tool("ip", "link", "del", f"{prefix}b")
 
 
-def test_two_hosts_and_one_shared_folder(hosts: str, tmp_path: Path) -> None:
+def test_two_hosts_and_one_shared_folder(hosts, tmp_path):
     """The same as on one host, and what they say to each other goes over the network."""
     starter = tmp_path / "start"
     starter.write_text(START.replace("PREFIX", hosts), encoding="utf-8")

@@ -1,13 +1,9 @@
 """Rank 0 keeps no results in memory. What a point costs beyond its computing, `tests.benchmarks.overhead` measures."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 from tests.benchmarks.overhead import run
 
 
-def test_rank_0_does_not_hold_results(tmp_path: Path) -> None:
+def test_rank_0_does_not_hold_results(tmp_path):
     """A thousand times as much in each result takes hardly more memory."""
     outputs, n_points = 16_001, 200
     small, large = (run(0, n_points, tmp_path, f"{n}.nc", n) for n in (11, outputs))

@@ -1,14 +1,10 @@
 """The log of a run under mpiexec says how far it is, again and again."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 from tests.mpi.launching import CHEAP, FAKED, run_to_end
 from tests.studyrunner.test_progress import LINE
 
 
-def test_a_run_on_two_ranks_says_how_far_it_is(tmp_path: Path) -> None:
+def test_a_run_on_two_ranks_says_how_far_it_is(tmp_path):
     """Both ranks are seen at work, and the rank that serves them is not too busy to say so."""
     study = (*CHEAP, "--set", "axes.scheme=['implicit', 'explicit']", "-o", "out.nc")
     told = {"FAKE_STEPS": "4", "FAKE_SECONDS": "0.03", "FAKE_TELLING": "0.1"}

@@ -1,9 +1,6 @@
 """The ranks of a machine have one copy of the scene between them."""
 
-from __future__ import annotations
-
 import json
-from pathlib import Path
 
 import pytest
 
@@ -14,7 +11,7 @@ SCRIPT = str(ROOT / "tests/mpi/share_arrays.py")
 N_BYTES = 64_000_000
 
 
-def test_ranks_of_a_machine_share_what_is_handed_out(tmp_path: Path) -> None:
+def test_ranks_of_a_machine_share_what_is_handed_out(tmp_path):
     """But the last one, which the system does not let map the memory of others."""
     refused = 2
     if not processes_may_share():

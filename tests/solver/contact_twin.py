@@ -3,8 +3,6 @@
 Written from Eqs. (11)-(15) in the convention of the project; shares nothing with the kernels of the solver.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 FloatArray = np.ndarray

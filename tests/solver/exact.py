@@ -1,7 +1,5 @@
 """States of the textbook scenes that are known exactly, and the errors of automatic ones against them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial

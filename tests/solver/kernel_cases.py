@@ -1,7 +1,5 @@
 """Inputs of the kernel tests, and the results that are compared with and without compilation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numba

@@ -3,8 +3,6 @@
 Exact between events where there is one direction, tiny implicit steps in the plane. Shares nothing with the solver.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -26,10 +24,10 @@ class Series:
         orders = np.arange(self.amplitudes.size)
         return np.real(np.exp(1j * self.omega * np.multiply.outer(time, orders)) @ self.amplitudes)
 
-    def scaled(self, factor: float) -> Series:
+    def scaled(self, factor: float) -> "Series":
         return Series(factor * self.amplitudes, self.omega)
 
-    def minus(self, other: Series) -> Series:
+    def minus(self, other: "Series") -> "Series":
         return Series(self.amplitudes - other.amplitudes, self.omega)
 
 

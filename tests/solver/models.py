@@ -1,13 +1,12 @@
 """Small models for the tests of the solver, all seeded, and the textbook and dovetail scenes at a small size."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eigh
 
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.converged import PathPoint
@@ -233,3 +232,11 @@ def march_wear(
     """The history from a start state; asked: what else `SlowTime` has."""
     wanted = SlowTime(wear_coefficient, scheme, cycles, step, **asked)
     return integrate_wear(model, friction_coefficient, settings, start, wanted, keep, resume)
+
+
+def glued_frequency(model: ReducedModel) -> float:
+    """First natural frequency of a model with its joint held, Hz, at the nodal diameter of the excitation."""
+    linear = model.linear[model.nodal_diameter]
+    inner = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs.ravel())
+    values = eigh(linear.stiffness[np.ix_(inner, inner)], linear.mass[np.ix_(inner, inner)], eigvals_only=True)
+    return float(np.sqrt(values[0]) / (2.0 * np.pi))

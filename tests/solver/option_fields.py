@@ -1,7 +1,5 @@
 """The option classes of the solver: tuning constants with their meaning and evidence."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 from dataclasses import is_dataclass

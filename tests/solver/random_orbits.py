@@ -1,7 +1,5 @@
 """Random textbook scenes with one contact pair whose periodic motions are known exactly, of any size and unit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

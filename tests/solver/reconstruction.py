@@ -3,8 +3,6 @@
 Nothing here passes through the condensed structure, the kernels or the penalty of the solver.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

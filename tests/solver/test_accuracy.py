@@ -1,7 +1,5 @@
 """Automatic harmonics and samples against exact motions, and the convergence of the marched mass with harmonics."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,7 @@ STATES = states()
 @pytest.mark.parametrize(
     ("name", "rtol"), [*((name, 1e-3) for name in STATES), *((name, 1e-2) for name in list(STATES)[::4])]
 )
-def test_an_automatic_state_is_as_accurate_as_was_asked_for(name: str, rtol: float) -> None:
+def test_an_automatic_state_is_as_accurate_as_was_asked_for(name, rtol):
     exact = STATES[name]()
     errors = errors_of(exact, SolverSettings(rtol=rtol))
     assert errors.accurate
@@ -29,7 +27,7 @@ def test_an_automatic_state_is_as_accurate_as_was_asked_for(name: str, rtol: flo
         assert errors.response > 1e-7
 
 
-def test_a_smaller_tolerance_takes_more_harmonics_or_samples() -> None:
+def test_a_smaller_tolerance_takes_more_harmonics_or_samples():
     for exact in (slider(10.0, 0.6), two_masses(0.4)):
         coarse, fine = (errors_of(exact, SolverSettings(rtol=rtol)) for rtol in (1e-2, 1e-3))
         assert fine.orders[-1] > coarse.orders[-1]
@@ -38,7 +36,7 @@ def test_a_smaller_tolerance_takes_more_harmonics_or_samples() -> None:
 
 
 @pytest.mark.slow
-def test_the_slider_converges_with_the_square_of_the_harmonics_at_least() -> None:
+def test_the_slider_converges_with_the_square_of_the_harmonics_at_least():
     harmonics = np.array([1, 3, 5, 9, 15])
     exact = slider(10.0, 0.9)
     assert exact.omega == pytest.approx(0.9 * NATURAL)

@@ -1,7 +1,5 @@
 """Branches followed by arc length through their folds."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -12,7 +10,6 @@ from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
-from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
 from solver.settings import SolverSettings
@@ -22,12 +19,12 @@ from tests.solver.test_natural import GRAZING, TOLERANCE, WALL_OMEGA, wall
 
 
 @lru_cache
-def upper_branch_size(amplitude: float) -> float:
+def upper_branch_size(amplitude):
     """Motion on the branch with impacts, along the frequency: a path that avoids the fold."""
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     idle = np.zeros(1)
 
-    def balance_at(omega: float, history: FloatArray) -> Balance:
+    def balance_at(omega, history):
         return Balance.frozen(case.joint(omega, amplitude), history, idle)
 
     found = first_point(case, 0.9, amplitude, idle)
@@ -40,11 +37,11 @@ def upper_branch_size(amplitude: float) -> float:
     return float(np.hypot(response[0, 1], response[0, 2]))
 
 
-def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
+def test_arc_length_goes_through_both_folds_to_the_other_branch():
     balance_at, first, size = wall(WALL_OMEGA)
     visited: list[float] = []
 
-    def watched(amplitude: float, history: FloatArray) -> Balance:
+    def watched(amplitude, history):
         visited.append(amplitude)
         return balance_at(amplitude, history)
 
@@ -62,7 +59,7 @@ def test_arc_length_goes_through_both_folds_to_the_other_branch() -> None:
 
 
 @pytest.mark.slow
-def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> None:
+def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target():
     balance_at, first, _ = wall(0.5)
     budget = Budget()
     result = follow_arc(Arc(balance_at, first(0.01), 0.01, JacobianSolver(), TOLERANCE, budget), np.inf)
@@ -70,7 +67,7 @@ def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target() -> Non
     assert budget.iterations <= CONTINUATION.arc_correctors * CONTINUATION.near_iterations
 
 
-def test_arc_length_does_not_go_on_where_stability_is_lost_without_a_fold() -> None:
+def test_arc_length_does_not_go_on_where_stability_is_lost_without_a_fold():
     """No slow change of the parameter leads to what the branch comes to beyond the target."""
     balance_at, first, _ = wall(0.9)
     spent, farthest = [], []
@@ -78,7 +75,7 @@ def test_arc_length_does_not_go_on_where_stability_is_lost_without_a_fold() -> N
         visited: list[float] = []
         budget = Budget()
 
-        def watched(amplitude: float, history: FloatArray, visited: list[float] = visited) -> Balance:
+        def watched(amplitude, history, visited=visited):
             visited.append(amplitude)
             return balance_at(amplitude, history)
 

@@ -1,13 +1,10 @@
 """Residual and Jacobian of the harmonic balance against differences, its inverse, and the full equations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK
 from solver.harmonic_balance.dlft import Balance
-from solver.model import FloatArray
 from solver.settings import Resolution, SolverSettings
 from tests.solver.models import cyclic_model, random_balance, random_model, scene, with_free_masses
 
@@ -18,11 +15,11 @@ MODELS = {
 }
 
 
-def case(kinds: str, seed: int, wear: bool) -> tuple[Balance, FloatArray]:
+def case(kinds, seed, wear):
     return random_balance(random_model(seed, MODELS[kinds]), SETTINGS, seed + 100, wear=wear)
 
 
-def jacobian_by_differences(balance: Balance, predicted: FloatArray, step: float) -> FloatArray:
+def jacobian_by_differences(balance, predicted, step):
     """Central differences where the differences of both sides agree, that is away from the switches.
 
     The states of the samples may change by round-off: a pair that has shaken down touches its limit without passing it.
@@ -45,7 +42,7 @@ def jacobian_by_differences(balance: Balance, predicted: FloatArray, step: float
 @pytest.mark.parametrize("wear", [False, True])
 @pytest.mark.parametrize("kinds", MODELS)
 @pytest.mark.parametrize("seed", [1, 2])
-def test_jacobian_is_that_of_central_differences(kinds: str, seed: int, wear: bool) -> None:
+def test_jacobian_is_that_of_central_differences(kinds, seed, wear):
     balance, predicted = case(kinds, seed, wear)
     at = balance.evaluate(predicted)
     assert {SEPARATED, STICK, SLIP} <= set(at.status_t.ravel())
@@ -58,7 +55,7 @@ def test_jacobian_is_that_of_central_differences(kinds: str, seed: int, wear: bo
 
 
 @pytest.mark.parametrize("wear", [False, True])
-def test_jacobian_under_a_travelling_wave(wear: bool) -> None:
+def test_jacobian_under_a_travelling_wave(wear):
     balance, predicted = random_balance(cyclic_model(3, MODELS["mixed"], 6, 2), SETTINGS, 7, wear=wear)
     assert np.abs(balance.joint.structure.dynamic_stiffness.imag).max() > 0
     differences = jacobian_by_differences(balance, predicted, 1e-4)
@@ -67,7 +64,7 @@ def test_jacobian_under_a_travelling_wave(wear: bool) -> None:
 
 
 @pytest.mark.parametrize("kinds", MODELS)
-def test_the_product_is_that_of_the_dense_jacobian(kinds: str) -> None:
+def test_the_product_is_that_of_the_dense_jacobian(kinds):
     balance, predicted = case(kinds, 2, wear=True)
     tangent = balance.linearise(balance.evaluate(predicted))
     dense = tangent.dense(np.arange(balance.joint.contact.n_contact))
@@ -78,7 +75,7 @@ def test_the_product_is_that_of_the_dense_jacobian(kinds: str) -> None:
 
 @pytest.mark.parametrize("wear", [False, True])
 @pytest.mark.parametrize("kinds", MODELS)
-def test_predict_is_the_inverse_of_evaluate(kinds: str, wear: bool) -> None:
+def test_predict_is_the_inverse_of_evaluate(kinds, wear):
     balance, predicted = case(kinds, 5, wear)
     at = balance.evaluate(predicted)
     # what a state stores is its own depth; from there no wear is left to add
@@ -91,7 +88,7 @@ def test_predict_is_the_inverse_of_evaluate(kinds: str, wear: bool) -> None:
 MASSES = {"all": [0, 1, 2, 3, 5], "some": [0, 1], "one_elastic": [0, 2, 3, 5]}  # of MODELS["mixed"]; 4 has no tangent
 
 
-def mass_balance(free: str, seed: int, wear: bool, resolution: Resolution) -> tuple[Balance, FloatArray]:
+def mass_balance(free, seed, wear, resolution):
     """Elastic pairs and masses on sliders in one joint."""
     model = with_free_masses(random_model(seed, MODELS["mixed"]), MASSES[free])
     balance, predicted = random_balance(model, SETTINGS, seed + 100, wear=wear, resolution=resolution)
@@ -109,7 +106,7 @@ def mass_balance(free: str, seed: int, wear: bool, resolution: Resolution) -> tu
         ("one_elastic", True, Resolution((1, 3, 5), 48)),
     ],
 )
-def test_jacobian_of_elastic_pairs_and_masses_on_sliders(free: str, wear: bool, resolution: Resolution) -> None:
+def test_jacobian_of_elastic_pairs_and_masses_on_sliders(free, wear, resolution):
     balance, predicted = mass_balance(free, 4, wear, resolution)
     at = balance.evaluate(predicted)
     inertial = balance.joint.penalty.inertial
@@ -124,7 +121,7 @@ def test_jacobian_of_elastic_pairs_and_masses_on_sliders(free: str, wear: bool, 
 @pytest.mark.parametrize("resolution", [Resolution((1, 2, 3), 24), Resolution((1, 3, 7), 64)])
 @pytest.mark.parametrize("wear", [False, True])
 @pytest.mark.parametrize("name", ["sdof_slider", "two_masses"])
-def test_jacobian_of_a_mass_on_a_slider(name: str, wear: bool, resolution: Resolution) -> None:
+def test_jacobian_of_a_mass_on_a_slider(name, wear, resolution):
     balance, predicted = random_balance(scene(name), SETTINGS, 7, wear=wear, resolution=resolution)
     assert balance.joint.penalty.inertial.all()
     at = balance.evaluate(predicted)
@@ -134,7 +131,7 @@ def test_jacobian_of_a_mass_on_a_slider(name: str, wear: bool, resolution: Resol
     assert np.abs(dense - differences).max() < 1e-7 * np.abs(differences).max()
 
 
-def test_residual_is_that_of_the_stiffness_matrices() -> None:
+def test_residual_is_that_of_the_stiffness_matrices():
     balance, predicted = case("mixed", 8, wear=True)
     at = balance.evaluate(predicted)
     structure = balance.joint.structure
@@ -148,7 +145,7 @@ def test_residual_is_that_of_the_stiffness_matrices() -> None:
         assert at.residual[:, 2 * n - 1] - 1j * at.residual[:, 2 * n] == pytest.approx(left, abs=1e-10)
 
 
-def test_the_scaled_residual_shows_an_error_of_the_vibration_beside_a_large_preload() -> None:
+def test_the_scaled_residual_shows_an_error_of_the_vibration_beside_a_large_preload():
     balance, predicted = case("3d", 9, wear=False)
     at = balance.evaluate(predicted)
     static, moving = at.scale

@@ -1,7 +1,5 @@
 """A mass at a wall that wears away: the branch with impacts ends, the mass falls on the other one, wear goes on."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -9,8 +7,7 @@ import pytest
 
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.outcome import Outcome
-from solver.results.history import StartState, WearHistory
-from solver.settings import Scheme, SolverSettings
+from solver.settings import SolverSettings
 from tests.references import vibro_impact_orbit
 from tests.solver.models import branch_states, march_wear
 
@@ -22,7 +19,7 @@ WEAR = 1e-7  # 1/Pa
 AREA = 1e-4
 
 
-def worn_wall(pressed: float = 0.0) -> ReducedModel:
+def worn_wall(pressed=0.0):
     """`vibro_impact` with a second displacement of its pair: a massless slide along the wall, moved by its own load.
 
     The friction is so small that the mass does not feel it. Another pair, pressed by `pressed`, wears all the time.
@@ -50,32 +47,29 @@ def worn_wall(pressed: float = 0.0) -> ReducedModel:
 
 
 @lru_cache
-def start(sweep: str = "up") -> StartState:
+def start(sweep="up"):
     (found,) = branch_states(worn_wall(1.0), 1e-3, FORCE, [OMEGA], SETTINGS, sweep)
     assert found.outcome is Outcome.CONVERGED
     return found
 
 
 @lru_cache
-def history(step: float, scheme: Scheme, end: float = 1000.0) -> WearHistory:
+def history(step, scheme, end=1000.0):
     cycles = np.linspace(0.0, end, 21)
     return march_wear(worn_wall(1.0), 1e-3, start(), WEAR, step, scheme, cycles, SETTINGS)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("share", "impacts"), [(0.98, True), (1.02, False)])
-def test_the_exact_branch_ends_at_the_depth_of_the_jump(share: float, impacts: bool) -> None:
+def test_the_exact_branch_ends_at_the_depth_of_the_jump(share, impacts):
     depth = share * history(5.0, "implicit").wear_depth[-1, 0]
     orbit = vibro_impact_orbit(1.0, 0.05, 1.0, FORCE, 100.0, GAP + depth, OMEGA, sweep_start=0.7)
     assert (abs(orbit.harmonic(0)) > 0.05) == impacts
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("scheme", "step"),
-    [("explicit", 50.0), ("implicit", 1000.0), ("adaptive", 0.0)],
-)
-def test_the_jump_is_found_and_the_march_goes_on(scheme: Scheme, step: float) -> None:
+@pytest.mark.parametrize(("scheme", "step"), [("explicit", 50.0), ("implicit", 1000.0), ("adaptive", 0.0)])
+def test_the_jump_is_found_and_the_march_goes_on(scheme, step):
     found = history(step, scheme)
     assert found.outcome is Outcome.CONVERGED
     assert 0.0 < found.jump_cycle < 1000.0
@@ -94,13 +88,13 @@ def test_the_jump_is_found_and_the_march_goes_on(scheme: Scheme, step: float) ->
 
 
 @pytest.mark.slow
-def test_the_jump_cycle_does_not_depend_much_on_the_step() -> None:
+def test_the_jump_cycle_does_not_depend_much_on_the_step():
     fine = history(5.0, "implicit").jump_cycle
     assert history(50.0, "implicit").jump_cycle == pytest.approx(fine, rel=0.1, abs=0.0)
     assert history(0.0, "adaptive").jump_cycle == pytest.approx(fine, rel=0.02, abs=0.0)
 
 
-def test_on_the_branch_without_impacts_nothing_jumps() -> None:
+def test_on_the_branch_without_impacts_nothing_jumps():
     found = march_wear(worn_wall(1.0), 1e-3, start("down"), WEAR, 50.0, "implicit", np.array([0.0, 1000.0]), SETTINGS)
     assert found.outcome is Outcome.CONVERGED
     assert np.isnan(found.jump_cycle)

@@ -1,7 +1,5 @@
 """Certificates: good states hold, their numbers fall as harmonics are added, and every broken state is caught."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 
@@ -10,10 +8,9 @@ import pytest
 
 from solver.accuracy.certificate import Certificate, certify
 from solver.accuracy.options import ACCURACY
-from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.model import ReducedModel
+from solver.harmonic_balance.dlft import Balance
 from solver.settings import SolverSettings
-from solver.structure.joint import Joint, build_case
+from solver.structure.joint import build_case
 from tests.solver.models import OMEGA, branch_states, first_point, random_model, scene
 
 TOLERANCE = SolverSettings().tolerance
@@ -22,9 +19,7 @@ SLIDER = 2 * np.pi * 160.0
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent")
 
 
-def on_branch(
-    model: ReducedModel, friction: float, amplitude: float, omega: float, settings: SolverSettings, sweep: str = "up"
-) -> tuple[Joint, Evaluation]:
+def on_branch(model, friction, amplitude, omega, settings, sweep="up"):
     """The state of a sweep, evaluated from what is stored of it."""
     (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
     assert start.state is not None
@@ -35,19 +30,19 @@ def on_branch(
 
 
 @lru_cache
-def slider(n_harmonics: int, n_samples: int = 256) -> tuple[Joint, Evaluation]:
+def slider(n_harmonics, n_samples=256):
     settings = SolverSettings(n_harmonics, n_samples)
     return on_branch(scene("sdof_slider", n_harmonics), 0.5, 10.0, SLIDER, settings)
 
 
 @lru_cache
-def two_masses(omega: float, n_harmonics: int) -> tuple[Joint, Evaluation]:
+def two_masses(omega, n_harmonics):
     settings = SolverSettings(n_harmonics, 256)
     return on_branch(scene("two_masses", n_harmonics), 0.5, 20.0, omega, settings)
 
 
 @lru_cache
-def vibro_impact(omega: float, n_harmonics: int, sweep: str = "up") -> tuple[Joint, Evaluation]:
+def vibro_impact(omega, n_harmonics, sweep="up"):
     """The upper branch is reached by a sweep up from below the bistable range."""
     settings = SolverSettings(n_harmonics, 256)
     model = scene("vibro_impact", n_harmonics)
@@ -62,7 +57,7 @@ def vibro_impact(omega: float, n_harmonics: int, sweep: str = "up") -> tuple[Joi
 
 
 @lru_cache
-def random_state(seed: int, kinds: tuple[str, ...] = KINDS) -> tuple[Joint, Evaluation]:
+def random_state(seed, kinds=KINDS):
     """Elastic joint with pairs that stick, slip and open."""
     case = build_case(random_model(seed, kinds), 0.4, OMEGA, SolverSettings(5, 128))
     worn = np.random.default_rng(seed).uniform(0.0, 2e-6, len(kinds))
@@ -70,13 +65,13 @@ def random_state(seed: int, kinds: tuple[str, ...] = KINDS) -> tuple[Joint, Eval
     return case.joint(OMEGA, 60.0), point.evaluation
 
 
-def failing(joint: Joint, evaluation: Evaluation) -> set[str]:
+def failing(joint, evaluation):
     return set(certify(joint, evaluation).failures(TOLERANCE))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("n_harmonics", [3, 21])
-def test_states_of_the_textbook_scenes_hold(n_harmonics: int) -> None:
+def test_states_of_the_textbook_scenes_hold(n_harmonics):
     states = [slider(n_harmonics), two_masses(0.4, n_harmonics), two_masses(0.6, n_harmonics)]
     states += [vibro_impact(1.2, n_harmonics), vibro_impact(1.5, n_harmonics), vibro_impact(1.2, n_harmonics, "down")]
     for joint, evaluation in states:
@@ -85,13 +80,13 @@ def test_states_of_the_textbook_scenes_hold(n_harmonics: int) -> None:
 
 
 @pytest.mark.slow
-def test_penetration_falls_as_harmonics_are_added() -> None:
+def test_penetration_falls_as_harmonics_are_added():
     values = [certify(*vibro_impact(1.2, n)).penetration for n in (3, 11, 21)]
     assert (np.diff(values) < 0.0).all()
     assert values[-1] < values[0] / 8.0
 
 
-def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_overshoots() -> None:
+def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_overshoots():
     joint, evaluation = slider(21)
     limit = 0.5 * evaluation.force_t[0, 0].max()
     overshoot = np.abs(evaluation.force_h[0, 1] @ joint.basis.synthesis).max() / limit - 1.0
@@ -101,7 +96,7 @@ def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_oversho
     assert certificate.tension == 0.0
 
 
-def test_an_unconverged_force_is_caught_by_the_residual() -> None:
+def test_an_unconverged_force_is_caught_by_the_residual():
     for joint, evaluation in (slider(5), random_state(1)):
         balance = Balance.frozen(joint, evaluation.history, evaluation.wear_depth)
         noise = np.random.default_rng(0).normal(size=evaluation.predicted_h.shape)
@@ -110,7 +105,7 @@ def test_an_unconverged_force_is_caught_by_the_residual() -> None:
 
 
 @pytest.mark.parametrize("state", [slider(5), random_state(1)])
-def test_friction_that_drives_is_caught_by_the_energy(state: tuple[Joint, Evaluation]) -> None:
+def test_friction_that_drives_is_caught_by_the_energy(state):
     # the motion is made to fit the force, so that equilibrium alone would not tell
     joint, evaluation = state
     turned = evaluation.force_h.copy()
@@ -130,7 +125,7 @@ def test_friction_that_drives_is_caught_by_the_energy(state: tuple[Joint, Evalua
     assert failures["energy_error"][0] > 0.5
 
 
-def test_a_slip_that_does_not_repeat_is_caught() -> None:
+def test_a_slip_that_does_not_repeat_is_caught():
     joint, evaluation = random_state(1)
     slipping = int(np.argmax(evaluation.slip_work))
     state_t = evaluation.state_t.copy()
@@ -140,7 +135,7 @@ def test_a_slip_that_does_not_repeat_is_caught() -> None:
     assert failing(joint, replace(evaluation, periodicity_error=0.02 * limit)) == {"periodicity_error"}
 
 
-def test_a_pull_is_caught_in_the_samples_and_in_the_series() -> None:
+def test_a_pull_is_caught_in_the_samples_and_in_the_series():
     joint, evaluation = random_state(1)
     pulled = evaluation.force_t.copy()
     pulled[0, 0, 3] = -0.05 * pulled[:, 0].max()
@@ -151,7 +146,7 @@ def test_a_pull_is_caught_in_the_samples_and_in_the_series() -> None:
     assert {"tension", "residual"} <= failing(joint, replace(evaluation, force_h=force_h))
 
 
-def test_surfaces_in_each_other_are_caught() -> None:
+def test_surfaces_in_each_other_are_caught():
     joint, evaluation = random_state(1)
     moved = np.linalg.norm(evaluation.displacement_h[:, :, 1:] @ joint.basis.synthesis[1:], axis=1).max()
     closer = evaluation.displacement_h.copy()
@@ -162,7 +157,7 @@ def test_surfaces_in_each_other_are_caught() -> None:
 
 
 @pytest.mark.parametrize("name", ["residual", *ACCURACY.violation_limits])
-def test_each_number_is_judged_and_named(name: str) -> None:
+def test_each_number_is_judged_and_named(name):
     limit = ACCURACY.violation_limits.get(name, 2.0 * TOLERANCE)
     assert GOOD.holds(TOLERANCE)
     assert replace(GOOD, **{name: limit}).holds(TOLERANCE)

@@ -1,7 +1,5 @@
 """Run time and time limit are those of computing: a first run compiles for longer than many states take."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time
@@ -18,21 +16,21 @@ from solver.settings import SolverSettings
 from tests.solver.models import march_wear, scene
 
 
-def fresh_kernel() -> None:
+def fresh_kernel():
     """A kernel that calls another one: neither is compiled yet."""
 
     @njit
-    def inner(values: np.ndarray) -> float:
+    def inner(values):
         return values.sum()
 
     @njit
-    def outer(values: np.ndarray) -> float:
+    def outer(values):
         return inner(values) + inner(values[::-1])
 
     outer(np.arange(3.0))
 
 
-def test_compiling_takes_no_computing_time() -> None:
+def test_compiling_takes_no_computing_time():
     cpu, computing = time.thread_time(), computing_time()
     fresh_kernel()
     cpu, computing = time.thread_time() - cpu, computing_time() - computing
@@ -41,12 +39,12 @@ def test_compiling_takes_no_computing_time() -> None:
 
 
 @pytest.mark.slow
-def test_run_time_leaves_out_compiling(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_run_time_leaves_out_compiling(monkeypatch):
     settings = SolverSettings(harmonics=3, samples=64)
     model = scene("sdof_slider", 3)
     _, start = next(follow_branch(model, 0.5, 10.0, np.array([160.0]), "up", settings))
 
-    def march() -> tuple[float, float]:
+    def march():
         """CPU time of a march and what it says that it took."""
         began = time.thread_time()
         history = march_wear(model, 0.5, start, 1e-11, 1e4, "explicit", np.array([0.0, 1e4]), settings)
@@ -64,7 +62,7 @@ def test_run_time_leaves_out_compiling(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_compiled_is_noticed_and_what_is_there_is_not() -> None:
+def test_what_is_compiled_is_noticed_and_what_is_there_is_not():
     code = """
 from numba import njit
 from solver.clock import n_compiled

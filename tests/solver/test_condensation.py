@@ -1,7 +1,5 @@
 """The condensed structure against the full equations, and a folded sector against its whole ring."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import numpy as np
@@ -11,6 +9,7 @@ from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nod
 from solver.structure import condensation
 from solver.structure.condensation import build_structure, relative_indices
 from solver.structure.fourier import change_orders, from_complex, to_complex
+from solver.structure.frequency_slope import frequency_slope
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 from solver.structure.options import STRUCTURE
 from tests.solver.models import MASS, OMEGA, STIFFNESS, cyclic_model, definite, random_model, scene
@@ -22,7 +21,7 @@ AMPLITUDE = 60.0
 
 
 @pytest.mark.parametrize("n_inner", [0, 1, 6])
-def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_inner: int) -> None:
+def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_inner):
     model = random_model(1, KINDS, n_inner)
     linear = model.linear[0]
     structure = build_structure(model, OMEGA, AMPLITUDE, ORDERS)
@@ -47,7 +46,7 @@ def test_condensed_equilibrium_and_responses_are_those_of_the_full_structure(n_i
 
 @pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(6, 2), (5, 2), (5, 1), (6, 3), (7, 0)])
 @pytest.mark.parametrize("orders", [(1, 3), (1, 3, 5), (1, 2, 5), (1,)])
-def test_any_orders_are_harmonics_of_all_of_them(n_sectors: int, nodal_diameter: int, orders: tuple[int, ...]) -> None:
+def test_any_orders_are_harmonics_of_all_of_them(n_sectors, nodal_diameter, orders):
     # each order sees the nodal diameter of its own, not of its place
     model = cyclic_model(9, KINDS, n_sectors, nodal_diameter, 5)
     every = build_structure(model, OMEGA, AMPLITUDE, (1, 2, 3, 4, 5))
@@ -71,7 +70,23 @@ def test_any_orders_are_harmonics_of_all_of_them(n_sectors: int, nodal_diameter:
     assert some.input_work(displacement_h) == pytest.approx(every.input_work(full_h), rel=1e-12)
 
 
-def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
+@pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(5, 2), (6, 3), (7, 0)])
+def test_the_slope_with_the_frequency_is_that_of_differences(n_sectors, nodal_diameter):
+    model, orders = cyclic_model(9, KINDS, n_sectors, nodal_diameter, 5), (1, 3, 5)
+    relative, _ = relative_indices(model.contact)
+    u = np.random.default_rng(11).normal(size=(relative.size, 2 * len(orders) + 1))
+    slope = frequency_slope(model, OMEGA, AMPLITUDE, orders, u)
+    length, values = 1e-5 * OMEGA, []
+    for omega in (OMEGA - length, OMEGA + length):
+        there = build_structure(model, omega, AMPLITUDE, orders)
+        product = there.drive @ to_complex(u)[:, 0] + there.drive_offset
+        values.append((there.apply(u) - there.force_h(), product, to_complex(there.response_h(u))[:, 0]))
+    for found, one, other in zip((slope.force, slope.product, slope.response), *values, strict=True):
+        expected = (other - one) / (2.0 * length)
+        assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+def test_a_sector_moves_like_its_whole_ring_in_every_harmonic():
     # Two masses a sector, tied to each other and, unevenly, to the next sector; the ring is assembled directly, and
     # forces that travel with the wave act on the contact displacement 0 of every sector.
     n_sectors, wave, n_harmonics = 5, 2, 4
@@ -83,7 +98,7 @@ def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
         "m": np.zeros((2, 2)),
     }
 
-    def ring(name: str) -> np.ndarray:
+    def ring(name):
         whole = np.zeros((2 * n_sectors, 2 * n_sectors))
         for s in range(n_sectors):
             here, there = slice(2 * s, 2 * s + 2), slice(2 * ((s + 1) % n_sectors), 2 * ((s + 1) % n_sectors) + 2)
@@ -92,7 +107,7 @@ def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
             whole[there, here] += tie[name].T
         return whole
 
-    def sector(name: str, k: int) -> np.ndarray:
+    def sector(name, k):
         turn = np.exp(2j * np.pi * k / n_sectors)
         matrix = own[name] + tie[name] * turn + tie[name].T / turn
         return matrix.real if k == 0 else matrix
@@ -138,7 +153,7 @@ def test_a_sector_moves_like_its_whole_ring_in_every_harmonic() -> None:
         assert response == pytest.approx(moved[1], rel=1e-9, abs=0.0), f"harmonic {n}"
 
 
-def test_needed_nodal_diameters_are_folded() -> None:
+def test_needed_nodal_diameters_are_folded():
     assert needed_nodal_diameters(3, 47, 3) == (0, 3, 6, 9)
     assert needed_nodal_diameters(20, 47, 3) == (0, 7, 13, 20)  # 40 -> 7, 60 - 47 = 13
     assert needed_nodal_diameters(2, 4, 5) == (0, 2)
@@ -146,7 +161,7 @@ def test_needed_nodal_diameters_are_folded() -> None:
     assert needed_nodal_diameters(4, 0, 9) == (0,)
 
 
-def test_a_structure_that_nothing_holds_is_singular() -> None:
+def test_a_structure_that_nothing_holds_is_singular():
     model = random_model(8)
     linear = model.linear[0]
     free = {name: np.zeros_like(linear.mass) for name in ("mass", "damping", "stiffness")}
@@ -157,7 +172,7 @@ def test_a_structure_that_nothing_holds_is_singular() -> None:
         build_structure(ReducedModel({0: loose}, model.contact, model.response_names), OMEGA, 1.0, (1,))
 
 
-def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(monkeypatch):
     model = scene("dovetail_sector", 5, mesh=1)
     orders = (1, 2, 3, 5)
     each = build_structure(model, OMEGA, AMPLITUDE, orders)
@@ -181,7 +196,7 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
     assert build_structure(bare, OMEGA, AMPLITUDE, orders).apply(displacement_h).shape == expected.shape
 
 
-def only_pairs(linear: LinearModel, n_contact: int) -> LinearModel:
+def only_pairs(linear, n_contact):
     """A structure without displacements other than those of the pairs."""
     n = 3 * n_contact
     square = {name: getattr(linear, name)[:n, :n] for name in ("mass", "damping", "stiffness")}

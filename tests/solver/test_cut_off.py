@@ -1,7 +1,5 @@
 """A contact that reaches an edge of its pairs where the bodies go on is told by the outcome, and no other one is."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -9,7 +7,6 @@ import numpy as np
 import pytest
 
 from solver import march_wear
-from solver.model import ContactInterface, ReducedModel
 from solver.outcome import COMPLETE, Outcome
 from solver.results.cut_off import describe_cut_off, first_cut_off
 from solver.settings import SolverSettings
@@ -22,11 +19,11 @@ A_POINT = point_radius(100.0, 10e-3, composite_modulus(200e9, 0.3))
 SETTINGS = SolverSettings(harmonics=3, samples=32)
 
 
-def edge_of(model: ReducedModel, edge: list[bool] | None) -> ContactInterface:
+def edge_of(model, edge):
     return replace(model.contact, edge=None if edge is None else np.array(edge))
 
 
-def test_load_or_wear_at_the_edge_is_found_at_its_first_count() -> None:
+def test_load_or_wear_at_the_edge_is_found_at_its_first_count():
     contact = edge_of(build_scene("cylinder_on_flat", strips=6), [False, False, True])
     cycles, none = np.array([0.0, 10.0, 20.0, 30.0]), np.zeros((4, 3))
     middle = none + [2.0, 1.0, 0.0]
@@ -48,7 +45,7 @@ def test_load_or_wear_at_the_edge_is_found_at_its_first_count() -> None:
     assert math.isnan(first_cut_off(contact, cycles, gone, middle))
 
 
-def test_it_is_said_from_which_count_on() -> None:
+def test_it_is_said_from_which_count_on():
     assert describe_cut_off(2000.0).endswith("at cycle 2000 already")
     assert describe_cut_off(0.0).endswith("at cycle 0")
     assert describe_cut_off(math.inf).endswith("in the final state")
@@ -62,7 +59,7 @@ def test_it_is_said_from_which_count_on() -> None:
         ("sphere_on_flat", {"patches": 4, "half_width": 0.9 * A_POINT}),
     ],
 )
-def test_pairs_that_do_not_hold_the_unworn_contact_cut_it_off_at_once(name: str, values: dict[str, float]) -> None:
+def test_pairs_that_do_not_hold_the_unworn_contact_cut_it_off_at_once(name, values):
     found = march_wear(build_scene(name, **values), 20.0, 1.0, 0.6, 1e-13, [0.0], sweep="ramp", settings=SETTINGS)
     assert found.outcome is Outcome.CONTACT_CUT_OFF
     assert found.cut_off_cycle == 0.0
@@ -74,13 +71,9 @@ def test_pairs_that_do_not_hold_the_unworn_contact_cut_it_off_at_once(name: str,
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "narrow", "wide"),
-    [
-        ("cylinder_on_flat", {"strips": 12, "half_width": 1.5 * A_LINE}, {"strips": 20, "half_width": 2.5 * A_LINE}),
-    ],
+    [("cylinder_on_flat", {"strips": 12, "half_width": 1.5 * A_LINE}, {"strips": 20, "half_width": 2.5 * A_LINE})],
 )
-def test_a_scar_that_grows_out_of_its_pairs_is_no_result(
-    name: str, narrow: dict[str, float], wide: dict[str, float]
-) -> None:
+def test_a_scar_that_grows_out_of_its_pairs_is_no_result(name, narrow, wide):
     # the same pairs, with and without some farther out
     found = [
         march_wear(
@@ -107,7 +100,7 @@ def test_a_scar_that_grows_out_of_its_pairs_is_no_result(
     assert np.isfinite(cut.worn_volume).all()
 
 
-def test_a_final_state_without_slow_time_is_cut_off_as_well() -> None:
+def test_a_final_state_without_slow_time_is_cut_off_as_well():
     # partial slip would wear up to 1.17 of the unworn contact
     model = build_scene("cylinder_on_flat", strips=40, half_width=1.08 * A_LINE)
     found = march_wear(model, 20.0, 1.0, 0.6, 1e-13, math.inf, scheme="final", sweep="ramp", settings=SETTINGS)

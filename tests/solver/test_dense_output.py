@@ -1,10 +1,6 @@
 """What is kept of the steps of a wear history, and what is read between their ends."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +17,7 @@ LOOP = np.ones((1, 128, 3))
 RESOLUTIONS = (Resolution((1, 2, 3), 64), Resolution((1, 2, 3, 4, 5), 128))
 
 
-def report(depth: Sequence[float], value: float, resolution: Resolution = RESOLUTIONS[0], **more: Any) -> StateReport:
+def report(depth, value, resolution=RESOLUTIONS[0], **more):
     """All numbers of a state but its depths are `value`."""
     pairs = np.full(2, value)
     return StateReport(
@@ -41,7 +37,7 @@ def report(depth: Sequence[float], value: float, resolution: Resolution = RESOLU
     )
 
 
-def taken(counts: Any, smooth: bool = False, n_steps: int = 3, **more: Any) -> DenseOutput:
+def taken(counts, smooth=False, n_steps=3, **more):
     """Steps of 10 cycles; the first pair wears as t^2, the second one nothing."""
     output = DenseOutput(AREA, None if counts is None else np.array(counts, float), smooth=smooth, **more)
     for n in range(n_steps + 1):
@@ -50,7 +46,7 @@ def taken(counts: Any, smooth: bool = False, n_steps: int = 3, **more: Any) -> D
     return output
 
 
-def test_between_the_ends_of_a_given_step_all_is_linear() -> None:
+def test_between_the_ends_of_a_given_step_all_is_linear():
     found = taken([0.0, 4.0, 10.0, 25.0]).read(np.array([0.0, 4.0, 10.0, 25.0]))
     assert found["wear_depth"][:, 0] == pytest.approx([0.0, 40.0, 100.0, 650.0])
     assert found["wear_rate"] == pytest.approx([0.0, 8.0, 20.0, 50.0])
@@ -60,7 +56,7 @@ def test_between_the_ends_of_a_given_step_all_is_linear() -> None:
             assert values == pytest.approx(np.repeat([[0.0], [0.4], [1.0], [2.5]], values.shape[1], axis=1)), name
 
 
-def test_what_holds_at_both_ends_of_a_step_holds_between() -> None:
+def test_what_holds_at_both_ends_of_a_step_holds_between():
     found = taken([0.0, 4.0, 10.0, 25.0]).read(np.array([0.0, 4.0, 10.0, 25.0]))
     for name in CERTIFIED:
         assert found[name].tolist() == [0.0, 1.0, 1.0, 3.0], name
@@ -72,7 +68,7 @@ def test_what_holds_at_both_ends_of_a_step_holds_between() -> None:
     assert found["local"].tolist() == [0.5, 1.0, 1.0, 2.0]
 
 
-def test_within_an_adaptive_step_the_depth_is_a_cubic_and_all_else_linear_in_the_volume() -> None:
+def test_within_an_adaptive_step_the_depth_is_a_cubic_and_all_else_linear_in_the_volume():
     found = taken([5.0, 14.0], smooth=True).read(np.array([5.0, 14.0]))
     # t^2 is a cubic
     assert found["wear_depth"] == pytest.approx(np.array([[25.0, 0.0], [196.0, 0.0]]))
@@ -81,7 +77,7 @@ def test_within_an_adaptive_step_the_depth_is_a_cubic_and_all_else_linear_in_the
     assert found["wear_rate"] == pytest.approx(20.0 * shares)
 
 
-def test_a_cubic_never_falls_however_steep_its_ends_are() -> None:
+def test_a_cubic_never_falls_however_steep_its_ends_are():
     output = DenseOutput(AREA, np.array([10.0]), smooth=True)
     output.add(0.0, report([0.0, 0.0], 0.0), np.array([100.0, 0.0]), 0.0)
     output.add(10.0, report([1.0, 1.0], 1.0), np.array([0.0, 100.0]), 0.0)
@@ -90,7 +86,7 @@ def test_a_cubic_never_falls_however_steep_its_ends_are() -> None:
     assert depth[-1].tolist() == [1.0, 1.0]
 
 
-def test_steps_that_nothing_is_read_of_are_not_kept() -> None:
+def test_steps_that_nothing_is_read_of_are_not_kept():
     counts = [0.0, 31.0, 40.0, 72.0]
     output, whole = taken(counts, n_steps=9), taken(None, n_steps=9)
     # the ends of the steps with a count, and the last one, which the next step begins at
@@ -104,7 +100,7 @@ def test_steps_that_nothing_is_read_of_are_not_kept() -> None:
 
 @pytest.mark.parametrize("smooth", [False, True])
 @pytest.mark.parametrize(("quantity", "wanted"), [("wear_depth", 500.0), ("worn_volume", 500.0)])
-def test_a_target_is_found_within_the_step_that_reaches_it(quantity: str, wanted: float, smooth: bool) -> None:
+def test_a_target_is_found_within_the_step_that_reaches_it(quantity, wanted, smooth):
     output = taken(None, smooth, target=WearTarget(quantity, wanted))
     assert output.reached_target
     exact = np.sqrt(500.0) if smooth else 20.0 + 10.0 * (500.0 - 400.0) / 500.0
@@ -114,7 +110,7 @@ def test_a_target_is_found_within_the_step_that_reaches_it(quantity: str, wanted
     assert not taken(None, smooth, target=WearTarget(quantity, 1e4)).reached_target
 
 
-def test_a_shift_of_the_resonance_is_found_as_a_function_of_the_worn_volume() -> None:
+def test_a_shift_of_the_resonance_is_found_as_a_function_of_the_worn_volume():
     output = DenseOutput(AREA, None, smooth=False, target=WearTarget("frequency_shift", 0.02))
     for n, resonance in enumerate((100.0, 101.0, 97.0)):
         output.add(10.0 * n, report([n, n], 0.0, resonance=resonance), np.ones(2), 0.0)
@@ -122,7 +118,7 @@ def test_a_shift_of_the_resonance_is_found_as_a_function_of_the_worn_volume() ->
     assert output.taken.reached == pytest.approx(15.0)
 
 
-def test_even_counts_are_as_far_from_each_other_in_volume_and_cycles_together() -> None:
+def test_even_counts_are_as_far_from_each_other_in_volume_and_cycles_together():
     for smooth in (False, True):
         output = taken(None, smooth)
         counts = output.even_counts(7)
@@ -135,7 +131,7 @@ def test_even_counts_are_as_far_from_each_other_in_volume_and_cycles_together() 
     assert taken(None, n_steps=0).even_counts(3).tolist() == [0.0, 0.0, 0.0]
 
 
-def test_of_many_steps_those_that_go_far_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_many_steps_those_that_go_far_are_kept(monkeypatch):
     monkeypatch.setattr(output_module, "WEAR", replace(WEAR, kept_steps=20))
     output = taken(None, n_steps=200)
     monkeypatch.setattr(output_module, "WEAR", WEAR)

@@ -1,8 +1,5 @@
 """The limit of the explicit step against a closed form, and oscillation beyond it."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 
@@ -13,8 +10,7 @@ from hypothesis import strategies as st
 
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.packing import pack, unpack
-from solver.results.history import WearHistory
-from solver.settings import Scheme, SolverSettings
+from solver.settings import SolverSettings
 from solver.wear.rates import WearRates
 from tests.solver.models import branch_states, march_wear
 
@@ -25,7 +21,7 @@ AREA = 1e-4
 SLIDE = 1e-4  # m, amplitude of the sliding
 
 
-def seesaw() -> ReducedModel:
+def seesaw():
     """A block pressed with 100 N on two springs with a pair at the end of each: what one pair loses the other takes.
 
     The pairs slide with an amplitude of `SLIDE` whatever presses them: the friction is next to nothing. Displacements:
@@ -52,20 +48,20 @@ def seesaw() -> ReducedModel:
     return ReducedModel({0: linear}, contact, ("slide",))
 
 
-def exact_limit() -> float:
+def exact_limit():
     """N_1 - N_2 falls by k (W_1 - W_2), and each depth grows by k_w / alpha N 4 X a cycle: 2 over k_w / alpha 4 X k."""
     return 2.0 / (WEAR / AREA * 4.0 * SLIDE * STIFFNESS)
 
 
 @lru_cache
-def history(share: float, scheme: Scheme) -> WearHistory:
+def history(share, scheme):
     model = seesaw()
     (start,) = branch_states(model, 1e-4, 1.0, [100.0], SETTINGS)
     step = share * exact_limit()
     return march_wear(model, 1e-4, start, WEAR, step, scheme, np.linspace(0.0, 20 * step, 21), SETTINGS)
 
 
-def test_the_limit_of_the_explicit_step_is_that_of_the_closed_form() -> None:
+def test_the_limit_of_the_explicit_step_is_that_of_the_closed_form():
     assert history(0.5, "explicit").step_limit == pytest.approx(exact_limit(), rel=0.01, abs=0.0)
     # a property of the state and not of the scheme
     assert history(0.5, "implicit").step_limit == history(0.5, "explicit").step_limit
@@ -75,7 +71,7 @@ def test_the_limit_of_the_explicit_step_is_that_of_the_closed_form() -> None:
     ("share", "scheme", "oscillates"),
     [(0.4, "explicit", False), (1.3, "explicit", True), (1.3, "implicit", False), (10.0, "implicit", False)],
 )
-def test_beyond_the_limit_the_explicit_scheme_oscillates(share: float, scheme: Scheme, oscillates: bool) -> None:
+def test_beyond_the_limit_the_explicit_scheme_oscillates(share, scheme, oscillates):
     found = history(share, scheme)
     assert found.oscillates is oscillates
     assert (np.diff(found.wear_depth, axis=0) >= 0.0).all()
@@ -95,7 +91,7 @@ def test_beyond_the_limit_the_explicit_scheme_oscillates(share: float, scheme: S
         ([], False),
     ],
 )
-def test_oscillation_is_alternation_that_does_not_calm(rates: list[float], oscillates: bool) -> None:
+def test_oscillation_is_alternation_that_does_not_calm(rates, oscillates):
     followed = WearRates.none(2)
     for rate in rates:
         followed = followed.after(np.array([1.0, rate]))
@@ -105,7 +101,7 @@ def test_oscillation_is_alternation_that_does_not_calm(rates: list[float], oscil
 
 @settings(max_examples=200)
 @given(st.lists(st.sampled_from([0.0, 1.0, 1.0005, 1.5, 1.99, 2.0, 3.0, 1e4]), max_size=14), st.integers(0, 14))
-def test_oscillation_is_that_of_all_rates_together_also_when_kept(rates: list[float], cut: int) -> None:
+def test_oscillation_is_that_of_all_rates_together_also_when_kept(rates, cut):
     followed = WearRates.none(1)
     for place, rate in enumerate(rates):
         if place == cut:
@@ -115,7 +111,7 @@ def test_oscillation_is_that_of_all_rates_together_also_when_kept(rates: list[fl
     assert followed.largest[0] == max(rates, default=0.0)
 
 
-def oscillation_of_all(rates: Sequence[float]) -> bool:
+def oscillation_of_all(rates):
     """The plain definition, from all rates of a march."""
     size = max(np.abs(rates), default=0.0)
     run = 0

@@ -4,8 +4,6 @@ Never NaN with a converged outcome, never a number with another one, no wear tha
 leaves no doubt that a state exists, convergence is demanded.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass, replace
 
@@ -55,20 +53,11 @@ class Ended:
     history: WearHistory
 
 
-def elastic(n_pairs: int = 3) -> Case:
+def elastic(n_pairs=3):
     return Case(random_model(1, ("3d",) * n_pairs), OMEGA)
 
 
-def block(
-    stiffness: tuple[float, ...] = (1e7, 2e7),
-    *,
-    ground: float = 1e5,
-    damping: float = 0.02,
-    preload: float = 100.0,
-    area: tuple[float, ...] | None = None,
-    gap: float = 0.0,
-    lift: float = 0.0,
-) -> Case:
+def block(stiffness=(1e7, 2e7), *, ground=1e5, damping=0.02, preload=100.0, area=None, gap=0.0, lift=0.0):
     """A rigid block of 1 kg on elastic pairs without mass, pressed on, pushed along both tangents.
 
     stiffness: N/m, of each pair, half as much along the tangents. ground: N/m, all that holds the block but friction.
@@ -103,13 +92,13 @@ def block(
     return Case(ReducedModel({0: linear}, contact, ("along", "across")), BLOCK)
 
 
-def slider(stiffness: float = 1e5, damping: float = 0.0, force: float = 10.0, omega: float = 2 * np.pi * 160.0) -> Case:
+def slider(stiffness=1e5, damping=0.0, force=10.0, omega=2 * np.pi * 160.0):
     """The textbook slider; its normal force is 10 N less `stiffness` times the wear depth."""
     model = scene("sdof_slider", SETTINGS.harmonics, normal_stiffness=stiffness, damping=damping)
     return Case(model, omega, 0.5, force, 1.1e-11, 8e4, 8e3)
 
 
-def run(case: Case) -> Ended:
+def run(case):
     """Both phases of a point, judged."""
     started = time.process_time()
     frequencies = np.array([case.omega / (2.0 * np.pi)])
@@ -122,7 +111,7 @@ def run(case: Case) -> Ended:
     return Ended(start, history)
 
 
-def judge_start(case: Case, start: StartState) -> None:
+def judge_start(case, start):
     assert (start.state is None) == (start.outcome is not Outcome.CONVERGED)
     if start.state is None:
         return
@@ -133,7 +122,7 @@ def judge_start(case: Case, start: StartState) -> None:
     assert certificate.holds(case.settings.tolerance), certificate.sentence(case.settings.tolerance)
 
 
-def judge_history(case: Case, start: StartState, history: WearHistory) -> None:
+def judge_history(case, start, history):
     numbers = ("wear_depth", "wear_rate", "worn_volume", "mean_pressure", "slip_range", "open_fraction")
     numbers += ("response", "response_peak")
     if not history.outcome.complete:
@@ -154,7 +143,7 @@ def judge_history(case: Case, start: StartState, history: WearHistory) -> None:
     assert (history.open_fraction <= 1.0).all()
 
 
-def run_converged(case: Case) -> WearHistory:
+def run_converged(case):
     """A case whose states exist."""
     ended = run(case)
     assert ended.start.outcome is Outcome.CONVERGED, ended.start.outcome.sentence
@@ -167,7 +156,7 @@ def run_converged(case: Case) -> WearHistory:
     ("friction", "scheme"), [(0.0, "implicit"), (0.05, "explicit"), (2.0, "implicit"), (2.0, "explicit")]
 )
 @pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
-def test_friction(base: Case, friction: float, scheme: Scheme) -> None:
+def test_friction(base, friction, scheme):
     case = replace(base, friction=friction, scheme=scheme)
     if scheme == "implicit":
         run_converged(case)
@@ -178,12 +167,9 @@ def test_friction(base: Case, friction: float, scheme: Scheme) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("factor", "scheme"),
-    [(1e-3, "implicit"), (1e2, "explicit"), (1e4, "implicit")],
-)
+@pytest.mark.parametrize(("factor", "scheme"), [(1e-3, "implicit"), (1e2, "explicit"), (1e4, "implicit")])
 @pytest.mark.parametrize("base", [elastic(), block(), slider()], ids=["elastic", "block", "slider"])
-def test_wear_coefficient(base: Case, factor: float, scheme: Scheme) -> None:
+def test_wear_coefficient(base, factor, scheme):
     ended = run(replace(base, wear=factor * base.wear, scheme=scheme))
     assert ended.start.outcome is Outcome.CONVERGED
     if scheme == "implicit" and factor <= 1.0:
@@ -195,7 +181,7 @@ def test_wear_coefficient(base: Case, factor: float, scheme: Scheme) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-4, 50.0])
 @pytest.mark.parametrize("base", [elastic(), block(), slider()], ids=["elastic", "block", "slider"])
-def test_amplitude(base: Case, factor: float) -> None:
+def test_amplitude(base, factor):
     history = run_converged(replace(base, amplitude=factor * base.amplitude))
     if factor == 1e-4:
         assert not history.wear_depth.any(), "so small a load is held by friction"
@@ -203,7 +189,7 @@ def test_amplitude(base: Case, factor: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 5.0])
-def test_a_block_that_bounces(factor: float) -> None:
+def test_a_block_that_bounces(factor):
     # lightly damped on stiff ground: a motion of the period of the excitation need not be stable, nor be found
     base = block(lift=0.2)
     ended = run(replace(base, amplitude=factor * base.amplitude))
@@ -212,7 +198,7 @@ def test_a_block_that_bounces(factor: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("amplitude", [5e-5, 25.0])
-def test_amplitude_up_to_the_blade_unseating(amplitude: float) -> None:
+def test_amplitude_up_to_the_blade_unseating(amplitude):
     settings = SolverSettings(3, 64)
     case = Case(dovetail(), 2 * np.pi * 212.5, 0.5, amplitude, 1.1e-11, 3e3, 1e3, settings=settings)
     ended = run(case)
@@ -222,7 +208,7 @@ def test_amplitude_up_to_the_blade_unseating(amplitude: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1e-8, 1e-4, 1e4, 1e8])
-def test_contact_stiffness_ratio(ratio: float) -> None:
+def test_contact_stiffness_ratio(ratio):
     history = run_converged(block((1e7, 1e7 * ratio)))
     # the stiffer of two pairs on one rigid block carries the load
     carried = history.mean_pressure[0] * 1e-4
@@ -231,7 +217,7 @@ def test_contact_stiffness_ratio(ratio: float) -> None:
 
 
 @pytest.mark.parametrize("friction_force", [9.0, 9.99])
-def test_friction_alone_bounds_an_undamped_resonance(friction_force: float) -> None:
+def test_friction_alone_bounds_an_undamped_resonance(friction_force):
     # more than pi/4 of the force: Den Hartog; the work of the force is then less than what friction takes
     case = replace(slider(0.0, 0.0, 10.0, 2 * np.pi * np.sqrt(1.6e6) / (2 * np.pi)), friction=friction_force / 10.0)
     history = run_converged(replace(case, settings=SolverSettings(11, 256)))
@@ -239,7 +225,7 @@ def test_friction_alone_bounds_an_undamped_resonance(friction_force: float) -> N
 
 
 @pytest.mark.parametrize("friction_force", [0.0, 3.0, 7.0])
-def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction_force: float) -> None:
+def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction_force):
     case = slider(0.0, 0.0, 10.0, float(np.sqrt(1.6e6)))
     ended = run(replace(case, friction=friction_force / 10.0))
     if ended.start.outcome is Outcome.CONVERGED:
@@ -249,7 +235,7 @@ def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction_force: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [0])
-def test_zero_damping_exactly_at_a_resonance_of_the_held_structure(number: int) -> None:
+def test_zero_damping_exactly_at_a_resonance_of_the_held_structure(number):
     case = elastic()
     linear = case.model.linear[0]
     inner = np.setdiff1d(np.arange(len(linear.mass)), case.model.contact.dofs)
@@ -260,7 +246,7 @@ def test_zero_damping_exactly_at_a_resonance_of_the_held_structure(number: int) 
 
 
 @pytest.mark.slow
-def test_zero_damping_off_resonance() -> None:
+def test_zero_damping_off_resonance():
     for case in (elastic(), block()):
         linear = case.model.linear[0]
         undamped = replace(case.model, linear={0: replace(linear, damping=np.zeros_like(linear.damping))})
@@ -268,7 +254,7 @@ def test_zero_damping_off_resonance() -> None:
 
 
 @pytest.mark.slow
-def test_forces_below_all_numbers() -> None:
+def test_forces_below_all_numbers():
     # no load but a vibrating one on pairs that just touch: predicted forces whose squares underflow
     case = block(preload=0.0, lift=0.2)
     for amplitude in (1e-160, 0.0):
@@ -276,7 +262,7 @@ def test_forces_below_all_numbers() -> None:
 
 
 @pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
-def test_gaps_never_reached(base: Case) -> None:
+def test_gaps_never_reached(base):
     contact = replace(base.model.contact, gap=np.full(base.model.contact.n_contact, 1.0))
     history = run_converged(replace(base, model=replace(base.model, contact=contact)))
     assert not history.wear_depth.any()
@@ -285,7 +271,7 @@ def test_gaps_never_reached(base: Case) -> None:
 
 
 @pytest.mark.slow
-def test_500_pairs() -> None:
+def test_500_pairs():
     # one tangent each and a constant load: the same with closing displacements takes fifty times as long
     settings = SolverSettings(1, 32)
     case = Case(random_model(3, ("constant_load_one_tangent",) * 500), OMEGA, amplitude=20.0, settings=settings)
@@ -293,14 +279,14 @@ def test_500_pairs() -> None:
     assert 0 < (history.wear_depth[-1] > 0.0).sum() < 500
 
 
-def test_a_pair_that_is_worn_through_at_once_asks_for_shorter_steps() -> None:
+def test_a_pair_that_is_worn_through_at_once_asks_for_shorter_steps():
     # 33 N on 1e-9 m2 wear 4 cm in 200 cycles: many times what takes the pair out of reach
     ended = run(block((1e7, 1e7, 1e7), area=(1e-9, 1e-6, 1e-3)))
     assert ended.history.outcome is Outcome.STEP_TOO_LONG
     assert ended.history.last_cycle == 0.0
 
 
-def run_converged_at_steps(case: Case) -> WearHistory:
+def run_converged_at_steps(case):
     """All steps are reported, not only the six counts of `run`."""
     start = run(case).start
     cycles = np.arange(round(case.cycles / case.step) + 1) * case.step
@@ -309,11 +295,11 @@ def run_converged_at_steps(case: Case) -> WearHistory:
     return history
 
 
-def test_a_single_step_beyond_the_limit_is_told_by_the_limit_alone() -> None:
+def test_a_single_step_beyond_the_limit_is_told_by_the_limit_alone():
     # the slider under a spring: one step too long takes all of the preload, nothing is left that could oscillate
     base = slider()
 
-    def rate(depth: float) -> float:
+    def rate(depth):
         normal = 10.0 - 1e5 * depth
         amplitude = slider_amplitude(0.1, 0.0, 1.6e5, 10.0, 0.5 * normal, base.omega)
         return 1.1e-11 / 1e-4 * 4.0 * normal * amplitude

@@ -1,7 +1,5 @@
 """The final state without slow time: where an active set has it, and where only the march does."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -10,22 +8,19 @@ import pytest
 
 from solver import march_wear
 from solver.accuracy.error_estimate import NOTHING
-from solver.contact.wear_law import ARCHARD, WearLaw
+from solver.contact.wear_law import ARCHARD
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
-from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
-from solver.results.history import StartState, WearHistory
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
-from solver.wear.final_state.active_set import NoActiveSetError, WornOff, wear_off
+from solver.wear.final_state.active_set import NoActiveSetError, wear_off
 from solver.wear.final_state.cooperation import failure, work_slopes
 from solver.wear.final_state.find import find_final_state
 from solver.wear.solutions import SlowTime
-from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
 from studies import build_scene
 from tests.solver.models import march_wear as march_from_start
@@ -47,7 +42,7 @@ SLOW = [pytest.param("sphere", marks=pytest.mark.slow)]
 
 
 @cache
-def unworn(case: str) -> tuple[ReducedModel, StartState]:
+def unworn(case):
     scene, parameters, friction, frequency, force, _ = CASES[case]
     model = build_scene(scene, **parameters)
     ((_, start),) = follow_branch(model, friction, force, np.array([frequency]), "ramp", COARSE)
@@ -55,28 +50,21 @@ def unworn(case: str) -> tuple[ReducedModel, StartState]:
 
 
 @cache
-def found(case: str) -> WearHistory:
+def found(case):
     return directly(*unworn(case), CASES[case][2], CASES[case][5])
 
 
-def directly(
-    model: ReducedModel,
-    start: StartState,
-    friction: float,
-    wear: float,
-    law: WearLaw = ARCHARD,
-    settings: SolverSettings = COARSE,
-) -> WearHistory:
+def directly(model, start, friction, wear, law=ARCHARD, settings=COARSE):
     return find_final_state(model, friction, settings, start, SlowTime(wear, "adaptive", END, law=law))
 
 
 @cache
-def marched(case: str) -> WearHistory:
+def marched(case):
     model, start = unworn(case)
     return march_from_start(model, CASES[case][2], start, CASES[case][5], 1.0, "adaptive", END, COARSE)
 
 
-def begun(case: str) -> tuple[WearingJoint, WearState]:
+def begun(case):
     """The joint and its unworn state."""
     model, start = unworn(case)
     assert start.state is not None
@@ -85,13 +73,13 @@ def begun(case: str) -> tuple[WearingJoint, WearState]:
     return work, work.begin(start.state, start.resolution, NOTHING, accurate=True)
 
 
-def worn_off(work: WearingJoint, state: WearState) -> WornOff:
+def worn_off(work, state):
     return wear_off(work, state, state.depth, np.zeros(state.depth.size, bool), 1e-4)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["cylinder", "slider", *SLOW])
-def test_it_is_the_limit_of_the_march_for_a_fifth_of_its_iterations(case: str) -> None:
+def test_it_is_the_limit_of_the_march_for_a_fifth_of_its_iterations(case):
     direct, march = found(case), marched(case)
     assert direct.final_method == "active_set"
     assert march.final_method == ""
@@ -114,14 +102,14 @@ def test_it_is_the_limit_of_the_march_for_a_fifth_of_its_iterations(case: str) -
 
 
 @pytest.mark.parametrize("case", ["cylinder", *SLOW])
-def test_it_is_the_limit_state_of_the_pairs_that_stick(case: str) -> None:
+def test_it_is_the_limit_state_of_the_pairs_that_stick(case):
     direct = found(case)
     limit = limit_depth(unworn(case)[0], direct.slip_range[-1] == 0.0)
     assert np.abs(direct.wear_depth[-1] - limit).max() < 1e-6 * limit.max()
 
 
 @pytest.mark.slow
-def test_the_error_of_a_wear_rate_that_is_round_off_counts_for_nothing() -> None:
+def test_the_error_of_a_wear_rate_that_is_round_off_counts_for_nothing():
     """Worn volume and outcome say the same, and no harmonics are added to find out what round-off wears."""
     model = build_scene("cylinder_on_flat", strips=60)
     ((_, start),) = follow_branch(model, 0.6, 1.0, np.array([20.0]), "ramp", SolverSettings())
@@ -136,7 +124,7 @@ def test_the_error_of_a_wear_rate_that_is_round_off_counts_for_nothing() -> None
 
 
 @pytest.mark.slow
-def test_beside_a_resonance_the_march_is_taken_and_both_are_told() -> None:
+def test_beside_a_resonance_the_march_is_taken_and_both_are_told():
     direct, march = found("beside resonance"), marched("beside resonance")
     assert direct.final_method == "march"
     assert np.array_equal(direct.wear_depth, march.wear_depth)
@@ -146,7 +134,7 @@ def test_beside_a_resonance_the_march_is_taken_and_both_are_told() -> None:
 
 
 @pytest.mark.slow
-def test_where_residual_shear_matters_the_march_is_taken() -> None:
+def test_where_residual_shear_matters_the_march_is_taken():
     # the same pairs wear off; the friction that is left in the others depends on how fast
     direct = found("some slip")
     assert direct.final_method == "march"
@@ -158,7 +146,7 @@ def test_where_residual_shear_matters_the_march_is_taken() -> None:
     assert 1e-3 < apart < 5e-2
 
 
-def test_where_no_wear_relieves_a_pair_there_is_no_active_set() -> None:
+def test_where_no_wear_relieves_a_pair_there_is_no_active_set():
     endless = found("constant load")
     assert endless.outcome is Outcome.NO_FINAL_STATE
     assert endless.final_method == "march"
@@ -168,7 +156,7 @@ def test_where_no_wear_relieves_a_pair_there_is_no_active_set() -> None:
 
 
 @pytest.mark.parametrize("case", ["cylinder", pytest.param("beside resonance", marks=pytest.mark.slow)])
-def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case: str) -> None:
+def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case):
     work, state = begun(case)
     joint, at = work.at(state), state.point.evaluation
     pairs = np.argsort(-at.slip_work)[:3]
@@ -186,7 +174,7 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case: str) -
         assert slopes[:, place] == pytest.approx(wanted, abs=1e-3 * np.abs(wanted).max())
 
 
-def test_the_tests_of_cooperation_refuse_other_final_states() -> None:
+def test_the_tests_of_cooperation_refuse_other_final_states():
     work, before = begun("cylinder")
     final = worn_off(work, before)
     assert failure(work, before, final, 1e-4) == ""
@@ -204,7 +192,7 @@ def test_the_tests_of_cooperation_refuse_other_final_states() -> None:
     assert "still wear" in failure(work, before, short, 1e-4)
 
 
-def test_the_front_door_takes_it_to_the_end_only() -> None:
+def test_the_front_door_takes_it_to_the_end_only():
     model = build_scene("sdof_slider")
     with pytest.raises(ValueError, match="goes with cycles = inf"):
         march_wear(model, 160.0, 10.0, 0.5, 1e-11, 1e5, scheme="final")

@@ -1,7 +1,5 @@
 """Static and periodic states under much friction: all are found, and their limit is the glued structure."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 
@@ -9,8 +7,6 @@ import numpy as np
 import pytest
 
 from solver.continuation.first_state import solve_first_state, solve_static_state
-from solver.harmonic_balance.converged import PathPoint
-from solver.model import FloatArray, ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
@@ -26,7 +22,7 @@ PRESS = 200.0  # N on each pair: with it the glued dovetail pulls nowhere
 
 
 @lru_cache
-def pressed_dovetail() -> ReducedModel:
+def pressed_dovetail():
     """The coarse dovetail with so much more load on its flanks that all pairs of the glued structure are pressed."""
     model = dovetail()
     linear = model.linear[0]
@@ -35,28 +31,28 @@ def pressed_dovetail() -> ReducedModel:
     return replace(model, linear={0: replace(linear, load_static=load)})
 
 
-def glued_force(model: ReducedModel) -> FloatArray:
+def glued_force(model):
     """Contact force (n_contact, 3), N, of the static load with all relative displacements held."""
     linear = model.linear[0]
     condensed = condense(np.real(linear.stiffness), model.contact.dofs.ravel(), linear.load_static)
     return np.real(condensed.force).reshape(-1, 3)
 
 
-def static_point(model: ReducedModel, friction: float) -> PathPoint:
+def static_point(model, friction):
     case = build_case(model, friction, OMEGA, SETTINGS)
     point = solve_static_state(case.joint(OMEGA, 0.0), np.zeros(model.contact.n_contact), 1e-9, Budget())
     assert point is not None, f"no static state at a friction coefficient of {friction}"
     return point
 
 
-def needed_friction(model: ReducedModel) -> float:
+def needed_friction(model):
     """Friction coefficient from which the glued structure slips nowhere."""
     force = glued_force(model)
     assert force[:, 0].min() > 0.0
     return float((np.hypot(force[:, 1], force[:, 2]) / force[:, 0]).max())
 
 
-def test_beyond_the_friction_that_holds_all_pairs_the_static_state_is_the_glued_one() -> None:
+def test_beyond_the_friction_that_holds_all_pairs_the_static_state_is_the_glued_one():
     model = pressed_dovetail()
     needed, force = needed_friction(model), glued_force(model)
     assert 1.5 < needed < 100.0, "the test means nothing"
@@ -67,7 +63,7 @@ def test_beyond_the_friction_that_holds_all_pairs_the_static_state_is_the_glued_
 
 
 @pytest.mark.slow
-def test_with_more_friction_the_vibration_comes_to_that_of_the_glued_structure() -> None:
+def test_with_more_friction_the_vibration_comes_to_that_of_the_glued_structure():
     model = pressed_dovetail()
     glued = None
     away = []
@@ -86,7 +82,7 @@ def test_with_more_friction_the_vibration_comes_to_that_of_the_glued_structure()
 
 
 @pytest.mark.parametrize("friction", [0.3, 0.5, 1.0, 2.0, 5.0, 30.0, 1000.0])
-def test_the_dovetail_has_a_static_state_under_any_friction(friction: float) -> None:
+def test_the_dovetail_has_a_static_state_under_any_friction(friction):
     model = dovetail()
     evaluation = static_point(model, friction).evaluation
     normal, tangential = evaluation.force_h[:, 0, 0], evaluation.force_h[:, 1:, 0]

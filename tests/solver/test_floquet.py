@@ -1,7 +1,5 @@
 """Floquet multipliers of states against those of exact motions, and what becomes of unstable states."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 
@@ -9,39 +7,33 @@ import numpy as np
 import pytest
 
 from solver.contact.coulomb import SEPARATED
-from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.dlft import Balance
 from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
-from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
-from solver.results.history import StartState
 from solver.settings import SolverSettings
 from solver.stability.floquet import find_instability, multipliers_of
 from solver.stability.monodromy import build_monodromy, switching_pairs
 from solver.structure.fourier import synthesis, to_complex
-from solver.structure.joint import Case, Joint, build_case
+from solver.structure.joint import build_case
 from tests.solver.models import cyclic_model, march_wear, random_balance, random_model
 from tests.solver.models import scene as bundled
-from tests.solver.random_orbits import Scene, drawn
+from tests.solver.random_orbits import drawn
 
 
 @pytest.fixture
-def presented(monkeypatch: pytest.MonkeyPatch) -> None:
+def presented(monkeypatch):
     """Unstable states are handed out, to be looked at here."""
     monkeypatch.setattr(frequency_sweep, "find_instability", lambda *_: None)
 
 
-def start_of(
-    model: ReducedModel, friction: float, excitation: float, frequency: float, settings: SolverSettings
-) -> StartState:
+def start_of(model, friction, excitation, frequency, settings):
     ((_, start),) = follow_branch(model, friction, excitation, np.array([frequency]), "up", settings)
     return start
 
 
-def state_at(
-    model: ReducedModel, friction: float, excitation: float, frequency: float, settings: SolverSettings | None = None
-) -> tuple[Case, Joint, Evaluation]:
+def state_at(model, friction, excitation, frequency, settings=None):
     """The state that a sweep up comes to."""
     settings = settings or SolverSettings()
     start = start_of(model, friction, excitation, frequency, settings)
@@ -53,7 +45,7 @@ def state_at(
 
 
 @lru_cache
-def state_of(kind: str, seed: int, damping: float = 1.0) -> tuple[Scene, Case, Joint, Evaluation]:
+def state_of(kind, seed, damping=1.0):
     """A drawn scene, its damping times a factor, and its state."""
     scene = drawn(kind, seed)
     scene = replace(scene, damping=damping * scene.damping)
@@ -61,7 +53,7 @@ def state_of(kind: str, seed: int, damping: float = 1.0) -> tuple[Scene, Case, J
     return scene, case, joint, at
 
 
-def exact_multipliers(scene: Scene, joint: Joint, at: Evaluation) -> ComplexArray:
+def exact_multipliers(scene, joint, at):
     """Of the exact periodic motion next to a state, by differences of its period map."""
     orders, masses = joint.basis.orders, np.diag(scene.mass) > 0.0
     motion = np.zeros((masses.size, 2 * len(orders) + 1))
@@ -82,11 +74,11 @@ def exact_multipliers(scene: Scene, joint: Joint, at: Evaluation) -> ComplexArra
     return np.linalg.eigvals(np.array(columns).T)
 
 
-def marched(joint: Joint, at: Evaluation, n_samples: int) -> ComplexArray:
+def marched(joint, at, n_samples):
     return multipliers_of(build_monodromy(joint, joint.model.linear[0], at, n_samples), every=True)
 
 
-def largest(multipliers: ComplexArray) -> float:
+def largest(multipliers):
     """Largest size of those that are none of a pair that sticks: such a pair neither gains nor loses."""
     sizes = np.abs(multipliers)
     return float(sizes[np.abs(multipliers - 1.0) > 1e-6].max(initial=0.0))
@@ -106,7 +98,7 @@ def largest(multipliers: ComplexArray) -> float:
         ("inclined", 8, 0.01),
     ],
 )
-def test_the_largest_multiplier_is_that_of_the_exact_motion(kind: str, seed: int, allowed: float) -> None:
+def test_the_largest_multiplier_is_that_of_the_exact_motion(kind, seed, allowed):
     scene, _, joint, at = state_of(kind, seed)
     assert largest(marched(joint, at, 512)) == pytest.approx(largest(exact_multipliers(scene, joint, at)), abs=allowed)
 
@@ -114,7 +106,7 @@ def test_the_largest_multiplier_is_that_of_the_exact_motion(kind: str, seed: int
 @pytest.mark.slow
 @pytest.mark.usefixtures("presented")
 @pytest.mark.parametrize(("kind", "damping"), [("slider", -3.0), ("two masses", -0.3), ("jenkins", -3.0)])
-def test_with_negative_damping_as_well(kind: str, damping: float) -> None:
+def test_with_negative_damping_as_well(kind, damping):
     """Friction holds some of these vibrations, and some not."""
     seen = 0
     for seed in (1, 4, 6):
@@ -133,7 +125,7 @@ def test_with_negative_damping_as_well(kind: str, damping: float) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("presented")
 @pytest.mark.parametrize("seed", [1, 17, 29])
-def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
+def test_a_multiplier_beyond_minus_one_doubles_the_period(seed):
     scene, case, joint, at = state_of("impact", seed)
     exact = exact_multipliers(scene, joint, at)
     beyond = bool(((np.abs(exact.imag) < 1e-9) & (exact.real < -1.0)).any())
@@ -142,13 +134,8 @@ def test_a_multiplier_beyond_minus_one_doubles_the_period(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("omega", "n_harmonics", "n_samples"),
-    [(1.0, 3, 128), (1.5, 9, 128)],
-)
-def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(
-    omega: float, n_harmonics: int, n_samples: int
-) -> None:
+@pytest.mark.parametrize(("omega", "n_harmonics", "n_samples"), [(1.0, 3, 128), (1.5, 9, 128)])
+def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(omega, n_harmonics, n_samples):
     """Its multipliers lie within the unit circle: the mass comes to this motion by itself, see `tests.event_driven`."""
     case, joint, at = state_at(
         bundled("vibro_impact"), 0.0, 0.02, omega / (2.0 * np.pi), SolverSettings(n_harmonics, n_samples)
@@ -158,17 +145,17 @@ def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(
     assert find_instability(case, joint, at, Budget()) is None
 
 
-def with_matrices(name: str, **matrices: FloatArray) -> ReducedModel:
+def with_matrices(name, **matrices):
     """A bundled scene with other matrices."""
     model = bundled(name)
     return replace(model, linear={0: replace(model.linear[0], **matrices)})
 
 
-def scaled_damping(factor: float) -> ReducedModel:
+def scaled_damping(factor):
     return with_matrices("vibro_impact", damping=factor * bundled("vibro_impact").linear[0].damping)
 
 
-def driven(damping: float) -> ReducedModel:
+def driven(damping):
     """The two masses, the first one with another damping."""
     changed = bundled("two_masses").linear[0].damping.copy()
     changed[0, 0] = damping
@@ -185,9 +172,7 @@ def driven(damping: float) -> ReducedModel:
     ],
     ids=["damping", "stiffness", "wall", "slider"],
 )
-def test_a_growing_vibration_is_no_result(
-    model: ReducedModel, friction: float, excitation: float, frequency: float
-) -> None:
+def test_a_growing_vibration_is_no_result(model, friction, excitation, frequency):
     start = start_of(model, friction, excitation, frequency, SolverSettings())
     assert start.outcome is Outcome.UNSTABLE
     assert start.state is None
@@ -198,7 +183,7 @@ def test_a_growing_vibration_is_no_result(
     assert np.isnan(history.response).all()
 
 
-def test_a_state_that_sticks_all_over_is_that_of_its_structure() -> None:
+def test_a_state_that_sticks_all_over_is_that_of_its_structure():
     start = start_of(driven(-0.5), 50.0, 20.0, 0.05, SolverSettings())
     assert start.outcome is Outcome.UNSTABLE
     # the first mass alone: x'' - 0.5 x' + 2 x = 0 for 20 s
@@ -206,7 +191,7 @@ def test_a_state_that_sticks_all_over_is_that_of_its_structure() -> None:
     assert "linear structure alone" in start.message
 
 
-def test_the_largest_multiplier_by_products_is_that_of_all() -> None:
+def test_the_largest_multiplier_by_products_is_that_of_all():
     balance, predicted = random_balance(random_model(4, ("3d",) * 6, 12), SolverSettings(3, 24), 4, wear=False)
     at = balance.evaluate(predicted)
     assert switching_pairs(at)[0].any()
@@ -215,7 +200,7 @@ def test_the_largest_multiplier_by_products_is_that_of_all() -> None:
     assert np.abs(some).max() == pytest.approx(np.abs(every).max(), rel=1e-3)
 
 
-def test_the_march_is_of_second_order_for_the_structure_alone() -> None:
+def test_the_march_is_of_second_order_for_the_structure_alone():
     """An open joint, against the exponential of its matrix."""
     model = random_model(3, ("3d",), 2)
     balance, predicted = random_balance(model, SolverSettings(1, 24), 3, wear=False)
@@ -238,7 +223,7 @@ def test_the_march_is_of_second_order_for_the_structure_alone() -> None:
     assert errors[2] < 0.3 * errors[1]
 
 
-def test_it_is_not_looked_for_in_a_travelling_wave() -> None:
+def test_it_is_not_looked_for_in_a_travelling_wave():
     balance, predicted = random_balance(cyclic_model(3, ("3d",), 7, 1), SolverSettings(3, 24), 3, wear=False)
     at = balance.evaluate(predicted)
     assert switching_pairs(at)[0].any()

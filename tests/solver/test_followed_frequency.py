@@ -1,7 +1,5 @@
 """Histories whose frequency follows the resonance: exact motions, brute force, interruption, loss of the resonance."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import lru_cache
@@ -10,12 +8,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from solver import march_wear
+from solver import build_model, march_wear
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.results.history import StartState, WearHistory
-from solver.settings import Followed, FollowedFrequency, Scheme, SolverSettings
+from solver.settings import FollowedFrequency, Scheme, SolverSettings
 from solver.wear.options import WEAR as WEAR_OPTIONS
 from tests.followed_states import at_maximum, followed_states, in_quadrature, responses_around
 from tests.references import slider_orbit
@@ -30,9 +27,7 @@ SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit", "adaptive")
 
 
 @lru_cache
-def worn(
-    word: Followed = "resonance", scheme: Scheme = "adaptive", wear: float = WEAR, rtol: float = 1e-2
-) -> WearHistory:
+def worn(word="resonance", scheme="adaptive", wear=WEAR, rtol=1e-2):
     """History of the slider; steps of the other schemes are an eighth of the cycles."""
     return march_wear(
         scene("sdof_slider", damping=DAMPING),
@@ -48,7 +43,7 @@ def worn(
     )
 
 
-def exact_response(frequency: float, depth: float) -> complex:
+def exact_response(frequency, depth):
     """First harmonic of the slider at a wear depth, from event to event."""
     friction = 0.5 * (10.0 - 1e5 * depth)
     return complex(slider_orbit(0.1, DAMPING, 1.6e5, 10.0, friction, 2.0 * np.pi * frequency).harmonic(0))
@@ -56,7 +51,7 @@ def exact_response(frequency: float, depth: float) -> complex:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_phase_resonance_is_that_of_the_exact_motion(scheme: Scheme) -> None:
+def test_phase_resonance_is_that_of_the_exact_motion(scheme):
     history = worn(scheme=scheme)
     assert history.outcome is Outcome.CONVERGED
     assert history.excitation_frequency[-1] - history.excitation_frequency[0] > 1.0
@@ -68,7 +63,7 @@ def test_phase_resonance_is_that_of_the_exact_motion(scheme: Scheme) -> None:
 
 
 @pytest.mark.slow
-def test_the_largest_amplitude_is_that_of_the_exact_motion() -> None:
+def test_the_largest_amplitude_is_that_of_the_exact_motion():
     history = worn("peak", rtol=1e-3)
     assert history.outcome is Outcome.CONVERGED
     # below phase resonance, which is above 199 Hz
@@ -86,7 +81,7 @@ def test_the_largest_amplitude_is_that_of_the_exact_motion() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("word", ["resonance", "peak"])
-def test_the_responses_around_a_worn_state_have_the_frequency_of_the_history(word: Followed) -> None:
+def test_the_responses_around_a_worn_state_have_the_frequency_of_the_history(word):
     """Brute force: from the state of the history the frequency moves away, its depth and friction history kept."""
     model = scene("sdof_slider", damping=DAMPING)
     history = followed_states(model, FollowedFrequency(word, *BETWEEN), 10.0, WEAR, CYCLES)
@@ -104,7 +99,7 @@ def test_the_responses_around_a_worn_state_have_the_frequency_of_the_history(wor
 
 
 @pytest.mark.slow
-def test_where_the_spring_no_longer_presses_the_resonance_is_the_natural_frequency() -> None:
+def test_where_the_spring_no_longer_presses_the_resonance_is_the_natural_frequency():
     """Wear relaxes the spring of the slider: friction comes to its end with the wear."""
     model, settings = scene("sdof_slider", damping=DAMPING), SolverSettings(harmonics=3, samples=64)
     history = march_wear(model, "resonance", 10.0, 0.5, WEAR, math.inf, between=BETWEEN, settings=settings, outputs=3)
@@ -115,14 +110,14 @@ def test_where_the_spring_no_longer_presses_the_resonance_is_the_natural_frequen
 
 
 @pytest.mark.slow
-def test_only_the_product_of_wear_coefficient_and_cycles_matters() -> None:
+def test_only_the_product_of_wear_coefficient_and_cycles_matters():
     fast = worn(wear=10.0 * WEAR)
     np.testing.assert_allclose(fast.excitation_frequency, worn().excitation_frequency, rtol=1e-9)
     np.testing.assert_allclose(fast.worn_volume, worn().worn_volume, rtol=1e-9)
 
 
 @lru_cache
-def slider_start(word: Followed) -> StartState:
+def slider_start(word):
     """Start state of the slider."""
     model, follow = scene("sdof_slider", damping=DAMPING), FollowedFrequency(word, *BETWEEN)
     ((_, start),) = follow_branch(model, 0.5, 10.0, follow, "up", SolverSettings())
@@ -131,12 +126,12 @@ def slider_start(word: Followed) -> StartState:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("word", ["resonance", "peak"])
-def test_an_interrupted_history_is_equal_to_the_last_bit(word: Followed, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_history_is_equal_to_the_last_bit(word, monkeypatch):
     monkeypatch.setattr("solver.wear.integrate.WEAR", replace(WEAR_OPTIONS, iterations_per_save=8))
     model, follow, settings = scene("sdof_slider", damping=DAMPING), FollowedFrequency(word, *BETWEEN), SolverSettings()
     kept: list[Packed] = []
 
-    def history(resume: Packed | None = None) -> WearHistory:
+    def history(resume=None):
         return march_from(
             model,
             0.5,
@@ -162,7 +157,7 @@ def test_an_interrupted_history_is_equal_to_the_last_bit(word: Followed, monkeyp
 
 
 @pytest.mark.slow
-def test_an_interrupted_search_finds_the_same_start_to_the_last_bit() -> None:
+def test_an_interrupted_search_finds_the_same_start_to_the_last_bit():
     model, follow = scene("sdof_slider", damping=DAMPING), FollowedFrequency("resonance", *BETWEEN)
     given: list[Packed | str] = []
     ((_, whole),) = follow_branch(model, 0.5, 10.0, follow, "up", SolverSettings(), given.append)
@@ -177,7 +172,7 @@ def test_an_interrupted_search_finds_the_same_start_to_the_last_bit() -> None:
 
 
 @pytest.mark.slow
-def test_both_sweeps_find_the_one_resonance_of_the_slider() -> None:
+def test_both_sweeps_find_the_one_resonance_of_the_slider():
     model = scene("sdof_slider", damping=DAMPING)
     # the range lies in three quarter octaves, of which each has a sweep of its own
     found = [
@@ -190,7 +185,7 @@ def test_both_sweeps_find_the_one_resonance_of_the_slider() -> None:
     assert one == pytest.approx(worn().excitation_frequency[0], rel=1e-7)
 
 
-def test_a_resonance_that_leaves_its_range_ends_the_history_with_a_sentence() -> None:
+def test_a_resonance_that_leaves_its_range_ends_the_history_with_a_sentence():
     history = march_wear(
         scene("sdof_slider", damping=DAMPING), "resonance", 10.0, 0.5, WEAR, CYCLES, between=(180.0, 200.3)
     )
@@ -204,7 +199,7 @@ def test_a_resonance_that_leaves_its_range_ends_the_history_with_a_sentence() ->
     np.testing.assert_allclose(kept, worn().excitation_frequency[known], atol=0.05)
 
 
-def test_a_range_without_resonance_is_an_outcome_with_a_sentence() -> None:
+def test_a_range_without_resonance_is_an_outcome_with_a_sentence():
     history = march_wear(
         scene("sdof_slider", damping=DAMPING), "resonance", 10.0, 0.5, WEAR, CYCLES, between=(100.0, 150.0)
     )
@@ -214,7 +209,7 @@ def test_a_range_without_resonance_is_an_outcome_with_a_sentence() -> None:
 
 
 @pytest.mark.slow
-def test_a_resonance_that_the_sweep_jumps_over_is_none_of_its_states() -> None:
+def test_a_resonance_that_the_sweep_jumps_over_is_none_of_its_states():
     """The mass that bounces stiffens: a sweep down jumps from the lower branch to the upper one below its resonance."""
     settings, between = SolverSettings(harmonics=1, samples=64), (1.07 / (2.0 * np.pi), 1.3 / (2.0 * np.pi))
     history = march_wear(
@@ -223,6 +218,33 @@ def test_a_resonance_that_the_sweep_jumps_over_is_none_of_its_states() -> None:
     assert history.outcome is Outcome.RESONANCE_LOST
     assert "the sweep down jumps over the resonance at 0.17" in history.message
     assert 'give sweep = "up"' in history.message
+
+
+@lru_cache
+def two_resonances(word, sweep, high):
+    """Unworn state of two masses on a weak spring, one of them on a slider."""
+    spring, tie = 0.1 * (2.0 * math.pi * 215.0) ** 2, 2e3
+    stiffness = [[1.6e5 + tie, -tie], [-tie, spring + tie]]
+    parts = np.diag([0.1, 0.1]), np.diag([4.0, 4.0]), stiffness, [[-1, 0, -1]], 1e-4
+    model = build_model(*parts, load_harmonic=[1.0, 1.0], normal_load=10.0, response=[[1.0, 1.0]])
+    settings = SolverSettings(harmonics=3, samples=64)
+    return march_wear(model, word, 20.0, 0.5, 0.0, 0.0, sweep=sweep, between=(180.0, high), settings=settings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("word", ["resonance", "peak"])
+def test_a_second_peak_in_the_range_is_told_and_the_first_one_followed(word):
+    up, down = (two_resonances(word, sweep, 230.0) for sweep in ("up", "down"))
+    first, second = (float(history.excitation_frequency[0]) for history in (up, down))
+    assert first < 204.0
+    assert second > 214.0
+    assert up.outcome is Outcome.CONVERGED
+    assert "in the beginning the response has another peak in the range, near 21" in up.message
+    assert f"the history follows the one at {first:.6g} Hz" in up.message
+    assert up.other_peaks[0] == pytest.approx(second, abs=0.2)
+    alone = two_resonances(word, "up", 210.0)
+    assert (alone.message, float(alone.excitation_frequency[0])) == ("", first)
+    assert np.isnan(alone.other_peaks).all()
 
 
 @pytest.mark.parametrize(
@@ -237,7 +259,7 @@ def test_a_resonance_that_the_sweep_jumps_over_is_none_of_its_states() -> None:
         ({"scheme": "final", "cycles": np.inf}, "scheme: the scheme"),
     ],
 )
-def test_wrong_input_is_named(asked: dict[str, object], said: str) -> None:
+def test_wrong_input_is_named(asked, said):
     given: dict[str, object] = {"frequency": "resonance", "cycles": 1.0, "between": BETWEEN}
     with pytest.raises(ValueError, match=said):
         march_wear(

@@ -1,23 +1,21 @@
 """A dovetail root that slides all over: free along its slot, and held there once unequal wear drives it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from solver.contact.coulomb import SLIP, STICK
-from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.dlft import Balance
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings
-from solver.structure.joint import Case, Joint, build_case
+from solver.structure.joint import build_case
 from solver.wear.free_slide import creeps, free_slide
 from solver.wear_history import march_wear
 from studies import build_scene
 
 
-def joint_and_state(retainer: float, status: int) -> tuple[Case, Joint, Evaluation]:
+def joint_and_state(retainer, status):
     model = build_scene("dovetail_sector", mesh=1, retention_stiffness=retainer)
     case = build_case(model, 0.3, 1332.0, SolverSettings(), Resolution((1,), 16))
     joint = case.joint(1332.0, 1.0)
@@ -56,7 +54,7 @@ def test_nothing_is_held_where_a_pair_sticks_or_a_retainer_holds():
 @pytest.mark.slow
 def test_a_root_that_begins_to_slide_all_over_wears_on():
     model = build_scene("dovetail_sector", mesh=1)
-    history = march_wear(model, 212.0, 1.0, 0.3, 1.1e-11, 20_000.0)
+    history = march_wear(model, 212.0, 1.0, 0.3, 1.1e-11, 20_000.0, settings=SolverSettings(rtol=5e-2))
     assert history.outcome in (Outcome.CONVERGED, Outcome.INACCURATE)
     # with a retainer of 1e6 N/m 8.7007, of 1e7 N/m 8.7015
     assert abs(1e9 * history.worn_volume[-1] - 8.701) < 1e-2 * 8.701

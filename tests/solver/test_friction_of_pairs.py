@@ -1,7 +1,5 @@
 """A friction coefficient for each pair: equal ones are one for all, different ones are those of joints of their own."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import numpy as np
@@ -20,10 +18,10 @@ SETTINGS = SolverSettings(5, 128)
 KINDS = ("3d", "one_tangent", "constant_load")
 
 
-def side_by_side(one: ReducedModel, other: ReducedModel) -> ReducedModel:
+def side_by_side(one, other):
     """Two structures that have nothing to do with each other as one."""
 
-    def blocks(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    def blocks(first, second):
         whole = np.zeros((len(first) + len(second), first.shape[1] + second.shape[1]), np.result_type(first, second))
         whole[: len(first), : first.shape[1]], whole[len(first) :, first.shape[1] :] = first, second
         return whole
@@ -46,18 +44,18 @@ def side_by_side(one: ReducedModel, other: ReducedModel) -> ReducedModel:
     return ReducedModel({0: linear}, contact, names)
 
 
-def with_own_friction(model: ReducedModel, friction: list[float]) -> ReducedModel:
+def with_own_friction(model, friction):
     return replace(model, contact=replace(model.contact, friction_coefficient=np.array(friction)))
 
 
-def assert_same_bits(one: object, other: object, but: tuple[str, ...] = ()) -> None:
+def assert_same_bits(one, other, but=()):
     for field in fields(one):
         values, others = getattr(one, field.name), getattr(other, field.name)
         if field.name not in but:
             np.testing.assert_array_equal(values, others, err_msg=field.name)
 
 
-def test_equal_coefficients_give_the_bits_of_one_for_all() -> None:
+def test_equal_coefficients_give_the_bits_of_one_for_all():
     model, bent = random_model(3, KINDS), random_model(3, KINDS)
     balance, predicted = random_balance(model, SETTINGS, 3, wear=True)
     case = build_case(bent, np.full(3, 0.4), OMEGA, SETTINGS)
@@ -70,7 +68,7 @@ def test_equal_coefficients_give_the_bits_of_one_for_all() -> None:
     assert certify(balance.joint, at) == certify(other.joint, beside)
 
 
-def test_elastic_pairs_with_their_own_coefficients_are_those_that_stand_alone() -> None:
+def test_elastic_pairs_with_their_own_coefficients_are_those_that_stand_alone():
     models = [random_model(seed, ("3d",)) for seed in (1, 2)]
     friction = np.array([0.2, 0.45])
     settings = SolverSettings(3, 64, 1e-10)
@@ -87,7 +85,7 @@ def test_elastic_pairs_with_their_own_coefficients_are_those_that_stand_alone() 
     assert both.slip_work.min() > 0.0
 
 
-def test_the_jacobian_of_different_coefficients_is_that_of_central_differences() -> None:
+def test_the_jacobian_of_different_coefficients_is_that_of_central_differences():
     balance, predicted = random_balance(random_model(4, KINDS), SETTINGS, 4, wear=True)
     joint = replace(balance.joint, friction_coefficient=np.array([0.0, 0.3, 0.7]))
     balance = Balance(joint, balance.history, balance.wear_depth, balance.wear_gain)
@@ -109,7 +107,7 @@ def test_the_jacobian_of_different_coefficients_is_that_of_central_differences()
         (None, np.full((3, 1), 0.5), r"shape \(3, 1\)"),
     ],
 )
-def test_coefficients_that_are_not_one_of_each_pair_are_refused(own: object, given: object, message: str) -> None:
+def test_coefficients_that_are_not_one_of_each_pair_are_refused(own, given, message):
     model = random_model(3, KINDS)
     model = model if own is None else with_own_friction(model, own)
     with pytest.raises(ValueError, match=message):
@@ -117,7 +115,7 @@ def test_coefficients_that_are_not_one_of_each_pair_are_refused(own: object, giv
 
 
 @pytest.mark.slow
-def test_the_public_functions_take_one_for_all_one_of_each_or_those_of_the_model() -> None:
+def test_the_public_functions_take_one_for_all_one_of_each_or_those_of_the_model():
     model, settings = random_model(3, ("constant_load_one_tangent",) * 2), SolverSettings(1, 32)
     frequency, load, own = OMEGA / (2.0 * np.pi), 120.0, with_own_friction(model, [0.2, 0.6])
     numbers = ((model, 0.4), (model, [0.4, 0.4]), (model, [0.2, 0.6]))

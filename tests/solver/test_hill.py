@@ -1,7 +1,5 @@
 """Stability of states on all three branches of a mass at a wall; signs of determinants against dense ones."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -10,7 +8,6 @@ import pytest
 from solver.continuation.arc_length import Arc, follow_arc
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
-from solver.model import FloatArray
 from solver.newton.cost import is_dense_cheapest
 from solver.newton.krylov import ritz_values
 from solver.newton.linear_solver import JacobianSolver
@@ -25,12 +22,12 @@ SETTINGS = SolverSettings(21, 256)
 CASE = build_case(scene("vibro_impact"), 0.0, 1.55, SETTINGS)
 
 
-def balance_at(omega: float, history: FloatArray) -> Balance:
+def balance_at(omega, history):
     return Balance.frozen(CASE.joint(omega, FORCE), history, np.zeros(1))
 
 
 @lru_cache
-def crossings() -> dict[float, list[PathPoint]]:
+def crossings():
     """States of the branch from 1.55 rad/s through both folds back to 1.55 rad/s, that lie at 1.3 and 1.55 rad/s."""
     state = converged_state(CASE.model, 0.0, FORCE, 1.55, SETTINGS)
     start = balance_at(1.55, state.start_history)
@@ -38,7 +35,7 @@ def crossings() -> dict[float, list[PathPoint]]:
     found: dict[float, list[PathPoint]] = {1.3: [], 1.55: []}
     for target, seen in found.items():
 
-        def collect(point: PathPoint, seen: list[PathPoint] = seen) -> bool:
+        def collect(point, seen=seen):
             seen.append(point)
             return len(seen) == 2
 
@@ -49,7 +46,7 @@ def crossings() -> dict[float, list[PathPoint]]:
 
 
 @pytest.mark.slow
-def test_the_branches_have_alternating_stability() -> None:
+def test_the_branches_have_alternating_stability():
     upper, middle, lower = crossings()[1.55]
     tangents = [balance_at(1.55, point.history).linearise(point.evaluation) for point in (upper, middle, lower)]
     assert [is_stable(tangent, JacobianSolver()) for tangent in tangents] == [True, False, True]
@@ -58,7 +55,7 @@ def test_the_branches_have_alternating_stability() -> None:
     assert not lower.evaluation.force_h.any()
 
 
-def test_a_joint_that_is_open_or_stuck_all_over_is_stable() -> None:
+def test_a_joint_that_is_open_or_stuck_all_over_is_stable():
     for seed, level in ((1, -1e6), (2, 1e6)):
         balance, predicted = random_balance(random_model(seed), SolverSettings(3, 24), seed, wear=False)
         predicted[balance.joint.component_index % 3 == 0, 0] = level
@@ -68,7 +65,7 @@ def test_a_joint_that_is_open_or_stuck_all_over_is_stable() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6])
-def test_the_sign_with_a_kept_factorisation_is_that_of_the_dense_matrix(seed: int) -> None:
+def test_the_sign_with_a_kept_factorisation_is_that_of_the_dense_matrix(seed):
     settings = SolverSettings(3, 24)
     # wear in the step so large that signs of both kinds come up
     balance, predicted = random_balance(random_model(seed, ("3d",) * 14, 4), settings, seed, wear=True)
@@ -82,21 +79,29 @@ def test_the_sign_with_a_kept_factorisation_is_that_of_the_dense_matrix(seed: in
         predicted = predicted + 0.05 * np.abs(predicted).mean() * random.normal(size=predicted.shape)
 
 
-def test_two_right_sides_are_solved_as_one_by_one() -> None:
+def test_two_right_sides_are_solved_as_one_by_one():
     for kinds in (("3d", "normal_only"), ("3d",) * 14):
         balance, predicted = random_balance(random_model(3, kinds), SolverSettings(3, 24), 4, wear=False)
         tangent = balance.linearise(balance.evaluate(predicted))
         first, second, noise = np.random.default_rng(5).normal(size=(3, *predicted.shape))
         solver = JacobianSolver()
+        row = noise / np.linalg.norm(noise)
+
+        def change_of(step, by_parameter, row=row):
+            return (0.3 - float(np.vdot(row, step))) / float(np.vdot(row, by_parameter))
+
         # a second side near the one before, equal to it, and far from it
         for other in (second, second + 1e-2 * noise, second + 1e-2 * noise, noise):
-            for right, step in zip((first, other), solver.solve_with_parameter(tangent, first, other), strict=True):
-                assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
+            step, change = solver.solve_with_parameter(tangent, first, other, change_of)
+            assert np.linalg.norm(tangent.apply(step) - first - change * other) < 4e-3 * np.linalg.norm(first)
+            assert np.vdot(row, step) == pytest.approx(0.3, rel=1e-9)
+            near = solver.solve_by_parameter(tangent, other, 1e-2)
+            assert np.linalg.norm(tangent.apply(near) - other) < 2e-2 * np.linalg.norm(other)
         for right, step in zip((first, second), solver.solve_all(tangent, (first, second)), strict=True):
             assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
 
 
-def test_ritz_values_of_a_whole_space_are_the_eigenvalues() -> None:
+def test_ritz_values_of_a_whole_space_are_the_eigenvalues():
     matrix = np.random.default_rng(1).normal(size=(12, 12))
     found = ritz_values(lambda x: matrix @ x, np.ones(12), 30)[0]
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(np.linalg.eigvals(matrix)), abs=1e-8)

@@ -1,7 +1,5 @@
 """Harmonics added by homotopy: its ends, and the states that it finds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,13 +7,11 @@ import pytest
 
 from solver.accuracy.resolved_state import ResolvedState
 from solver.continuation.homotopy import HarmonicHomotopy, add_harmonics, compliances
-from solver.harmonic_balance.converged import PathPoint
 from solver.loading_history.start_states import follow_branch
 from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import change_orders
-from solver.structure.joint import Case
 from tests.random_scenes import random_scene
 from tests.solver.models import OMEGA, random_model
 from tests.solver.test_refinement import FRICTION, SLIDER_OMEGA, SLIPPING, response, slider, solved_at, started
@@ -24,7 +20,7 @@ RICH = Resolution(all_orders(9), 256)
 THROWN_OFF = 53  # seed: a warm start with more harmonics fails
 
 
-def states() -> list[tuple[Case, float, float, PathPoint]]:
+def states():
     """A marched mass, and an elastic joint with pairs of every kind."""
     fixed = SolverSettings(5, 256)
     case, point = slider(fixed)
@@ -33,7 +29,7 @@ def states() -> list[tuple[Case, float, float, PathPoint]]:
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_the_homotopy_begins_at_the_state_and_ends_at_the_balance(which: int) -> None:
+def test_the_homotopy_begins_at_the_state_and_ends_at_the_balance(which):
     case, omega, amplitude, point = states()[which]
     joint = replace(case, resolution=RICH).joint(omega, amplitude)
     new = np.arange(5, 9)
@@ -48,7 +44,7 @@ def test_the_homotopy_begins_at_the_state_and_ends_at_the_balance(which: int) ->
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_the_homotopy_ends_at_the_state_that_a_warm_start_finds(which: int) -> None:
+def test_the_homotopy_ends_at_the_state_that_a_warm_start_finds(which):
     case, omega, amplitude, point = states()[which]
     case = replace(case, settings=SolverSettings())
     found = ResolvedState(case, case.joint(omega, amplitude), point).by_homotopy(RICH, Budget())
@@ -62,11 +58,11 @@ def test_the_homotopy_ends_at_the_state_that_a_warm_start_finds(which: int) -> N
 
 
 @pytest.mark.slow
-def test_a_scene_whose_warm_starts_fail_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scene_whose_warm_starts_fail_is_solved(monkeypatch):
     scene, attempts = random_scene(THROWN_OFF), []
     by_homotopy = ResolvedState.by_homotopy
 
-    def noted(level: ResolvedState, resolution: Resolution, budget: Budget) -> ResolvedState | None:
+    def noted(level, resolution, budget):
         found = by_homotopy(level, resolution, budget)
         attempts.append(found is not None)
         return found

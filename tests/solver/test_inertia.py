@@ -1,7 +1,5 @@
 """Masses on sliders against an exact and a plain twin, their limits, and their derivative against differences."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -13,14 +11,14 @@ from solver.contact.coulomb import SLIP, STICK
 from solver.contact.rigid_slider import step_line, step_mass, step_plane
 from solver.structure.fourier import build_basis, to_complex
 from tests.solver import mass_twin
-from tests.solver.kernel_cases import FRICTION, MassCase, mass_case, masses_tangent, run_masses
+from tests.solver.kernel_cases import FRICTION, mass_case, masses_tangent, run_masses
 
 FloatArray = np.ndarray
 GAIN, LOSS = 10.5, 9.5  # kg/s
 values = st.integers(-(10**6), 10**6).map(lambda count: 1e-3 * count)
 
 
-def one_step(force: float, velocity: float, limit: float) -> tuple[FloatArray, FloatArray]:
+def one_step(force, velocity, limit):
     """Friction, velocity after, mean velocity and mean speed of a step along a line, and its derivative."""
     tangent = np.full((3, 3), np.nan)
     return np.array(step_line(force, velocity, limit, GAIN, LOSS, tangent)), tangent
@@ -30,7 +28,7 @@ def one_step(force: float, velocity: float, limit: float) -> tuple[FloatArray, F
 
 
 @given(force=values, velocity=values, limit=values.map(abs))
-def test_a_step_along_a_line_obeys_newton_and_coulomb(force: float, velocity: float, limit: float) -> None:
+def test_a_step_along_a_line_obeys_newton_and_coulomb(force, velocity, limit):
     (friction, after, mean, speed), _ = one_step(force, velocity, limit)
     size = abs(force) + LOSS * abs(velocity) + limit
     assert abs(friction) <= limit + 1e-14 * size
@@ -49,7 +47,7 @@ def test_a_step_along_a_line_obeys_newton_and_coulomb(force: float, velocity: fl
 @given(
     force=st.floats(-20.0, 20.0), velocity=st.floats(-2.0, 2.0).filter(lambda v: abs(v) > 1e-2), limit=st.floats(0.1, 8)
 )
-def test_the_derivative_of_a_step_is_that_of_differences(force: float, velocity: float, limit: float) -> None:
+def test_the_derivative_of_a_step_is_that_of_differences(force, velocity, limit):
     at = np.array([force, velocity, limit])
     # away from the borders of the branches, and from a stop that takes no force at all
     forward = np.sign(velocity)
@@ -68,7 +66,7 @@ def test_the_derivative_of_a_step_is_that_of_differences(force: float, velocity:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("line", [0, 1])
-def test_a_pair_with_one_tangent_moves_along_it_alone(line: int) -> None:
+def test_a_pair_with_one_tangent_moves_along_it_alone(line):
     force, velocity = np.array([7.0, -11.0]), np.array([0.3, 0.4])
     out, tangent = np.full(7, np.nan), np.full((5, 5), np.nan)
     step_mass(force, velocity, 5.0, GAIN, LOSS, line, out, tangent)
@@ -86,11 +84,11 @@ def test_a_pair_with_one_tangent_moves_along_it_alone(line: int) -> None:
 @pytest.mark.slow
 @settings(max_examples=200)
 @given(seed=st.integers(0, 2**31), limit=st.floats(0.1, 20.0))
-def test_the_derivative_of_a_step_in_the_plane_is_that_of_differences(seed: int, limit: float) -> None:
+def test_the_derivative_of_a_step_in_the_plane_is_that_of_differences(seed, limit):
     random = np.random.default_rng(seed)
     at = np.concatenate([random.normal(size=2) * 8.0, random.normal(size=2), [limit]])
 
-    def run(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def run(x):
         out, tangent = np.empty(7), np.empty((5, 5))
         step_plane(x[:2].copy(), x[2:4].copy(), x[4], GAIN, LOSS, out, tangent)
         return out, tangent
@@ -113,7 +111,7 @@ def test_the_derivative_of_a_step_in_the_plane_is_that_of_differences(seed: int,
 # --------------------------------------------------------------------------------------------- the period and its twin
 
 
-def line_case(predicted_h: FloatArray, n_samples: int, mass: float = 1.3, line: int = 0) -> MassCase:
+def line_case(predicted_h, n_samples, mass=1.3, line=0):
     """One pair with one tangent; predicted_h (3, 7), N."""
     basis = build_basis((1, 2, 3), n_samples)
     template = mass_case(1, 0, basis)
@@ -125,7 +123,7 @@ def line_case(predicted_h: FloatArray, n_samples: int, mass: float = 1.3, line: 
     return replace(template, predicted_h=moved[None], mass=np.array([mass]), drag=drag, line=only)
 
 
-def force_on_a_line(seed: int) -> FloatArray:
+def force_on_a_line(seed):
     """Harmonics (3, 7), N, of a normal force that stays positive and of a force along the first tangent."""
     random = np.random.default_rng(seed)
     predicted_h = random.normal(size=(3, 7)) * 4.0
@@ -136,11 +134,11 @@ def force_on_a_line(seed: int) -> FloatArray:
     return predicted_h
 
 
-def series(row: FloatArray, omega: float) -> mass_twin.Series:
+def series(row, omega):
     return mass_twin.Series(np.concatenate([[row[0]], to_complex(row)]), omega)
 
 
-def marched(case: MassCase) -> tuple[FloatArray, float]:
+def marched(case):
     """Complex harmonics 0, 1, 2, 3 of the friction force of the one pair, and its slip work."""
     force_t, _, _, _, slip_work, _ = run_masses(case, case.predicted_h)
     line = int(case.line[0])
@@ -149,7 +147,7 @@ def marched(case: MassCase) -> tuple[FloatArray, float]:
 
 
 @pytest.mark.parametrize(("seed", "signs"), [(0, 3), (2, 2), (3, 3), (4, 3), (8, 3), (14, 3), (15, 3)])
-def test_a_line_is_that_of_the_exact_twin_to_second_order(seed: int, signs: int) -> None:
+def test_a_line_is_that_of_the_exact_twin_to_second_order(seed, signs):
     predicted_h = force_on_a_line(seed)
     case = line_case(predicted_h, 64)
     normal = series(predicted_h[0], case.omega)
@@ -172,7 +170,7 @@ def test_a_line_is_that_of_the_exact_twin_to_second_order(seed: int, signs: int)
         assert (np.array(errors) < 80.0 / samples**2).all()
 
 
-def plane_case(seed: int, n_samples: int) -> MassCase:
+def plane_case(seed, n_samples):
     basis = build_basis((1, 2, 3), n_samples)
     case = mass_case(1, seed, basis)
     random = np.random.default_rng(seed)
@@ -182,14 +180,14 @@ def plane_case(seed: int, n_samples: int) -> MassCase:
     return replace(case, predicted_h=predicted_h, line=np.array([-1]), has_normal=np.ones(1, bool))
 
 
-def plane_result(seed: int, n_samples: int) -> tuple[FloatArray, float]:
+def plane_result(seed, n_samples):
     case = plane_case(seed, n_samples)
     force_t, _, _, _, slip_work, _ = run_masses(case, case.predicted_h)
     return (force_t @ case.basis.analysis)[0, 1:] / case.step_share, float(slip_work[0])
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_the_plane_is_that_of_a_plain_twin_with_tiny_steps(seed: int) -> None:
+def test_the_plane_is_that_of_a_plain_twin_with_tiny_steps(seed):
     n_steps = 8192
     fine = plane_case(seed, n_steps)
     predicted = fine.predicted_h[0] @ fine.basis.synthesis
@@ -209,7 +207,7 @@ def test_the_plane_is_that_of_a_plain_twin_with_tiny_steps(seed: int) -> None:
 # -------------------------------------------------------------------------------------------------------------- limits
 
 
-def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero() -> None:
+def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero():
     case = mass_case(6, 5)
     held = case.predicted_h.copy()
     held[:, 0] = 0.0
@@ -224,12 +222,12 @@ def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero() -> None:
 # ---------------------------------------------------------------------------------------------------------- derivative
 
 
-def assert_derivative(case: MassCase, slack: float = 1e-6) -> int:
+def assert_derivative(case, slack=1e-6):
     """Compare with central differences of the whole periodic march; the number of pairs away from a switch."""
     n_contact, m = case.predicted_h.shape[0], case.basis.synthesis.shape[0]
     step = 1e-5
 
-    def run(predicted_h: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def run(predicted_h):
         force_t, velocity_t, _, _, slip_work, _ = run_masses(case, predicted_h)
         return (force_t @ case.basis.analysis / case.step_share)[:, 1:], slip_work, velocity_t[:, :, 0]
 
@@ -268,7 +266,7 @@ def assert_derivative(case: MassCase, slack: float = 1e-6) -> int:
 
 
 @pytest.mark.slow
-def test_the_derivative_goes_through_the_closure_of_the_period() -> None:
+def test_the_derivative_goes_through_the_closure_of_the_period():
     # masses that turn without ever stopping remember their start for many periods: of the derivative of the velocity at
     # the start nothing may be left out
     case = mass_case(9, 7, opens=False)

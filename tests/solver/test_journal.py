@@ -1,7 +1,5 @@
 """A search that is interrupted again and again on its way to one state ends with the same numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import fields, replace
 
@@ -10,7 +8,7 @@ import pytest
 
 from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import Sweep
-from solver.model import FloatArray, ReducedModel
+from solver.model import ReducedModel
 from solver.newton import journal as journal_module
 from solver.newton.journal import Journal
 from solver.newton.linear_solver import JacobianSolver
@@ -28,12 +26,12 @@ class KilledError(BaseException):
 
 
 @pytest.fixture
-def frequent_saves(monkeypatch: pytest.MonkeyPatch) -> None:
+def frequent_saves(monkeypatch):
     """Save points after a few results."""
     monkeypatch.setattr(journal_module, "RESULTS_PER_SAVE", 5)
 
 
-def assert_same(found: StartState, expected: StartState) -> None:
+def assert_same(found, expected):
     """Equal to the last bit, but for the time that it took."""
     one, other = (repr(replace(start, state=None, reference=None, run_time=0.0)) for start in (found, expected))
     assert one == other
@@ -43,16 +41,14 @@ def assert_same(found: StartState, expected: StartState) -> None:
             np.testing.assert_array_equal(getattr(state, entry.name), getattr(wanted, entry.name), entry.name)
 
 
-def in_short_runs(
-    model: ReducedModel, friction: float, amplitude: float, frequencies: FloatArray, way: Sweep
-) -> tuple[dict[int, StartState], int]:
+def in_short_runs(model, friction, amplitude, frequencies, way):
     """The start states from runs that all end at their second save point, and the number of runs."""
     found: dict[int, StartState] = {}
     saved: list[Packed] = []
     for n_runs in range(1, 1000):
         n_saves = 0
 
-        def keep(progress: Packed | str) -> None:
+        def keep(progress):
             nonlocal n_saves
             if isinstance(progress, str):
                 return
@@ -83,7 +79,7 @@ CASES: dict[str, Case] = {
 @pytest.mark.slow
 @pytest.mark.usefixtures("frequent_saves")
 @pytest.mark.parametrize("case", CASES)
-def test_runs_that_end_before_each_state_arrive_at_the_same_numbers(case: str) -> None:
+def test_runs_that_end_before_each_state_arrive_at_the_same_numbers(case):
     build, friction, amplitude, frequencies, way = CASES[case]
     model, at = build(), np.array(frequencies)
     whole = dict(follow_branch(model, friction, amplitude, at, way, AUTO))
@@ -97,7 +93,7 @@ def test_runs_that_end_before_each_state_arrive_at_the_same_numbers(case: str) -
 
 
 @pytest.mark.slow
-def test_the_iterations_of_a_frequency_are_its_own_whatever_is_known() -> None:
+def test_the_iterations_of_a_frequency_are_its_own_whatever_is_known():
     frequencies = np.array([205.0, 211.0, 212.0])
     together = dict(follow_branch(dovetail(13), 0.5, 0.5, frequencies, "up", AUTO))
     ((_, alone),) = follow_branch(dovetail(13), 0.5, 0.5, frequencies[2:], "up", AUTO)
@@ -105,15 +101,15 @@ def test_the_iterations_of_a_frequency_are_its_own_whatever_is_known() -> None:
     assert together[0].newton_iterations < together[1].newton_iterations
 
 
-def test_a_journal_gives_its_results_in_their_order_until_one_does_not_fit() -> None:
+def test_a_journal_gives_its_results_in_their_order_until_one_does_not_fit():
     solver, computed = JacobianSolver(), list(range(100, 110))
     journal = Journal()
     journal.begin(((1.0,), (2.0,), (), (True,), (5.0,)))
 
-    def is_number(known: object) -> bool:
+    def is_number(known):
         return isinstance(known, float)
 
-    def following() -> float:
+    def following():
         return float(computed.pop(0))
 
     assert [journal.once(solver, following, is_number) for _ in range(2)] == [1.0, 2.0]
@@ -123,13 +119,13 @@ def test_a_journal_gives_its_results_in_their_order_until_one_does_not_fit() -> 
     assert [journal.once(solver, following, is_number) for _ in range(2)] == [100.0, 101.0]
 
 
-def test_save_points_come_after_a_number_of_results_and_drop_the_factorisation() -> None:
+def test_save_points_come_after_a_number_of_results_and_drop_the_factorisation():
     saved: list[int] = []
     journal = Journal(lambda: saved.append(len(journal.saved)))
     dropped: list[int] = []
 
     class Solver:
-        def renew(self, epoch: int) -> None:
+        def renew(self, epoch):
             dropped.append(epoch)
 
     n = 2 * journal_module.RESULTS_PER_SAVE + 1

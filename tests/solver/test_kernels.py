@@ -1,7 +1,5 @@
 """Contact kernels against the law, a plain twin, differences, and themselves without compilation."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -17,17 +15,10 @@ from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, mean_
 from solver.contact.period_march import integrate_slip_work, march_period
 from solver.structure.fourier import build_basis
 from tests.solver import contact_twin
-from tests.solver.kernel_cases import (
-    BASIS,
-    FRICTION,
-    KernelCase,
-    friction_of,
-    kernel_case,
-    kernel_results,
-)
+from tests.solver.kernel_cases import BASIS, FRICTION, friction_of, kernel_case, kernel_results
 
 
-def marched(case: KernelCase) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def marched(case):
     """Predicted force, friction coefficients and start state, as `march_period` takes them."""
     return case.predicted_t, friction_of(case.start), case.start
 
@@ -37,14 +28,9 @@ friction_coefficients = st.one_of(st.just(0.0), st.floats(0.01, 2.0))
 
 
 @given(
-    normal=number,
-    tangents=st.tuples(number, number),
-    states=st.tuples(number, number),
-    friction=friction_coefficients,
+    normal=number, tangents=st.tuples(number, number), states=st.tuples(number, number), friction=friction_coefficients
 )
-def test_every_sample_obeys_signorini_and_coulomb(
-    normal: float, tangents: tuple[float, float], states: tuple[float, float], friction: float
-) -> None:
+def test_every_sample_obeys_signorini_and_coulomb(normal, tangents, states, friction):
     pressure, *rest, status = contact_sample(normal, *tangents, friction, *states)
     force, state = np.array(rest[:2]), np.array(rest[2:])
     moved = state - np.array(states)
@@ -66,7 +52,7 @@ def test_every_sample_obeys_signorini_and_coulomb(
 
 
 @pytest.mark.parametrize("most_periods", [1, 2, 5])
-def test_displacement_level_is_that_of_the_plain_twin(most_periods: int) -> None:
+def test_displacement_level_is_that_of_the_plain_twin(most_periods):
     case = kernel_case(4, 24, seed=1)
     force_t, state_t, status_t, periods, error = march_period(*marched(case), 0.0, most_periods)
     for pair in range(4):
@@ -79,7 +65,7 @@ def test_displacement_level_is_that_of_the_plain_twin(most_periods: int) -> None
     assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
 
 
-def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() -> None:
+def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient():
     # Constant pressure P, p_T = A cos: once periodic, the slider moves to and fro over 2 (A - mu P), so the integral of
     # P |dX| is 4 P (A - mu P); the samples contain both turns of p_T, so it holds to round-off.
     pressure, amplitude, n = 10.0, 12.0, 64
@@ -95,7 +81,7 @@ def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient() 
     assert work <= FRICTION * expected * (1 + 1e-12)
 
 
-def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples() -> None:
+def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples():
     # max(cos(t - 1) - 0.3, 0): closed for |t - 1| < a, cos a = 0.3
     a = np.arccos(0.3)
     exact = np.array([(np.sin(a) - 0.3 * a) / np.pi, (a - 0.3 * np.sin(a)) / np.pi])
@@ -112,7 +98,7 @@ def test_harmonics_of_a_force_that_opens_converge_with_the_square_of_the_samples
     )
 
 
-def slowly_closing(seed: int, n_contact: int = 6) -> KernelCase:
+def slowly_closing(seed, n_contact=6):
     """Pairs that slip along one direction and are pulled across it: what lies across closes by a little a period."""
     case = kernel_case(n_contact, BASIS.n_samples, seed=seed)
     predicted_h = case.predicted_h.copy()
@@ -124,7 +110,7 @@ def slowly_closing(seed: int, n_contact: int = 6) -> KernelCase:
 
 
 @pytest.mark.parametrize("seed", [31, 33])
-def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed: int) -> None:
+def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed):
     case = slowly_closing(seed)
     force_t, state_t, status_t, periods, error = march_period(*marched(case), 1e-9, 400)
     assert (error <= 1e-9).all()
@@ -147,7 +133,7 @@ def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed: int)
 
 
 @pytest.mark.slow
-def test_kernels_give_the_same_numbers_without_compilation(tmp_path: Path) -> None:
+def test_kernels_give_the_same_numbers_without_compilation(tmp_path):
     path = tmp_path / "plain.npz"
     root = Path(__file__).parents[2]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(root)}

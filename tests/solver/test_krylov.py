@@ -1,32 +1,29 @@
 """Krylov methods against dense solves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from solver.model import FloatArray
 from solver.newton.krylov import Recycled, solve_gmres
 from solver.newton.options import NEWTON
 
 
-def counted(matrix: FloatArray) -> tuple[list[int], object]:
+def counted(matrix):
     count = [0]
 
-    def product(vector: FloatArray) -> FloatArray:
+    def product(vector):
         count[0] += 1
         return matrix @ vector
 
     return count, product
 
 
-def well_conditioned(size: int, seed: int) -> FloatArray:
+def well_conditioned(size, seed):
     random = np.random.default_rng(seed)
     return np.eye(size) + 0.4 * random.normal(size=(size, size)) / np.sqrt(size)
 
 
 @pytest.mark.parametrize(("restart", "cycles"), [(60, 1), (6, 20)])
-def test_it_finds_the_solution_with_and_without_beginning_again(restart: int, cycles: int) -> None:
+def test_it_finds_the_solution_with_and_without_beginning_again(restart, cycles):
     matrix = well_conditioned(60, 1)
     right = np.random.default_rng(2).normal(size=60)
     exact = np.linalg.solve(matrix, right)
@@ -36,7 +33,7 @@ def test_it_finds_the_solution_with_and_without_beginning_again(restart: int, cy
     assert np.linalg.norm(found - exact) < 1e-8 * np.linalg.norm(exact)
 
 
-def test_a_singular_operator_gives_what_can_be_had_and_ends() -> None:
+def test_a_singular_operator_gives_what_can_be_had_and_ends():
     # J with a null vector on either side, and a right-hand side that it does not reach
     random = np.random.default_rng(6)
     left, null = (part / np.linalg.norm(part) for part in random.normal(size=(2, 100)))
@@ -56,7 +53,7 @@ def test_a_singular_operator_gives_what_can_be_had_and_ends() -> None:
     assert solve_gmres(lambda x: matrix @ x, reached, 1e-6, 60, 1)[1]
 
 
-def test_nothing_is_the_solution_of_nothing_and_what_is_not_finite_ends() -> None:
+def test_nothing_is_the_solution_of_nothing_and_what_is_not_finite_ends():
     zero = np.zeros(5)
     found, converged = solve_gmres(lambda x: x, zero, 1e-3, 5, 2)
     assert converged
@@ -64,7 +61,7 @@ def test_nothing_is_the_solution_of_nothing_and_what_is_not_finite_ends() -> Non
     assert not solve_gmres(lambda x: x * np.nan, np.ones(5), 1e-3, 5, 2)[1]
 
 
-def test_products_that_are_rounded_are_refined_by_exact_ones() -> None:
+def test_products_that_are_rounded_are_refined_by_exact_ones():
     random = np.random.default_rng(3)
     # a direction that moves far under a small force
     left, right = (np.linalg.qr(random.normal(size=(30, 30)))[0] for _ in range(2))
@@ -78,7 +75,7 @@ def test_products_that_are_rounded_are_refined_by_exact_ones() -> None:
     assert np.linalg.norm(matrix @ solution - wanted) < 1e-9 * np.linalg.norm(wanted)
 
 
-def test_what_a_solve_has_learned_serves_the_next_ones() -> None:
+def test_what_a_solve_has_learned_serves_the_next_ones():
     random = np.random.default_rng(8)
     matrix = well_conditioned(80, 9) + random.normal(size=(80, 4)) @ random.normal(size=(4, 80))
     recycled = Recycled()

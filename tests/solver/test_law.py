@@ -1,16 +1,14 @@
 """Elastic pairs and masses on sliders in one joint: each as it is alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
+from solver.contact.alternating_frequency_time import law_tangent, march_law
 from solver.contact.coulomb import SEPARATED, SLIP, STICK
 from solver.settings import Resolution, SolverSettings
-from solver.structure.joint import Joint, build_case
+from solver.structure.joint import build_case
 from tests.solver.models import OMEGA, PRELOAD, random_model, with_free_masses
 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "3d", "constant_load_one_tangent")
@@ -20,14 +18,14 @@ RESOLUTIONS = [Resolution((1, 2, 3), 32), Resolution((1, 3, 5), 64)]
 FloatArray = np.ndarray
 
 
-def mixed_joint(resolution: Resolution, free: list[int] = FREE, friction: float | FloatArray = FRICTION) -> Joint:
+def mixed_joint(resolution, free=FREE, friction=FRICTION):
     model = with_free_masses(random_model(1, KINDS), free)
     joint = build_case(model, friction, OMEGA, SolverSettings(), resolution).joint(OMEGA, 60.0)
     assert np.flatnonzero(joint.penalty.inertial).tolist() == free
     return joint
 
 
-def predicted(joint: Joint, seed: int = 2) -> tuple[FloatArray, FloatArray]:
+def predicted(joint, seed=2):
     """Predicted force (6, 3, m), N, at which pairs stick, slip and open, and a history, m."""
     random = np.random.default_rng(seed)
     values = random.normal(size=(6, 3, 2 * joint.basis.n_harmonics + 1)) * PRELOAD * 0.6
@@ -40,7 +38,7 @@ def predicted(joint: Joint, seed: int = 2) -> tuple[FloatArray, FloatArray]:
     return values, history
 
 
-def of_pairs(joint: Joint, pairs: list[int]) -> Joint:
+def of_pairs(joint, pairs):
     """The same joint with some of its pairs alone; its structure is not used."""
     penalty = replace(joint.penalty, **{name: value[pairs] for name, value in vars(joint.penalty).items()})
     contact = replace(joint.contact, dofs=joint.contact.dofs[pairs])
@@ -48,7 +46,7 @@ def of_pairs(joint: Joint, pairs: list[int]) -> Joint:
     return replace(joint, penalty=penalty, contact=contact, **own)
 
 
-def assert_same(found: Marched, expected: Marched, pairs: list[int]) -> None:
+def assert_same(found, expected, pairs):
     for name in ("status_t", "periods"):
         assert np.array_equal(getattr(found, name)[pairs], getattr(expected, name)), name
     # a product of matrices of another height may differ in its last digit
@@ -60,7 +58,7 @@ def assert_same(found: Marched, expected: Marched, pairs: list[int]) -> None:
 
 @pytest.mark.parametrize("friction", [FRICTION, np.linspace(0.3, 0.55, 6)], ids=["one", "of each pair"])
 @pytest.mark.parametrize("resolution", RESOLUTIONS)
-def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution: Resolution, friction: float | FloatArray) -> None:
+def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution, friction):
     joint = mixed_joint(resolution, friction=friction)
     values, history = predicted(joint)
     together = march_law(joint, values, history)
@@ -81,7 +79,7 @@ def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution: Resolution, fr
 
 
 @pytest.mark.parametrize("resolution", RESOLUTIONS)
-def test_the_motion_of_a_joint_is_that_of_the_march(resolution: Resolution) -> None:
+def test_the_motion_of_a_joint_is_that_of_the_march(resolution):
     # the harmonics of u = motion(p - lambda) against those of the places that the mass was marched through
     joint = mixed_joint(resolution)
     values, history = predicted(joint)

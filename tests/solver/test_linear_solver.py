@@ -1,12 +1,8 @@
 """Newton directions against a dense solve of the whole Jacobian."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from solver.harmonic_balance.dlft import Balance
-from solver.model import FloatArray
 from solver.newton.cost import is_dense_cheapest
 from solver.newton.linear_solver import JacobianSolver
 from solver.settings import SolverSettings
@@ -16,24 +12,24 @@ SETTINGS = SolverSettings(3, 24)
 ACCURACY = 2e-3  # relative residual of a direction: Newton's method gains three digits with it
 
 
-def large(seed: int, wear: bool = True) -> tuple[Balance, FloatArray]:
+def large(seed, wear=True):
     """14 pairs, 42 displacements, 294 unknowns: above the size that is always solved directly."""
     balance, predicted = random_balance(random_model(seed, ("3d",) * 14, 4), SETTINGS, seed, wear=wear)
     assert not is_dense_cheapest(predicted.size, len(predicted))
     return balance, predicted
 
 
-def oracle(balance: Balance, predicted: FloatArray, right: FloatArray) -> FloatArray:
+def oracle(balance, predicted, right):
     tangent = balance.linearise(balance.evaluate(predicted))
     dense = tangent.dense(np.arange(balance.joint.contact.n_contact))
     return np.linalg.solve(dense, right.ravel()).reshape(right.shape)
 
 
-def error(found: FloatArray, exact: FloatArray) -> float:
+def error(found, exact):
     return float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
 
 
-def test_a_large_system_is_solved_to_round_off_by_a_fresh_factorisation() -> None:
+def test_a_large_system_is_solved_to_round_off_by_a_fresh_factorisation():
     balance, predicted = large(4)
     right = np.random.default_rng(5).normal(size=predicted.shape)
     step = JacobianSolver().solve(balance.linearise(balance.evaluate(predicted)), right)
@@ -42,7 +38,7 @@ def test_a_large_system_is_solved_to_round_off_by_a_fresh_factorisation() -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wear", [False, True])
-def test_a_kept_factorisation_follows_jacobians_that_change(wear: bool) -> None:
+def test_a_kept_factorisation_follows_jacobians_that_change(wear):
     balance, predicted = large(6, wear)
     solver = JacobianSolver()
     random = np.random.default_rng(7)
@@ -62,7 +58,7 @@ def test_a_kept_factorisation_follows_jacobians_that_change(wear: bool) -> None:
     assert min(conditions) < 1e3
 
 
-def test_pairs_that_stay_stuck_are_left_out_and_found_again() -> None:
+def test_pairs_that_stay_stuck_are_left_out_and_found_again():
     balance, predicted = large(10, wear=False)
     solver = JacobianSolver()
     random = np.random.default_rng(11)

@@ -1,15 +1,11 @@
 """Fretting loops: exact cases, the laws in every loop, and loops between the steps of a march."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from solver.model import ReducedModel
 from solver.outcome import Outcome
-from solver.results.history import StartState, WearHistory
 from solver.results.loops import LOOP_PHASES, at_phases, loop_phases
 from solver.settings import Scheme, SolverSettings
 from tests.solver.models import branch_states, march_wear, scene
@@ -24,25 +20,25 @@ CYCLES = np.array([0.0, 2000.0, 8000.0, 14000.0, 16000.0])
 
 
 @lru_cache
-def slider_start(settings: SolverSettings = SLIDER) -> tuple[ReducedModel, StartState]:
+def slider_start(settings=SLIDER):
     model = scene("sdof_slider", settings.harmonics)
     (start,) = branch_states(model, FRICTION, 10.0, [2 * np.pi * 160.0], settings)
     return model, start
 
 
-def slider_march(scheme: Scheme, cycles: np.ndarray, settings: SolverSettings = SLIDER) -> WearHistory:
+def slider_march(scheme, cycles, settings=SLIDER):
     model, start = slider_start(settings)
     return march_wear(model, FRICTION, start, WEAR, 8000.0, scheme, cycles, settings, loops=(0,))
 
 
 @lru_cache
-def dovetail_start() -> tuple[ReducedModel, StartState]:
+def dovetail_start():
     model = scene("dovetail_sector", 5, mesh=1)
     return model, branch_states(model, FRICTION, 0.5, [2 * np.pi * 212.0, 2 * np.pi * 213.0], DOVETAIL)[1]
 
 
 @lru_cache
-def dovetail_march(scheme: Scheme = "implicit", loops: tuple[int, ...] = tuple(range(16))) -> WearHistory:
+def dovetail_march(scheme="implicit", loops=tuple(range(16))):
     model, start = dovetail_start()
     cycles = np.array([0.0, 500.0, 2000.0])
     history = march_wear(model, FRICTION, start, WEAR, 1000.0, scheme, cycles, DOVETAIL, loops=loops)
@@ -51,12 +47,12 @@ def dovetail_march(scheme: Scheme = "implicit", loops: tuple[int, ...] = tuple(r
     return history
 
 
-def closed(values: np.ndarray) -> np.ndarray:
+def closed(values):
     """The loop with its first phase once more at its end; phases on axis -2."""
     return np.concatenate([values, values[..., :1, :]], axis=-2)
 
 
-def loop_work(history: WearHistory) -> np.ndarray:
+def loop_work(history):
     """Integral of the tangential force over the displacement (n_output, n_loops), N m."""
     motion, force = (closed(values)[..., 1:] for values in (history.loop_displacement, history.loop_force))
     mean = 0.5 * (force[..., 1:, :] + force[..., :-1, :])
@@ -65,7 +61,7 @@ def loop_work(history: WearHistory) -> np.ndarray:
 
 @pytest.mark.parametrize("samples", [64, 96, 128, 200, 256])
 @pytest.mark.parametrize("lead", [0.0, 0.5])
-def test_between_samples_the_values_are_those_of_straight_lines(samples: int, lead: float) -> None:
+def test_between_samples_the_values_are_those_of_straight_lines(samples, lead):
     values = np.random.default_rng(samples).normal(size=(2, samples))
     phases = 2 * np.pi * (np.arange(samples) - lead) / samples
     found = at_phases(values, lead)
@@ -74,7 +70,7 @@ def test_between_samples_the_values_are_those_of_straight_lines(samples: int, le
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_the_loop_of_a_sliding_mass_is_a_rectangle(scheme: Scheme) -> None:
+def test_the_loop_of_a_sliding_mass_is_a_rectangle(scheme):
     history = slider_march(scheme, CYCLES)
     motion, force = history.loop_displacement[:, 0], history.loop_force[:, 0]
     assert motion.shape == force.shape == (CYCLES.size, LOOP_PHASES, 3)
@@ -95,7 +91,7 @@ def test_the_loop_of_a_sliding_mass_is_a_rectangle(scheme: Scheme) -> None:
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("samples", [64, 256])
-def test_the_loop_encloses_the_energy_that_friction_takes(scheme: Scheme, samples: int) -> None:
+def test_the_loop_encloses_the_energy_that_friction_takes(scheme, samples):
     history = slider_march(scheme, np.array([0.0, 8000.0, 16000.0]), SolverSettings(harmonics=9, samples=samples))
     work = loop_work(history)[:, 0]
     sliding = 0.5 * np.ptp(history.loop_displacement[:, 0, :, 1], axis=1)
@@ -107,7 +103,7 @@ def test_the_loop_encloses_the_energy_that_friction_takes(scheme: Scheme, sample
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_loops_of_a_joint_keep_the_laws(scheme: Scheme) -> None:
+def test_loops_of_a_joint_keep_the_laws(scheme):
     history = dovetail_march(scheme)
     model, _ = dovetail_start()
     normal, tangential = history.loop_force[..., 0], np.linalg.norm(history.loop_force[..., 1:], axis=-1)
@@ -131,7 +127,7 @@ def test_loops_of_a_joint_keep_the_laws(scheme: Scheme) -> None:
 
 
 @pytest.mark.slow
-def test_a_loop_does_not_depend_on_the_others_that_are_asked_for() -> None:
+def test_a_loop_does_not_depend_on_the_others_that_are_asked_for():
     every, some, none = (dovetail_march(loops=loops) for loops in (tuple(range(16)), (3, 7), ()))
     for name in ("loop_displacement", "loop_force"):
         assert np.array_equal(getattr(some, name), getattr(every, name)[:, [3, 7]])
@@ -141,7 +137,7 @@ def test_a_loop_does_not_depend_on_the_others_that_are_asked_for() -> None:
 
 
 @pytest.mark.parametrize("scheme", ["explicit", "implicit"])
-def test_between_steps_loops_are_interpolated_like_all_else(scheme: Scheme) -> None:
+def test_between_steps_loops_are_interpolated_like_all_else(scheme):
     ends, between = (slider_march(scheme, cycles) for cycles in (CYCLES[[0, 2, 4]], CYCLES))
     for name in ("loop_displacement", "loop_force", "mean_pressure"):
         whole, inner = getattr(ends, name), getattr(between, name)

@@ -1,11 +1,8 @@
 """Missions: blocks in order, flown many times, against wear histories, exact volumes and missions one by one."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import fields, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,12 +14,11 @@ from solver.contact.wear_law import WearLaw, WearTable
 from solver.missions import solutions
 from solver.missions.block_run import BlockCase, BlockRun
 from solver.missions.blocks import Begin, Mission
-from solver.missions.course import MissionCourse, MissionNode
+from solver.missions.course import MissionCourse
 from solver.missions.history import integrate_missions
 from solver.missions.options import MISSIONS
 from solver.missions.passage import SweptState, _states, in_order, interval_errors, sweep_rate
 from solver.missions.step import Step, take_step
-from solver.model import FloatArray, ReducedModel
 from solver.packing import Packed
 from solver.results.history import StartState
 from solver.settings import Resolution, WearTarget
@@ -35,12 +31,12 @@ WEAR, FRICTION = 1.1e-11, 0.5
 
 
 @lru_cache
-def slider() -> ReducedModel:
+def slider():
     """A mass on a support, pressed by a spring that wear relaxes."""
     return scene("sdof_slider")
 
 
-def two_blocks(begin: Begin = "continue", cycles: float = 200.0) -> tuple[Block, Block]:
+def two_blocks(begin="continue", cycles=200.0):
     """Two blocks that slip."""
     return (
         Block(slider(), 160.0, 10.0, FRICTION, cycles, begin, "cruise"),
@@ -48,7 +44,7 @@ def two_blocks(begin: Begin = "continue", cycles: float = 200.0) -> tuple[Block,
     )
 
 
-def integrate(blocks: tuple[Block, ...], missions: Any, **more: Any) -> MissionHistory:
+def integrate(blocks, missions, **more):
     return integrate_mission(blocks, WEAR, missions, settings=SETTINGS, **more)
 
 
@@ -56,7 +52,7 @@ def integrate(blocks: tuple[Block, ...], missions: Any, **more: Any) -> MissionH
 
 
 @pytest.mark.parametrize("flown", [(1, 4e4), (4, 1e4)], ids=["one mission", "continued"])
-def test_one_block_is_a_wear_history_to_the_last_bit(flown: tuple[int, float]) -> None:
+def test_one_block_is_a_wear_history_to_the_last_bit(flown):
     missions, cycles = flown
     counts = cycles * np.arange(missions + 1.0)
     one = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, counts, settings=SETTINGS)
@@ -76,7 +72,7 @@ def test_one_block_is_a_wear_history_to_the_last_bit(flown: tuple[int, float]) -
 
 
 @pytest.mark.slow
-def test_two_halves_with_continue_are_the_whole() -> None:
+def test_two_halves_with_continue_are_the_whole():
     """And the first block of several is the wear history of its cycles to the last bit."""
     half = Block(slider(), 160.0, 10.0, FRICTION, 2e4, "continue")
     history = integrate((half, half), 1)
@@ -94,7 +90,7 @@ def test_two_halves_with_continue_are_the_whole() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [1, -1])
-def test_gross_slip_wears_by_the_stroke_times_the_load_in_any_order(order: int) -> None:
+def test_gross_slip_wears_by_the_stroke_times_the_load_in_any_order(order):
     """V = k_w N s with the slip path s of a period: no wear acts back on a constant normal force."""
     model = scene("sdof_slider", normal_stiffness=0.0)
     amplitudes, cycles = ((10.0, 14.0), (3e3, 5e3))
@@ -118,14 +114,14 @@ RATES = np.array([[2e-9, 1e-9], [1e-9, 2.5e-9]])  # m per cycle of the unworn pa
 LOSS = 2e-3 * np.array([1.0, 0.8])[:, None, None] * np.array([[1.0, -1.0], [-1.0, 1.0]])  # 1 per cycle
 
 
-def pairs() -> ReducedModel:
+def pairs():
     """Two pairs, of which only the areas count here."""
     one = scene("two_masses")
     contact = replace(one.contact, area=np.array([1e-4, 2e-4]), surface=("one", "other"))
     return replace(one, contact=contact)
 
 
-def exact_run(case: Any, like: Any = None) -> BlockRun:
+def exact_run(case, like=None):
     """The wear of `dW/dn = r - L W` through a block; the reference solution wears a little more."""
     rate, loss = RATES[case.place] * (1.0 if like is None else 1.001), LOSS[case.place]
     slope = expm(-case.block.steady[1] * loss) - np.eye(2)
@@ -140,11 +136,11 @@ def exact_run(case: Any, like: Any = None) -> BlockRun:
 
 
 @pytest.fixture
-def exact_blocks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+def exact_blocks(monkeypatch):
     """Blocks of exactly known wear; the list has an entry for each run."""
     flown: list[int] = []
 
-    def run(case: Any, like: Any = None) -> BlockRun:
+    def run(case, like=None):
         flown.append(1)
         return exact_run(case, like)
 
@@ -152,7 +148,7 @@ def exact_blocks(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return flown
 
 
-def exactly_known(missions: Any, cycles: float = 1.0, order: int = 1, **more: Any) -> MissionHistory:
+def exactly_known(missions, cycles=1.0, order=1, **more):
     model = pairs()
     blocks = (Block(model, 1.0, 1.0, 0.5, cycles), Block(model, 2.0, 1.0, 0.5, 2.0 * cycles))
     return integrate_missions(Mission(blocks[::order], 1.0, missions, SETTINGS, **more))
@@ -160,9 +156,7 @@ def exactly_known(missions: Any, cycles: float = 1.0, order: int = 1, **more: An
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("cycles", "limit"), [(0.1, 20), (3.0, 30), (30.0, 30)])
-def test_two_thousand_missions_agree_with_missions_one_by_one(
-    exact_blocks: list[int], cycles: float, limit: float
-) -> None:
+def test_two_thousand_missions_agree_with_missions_one_by_one(exact_blocks, cycles, limit):
     """The longer the blocks, the more they adapt the pressures against each other within few missions."""
     rows = (0, 1, 7, 200, 1000, 2000)
     once = exactly_known(rows, cycles, largest_step=1)
@@ -182,16 +176,16 @@ def test_two_thousand_missions_agree_with_missions_one_by_one(
     assert many.missions[-1] == many.steps.sum() == many.last_mission == 2000
 
 
-def test_a_step_is_of_second_order_and_its_error_is_known(exact_blocks: list[int]) -> None:
+def test_a_step_is_of_second_order_and_its_error_is_known(exact_blocks):
     """After exact missions 0, H and 2H: against missions one by one."""
     model = pairs()
     mission = Mission((Block(model, 1.0, 1.0, 0.5, 1.0), Block(model, 2.0, 1.0, 0.5, 2.0)), 1.0, (0, 64), SETTINGS)
     nodes = list(MissionCourse.begun(2, 2).nodes)
 
-    def run(place: int, depth: FloatArray, carried: Any, with_slope: bool) -> BlockRun:
+    def run(place, depth, carried, with_slope):
         return exact_run(BlockCase(mission, place, depth, carried, with_slope, SETTINGS))
 
-    def step(before: list[MissionNode], length: int) -> Step:
+    def step(before, length):
         taken = take_step(mission, tuple(before), length, run, lambda *_: 1e-16)
         assert isinstance(taken, Step)
         return taken
@@ -210,7 +204,7 @@ def test_a_step_is_of_second_order_and_its_error_is_known(exact_blocks: list[int
     assert 6.0 < errors[4] / errors[3] < 8.5
 
 
-def test_the_order_of_blocks_counts_by_less_than_a_mission(exact_blocks: list[int]) -> None:
+def test_the_order_of_blocks_counts_by_less_than_a_mission(exact_blocks):
     one, other = (exactly_known((0, 40), 5.0, order, largest_step=1) for order in (1, -1))
     many = [exactly_known((0, 40), 5.0, order) for order in (1, -1)]
     apart = one.wear_depth[-1] - other.wear_depth[-1]
@@ -219,7 +213,7 @@ def test_the_order_of_blocks_counts_by_less_than_a_mission(exact_blocks: list[in
         assert (np.abs(history.wear_depth - literal.wear_depth) <= history.wear_depth_error).all()
 
 
-def test_an_interrupted_mission_goes_on_to_the_last_bit(exact_blocks: list[int]) -> None:
+def test_an_interrupted_mission_goes_on_to_the_last_bit(exact_blocks):
     model = pairs()
     blocks = (Block(model, 1.0, 1.0, 0.5, 3.0), Block(model, 2.0, 1.0, 0.5, 6.0))
     mission, kept = Mission(blocks, 1.0, (0, 100, 301), SETTINGS), list[Packed]()
@@ -231,7 +225,7 @@ def test_an_interrupted_mission_goes_on_to_the_last_bit(exact_blocks: list[int])
         assert len(exact_blocks) == n_runs - place - 1
 
 
-def equal(one: MissionHistory, other: MissionHistory) -> bool:
+def equal(one, other):
     """Whether two histories are equal to the last bit, but for their run time."""
     names = [field.name for field in fields(MissionHistory) if field.name != "run_time"]
     return all(
@@ -240,7 +234,7 @@ def equal(one: MissionHistory, other: MissionHistory) -> bool:
     )
 
 
-def test_a_target_ends_the_missions(exact_blocks: list[int]) -> None:
+def test_a_target_ends_the_missions(exact_blocks):
     rows = tuple(range(0, 2001, 50))
     whole = exactly_known(rows, 0.3)
     value = 0.2 * float(whole.wear_depth[-1].max())
@@ -252,10 +246,10 @@ def test_a_target_ends_the_missions(exact_blocks: list[int]) -> None:
     assert np.isnan(whole.missions_to_target)
 
 
-def test_a_block_that_fails_at_once_is_flown_in_shorter_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_block_that_fails_at_once_is_flown_in_shorter_steps(monkeypatch):
     """And one that fails in a single mission ends the history there, with what was computed."""
 
-    def run(case: Any, like: Any = None) -> BlockRun:
+    def run(case, like=None):
         nonlocal deepest
         found, depth = exact_run(case, like), float(case.depth.max())
         if depth > limit or (like is None and depth > deepest + 4e-8):
@@ -280,7 +274,7 @@ def test_a_block_that_fails_at_once_is_flown_in_shorter_steps(monkeypatch: pytes
 
 
 @pytest.mark.slow
-def test_missions_of_the_slider_agree_with_missions_one_by_one_and_go_on_to_the_last_bit() -> None:
+def test_missions_of_the_slider_agree_with_missions_one_by_one_and_go_on_to_the_last_bit():
     """Amplitude and frequency change from block to block."""
     checked = tuple(replace(block, friction_coefficient=FRICTION) for block in two_blocks(cycles=300.0))
     mission, kept = Mission(checked, WEAR, (0, 3, 6), SETTINGS), list[Packed]()
@@ -305,7 +299,7 @@ def test_missions_of_the_slider_agree_with_missions_one_by_one_and_go_on_to_the_
 
 
 @pytest.mark.slow
-def test_depths_of_a_table_count_from_the_unworn_joint() -> None:
+def test_depths_of_a_table_count_from_the_unworn_joint():
     law = WearLaw("table", table=WearTable((0.0,), (0.0, 2e-5, 4e-5), ((1.0, 0.2, 0.0),)))
     half = Block(slider(), 160.0, 10.0, FRICTION, 2e4, "up")
     history = integrate((half, half), 1, law=law)
@@ -319,13 +313,13 @@ def test_depths_of_a_table_count_from_the_unworn_joint() -> None:
 # --- passages ---
 
 
-def state(frequency: float, density: float, branch: int = 0, response: float = 0.0) -> SweptState:
+def state(frequency, density, branch=0, response=0.0):
     nan = float("nan")
     start = StartState(Outcome.CONVERGED, None, nan, Resolution((1,), 4), 0.0, 0.0, 0, 0.0, branch, 1.5)
     return SweptState(frequency, start, np.array([density]), np.array([response + 0j]), np.array([response]))
 
 
-def test_the_error_of_the_trapezoidal_rule_is_known_on_both_sides_of_a_jump() -> None:
+def test_the_error_of_the_trapezoidal_rule_is_known_on_both_sides_of_a_jump():
     """A parabola a m/Hz up to the jump at 1.5 Hz, a constant behind it."""
     before = [state(at, at**2) for at in (0.0, 0.5, 1.0, 1.5 - 1e-6)]
     behind = [state(at, 5.0, 1) for at in (1.5 + 1e-6, 2.0, 3.0)]
@@ -336,20 +330,20 @@ def test_the_error_of_the_trapezoidal_rule_is_known_on_both_sides_of_a_jump() ->
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_frequencies_of_a_passage_wear_one_after_the_other(order: int) -> None:
+def test_frequencies_of_a_passage_wear_one_after_the_other(order):
     """`dy/df = g(f) - L(f) y`, up and down, with a derivative by the depth before; against its integration."""
     at = np.linspace(0.0, 1.0, 201)
     loss = np.array([[1.0, -1.0], [-0.5, 0.5]])
 
-    def rates(f: float) -> tuple[FloatArray, FloatArray]:
+    def rates(f):
         return np.array([1.0 + f, 2.0 * (1.0 - f)]), -(1.0 + 3.0 * f) * loss
 
     states = [replace(state(f, 0.0), density=rates(f)[0]) for f in at][::order]
     grown, slope = in_order(states, [rates(of.frequency)[1] for of in states])
     ends = (0.0, 1.0)[::order]
 
-    def end(before: FloatArray) -> FloatArray:
-        def rise(f: float, y: FloatArray) -> FloatArray:
+    def end(before):
+        def rise(f, y):
             density, derivative = rates(f)
             return order * (density + derivative @ y)
 
@@ -359,7 +353,7 @@ def test_frequencies_of_a_passage_wear_one_after_the_other(order: int) -> None:
     np.testing.assert_allclose(slope @ [0.1, 0.0], end(np.array([0.1, 0.0])) - end(np.zeros(2)) - [0.1, 0.0], rtol=1e-3)
 
 
-def test_the_sweep_rate_is_that_of_the_half_power_width() -> None:
+def test_the_sweep_rate_is_that_of_the_half_power_width():
     """A linear oscillator of 100 Hz and damping ratio 0.01, and no peak at the edge of the range."""
     at = np.linspace(90.0, 110.0, 401)
     peak = 1.0 / np.abs(1.0 - (at / 100.0) ** 2 + 0.02j * at / 100.0)
@@ -369,7 +363,7 @@ def test_the_sweep_rate_is_that_of_the_half_power_width() -> None:
 
 
 @pytest.mark.slow
-def test_a_passage_wears_as_a_fixed_grid_of_frequencies() -> None:
+def test_a_passage_wears_as_a_fixed_grid_of_frequencies():
     model, passage = scene("sdof_slider", damping=6.0), Passage(185.0, 215.0, 5.0)
     block = Block(model, passage, 10.0, FRICTION, begin="up")
     history = integrate((block,), 1)
@@ -407,7 +401,7 @@ def test_a_passage_wears_as_a_fixed_grid_of_frequencies() -> None:
         ({"model": scene("sdof_slider", area=2e-4)}, r"blocks.*: model: give equal contact pairs"),
     ],
 )
-def test_a_wrong_block_is_named(changed: dict[str, Any], said: str) -> None:
+def test_a_wrong_block_is_named(changed, said):
     one, other = two_blocks()
     with pytest.raises(ValueError, match=said):
         integrate((one, replace(other, **changed)), 10)
@@ -427,12 +421,12 @@ def test_a_wrong_block_is_named(changed: dict[str, Any], said: str) -> None:
         ({"law": WearLaw("rust")}, 'wear law "rust"'),
     ],
 )
-def test_a_wrong_mission_is_a_sentence(wrong: dict[str, Any], said: str) -> None:
+def test_a_wrong_mission_is_a_sentence(wrong, said):
     with pytest.raises(ValueError, match=said):
         integrate(**{"blocks": two_blocks(), "missions": 10, **wrong})
 
 
-def test_a_block_without_a_start_state_is_an_outcome() -> None:
+def test_a_block_without_a_start_state_is_an_outcome():
     """The time is over before the first state."""
     history = integrate_mission(two_blocks("up"), WEAR, 10, settings=replace(SETTINGS, time_limit=0.0))
     assert history.outcome is Outcome.TIME_LIMIT

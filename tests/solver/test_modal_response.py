@@ -1,7 +1,5 @@
 """Single nonlinear mode theory against the linear oscillator and the full forced response."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +9,7 @@ from solver import backbone, frequency_response, modal_response
 from tests.solver.test_modes import MASS, SIZE, STIFFNESS, foot, slider
 
 
-def test_without_slip_the_curve_is_that_of_a_linear_oscillator() -> None:
+def test_without_slip_the_curve_is_that_of_a_linear_oscillator():
     model = foot()
     mode = backbone(model, np.geomspace(1e-9, 1e-6, 4), 0.5)
     force = 0.02  # N
@@ -29,7 +27,7 @@ def test_without_slip_the_curve_is_that_of_a_linear_oscillator() -> None:
 
 
 @pytest.mark.slow
-def test_with_slip_the_curve_is_near_the_full_response() -> None:
+def test_with_slip_the_curve_is_near_the_full_response():
     """A mass on a rigid slider: both sides of the resonance, where friction damps more than the damper."""
     model = slider(damping=2.0)
     mode = backbone(model, np.geomspace(8.0, 25.0, 6) * SIZE * np.sqrt(MASS), 0.5, direction="down")
@@ -44,14 +42,14 @@ def test_with_slip_the_curve_is_near_the_full_response() -> None:
     np.testing.assert_allclose(size[rows], np.abs(full.response[:, 0]), rtol=0.04)
 
 
-def test_a_resonance_beyond_the_mode_leaves_a_gap() -> None:
+def test_a_resonance_beyond_the_mode_leaves_a_gap():
     model = foot()
     mode = backbone(model, [1e-9, 1e-8], 0.5)
     curve = modal_response(model, mode, 1.0)
     assert np.count_nonzero(np.isnan(curve.frequency)) == 1
 
 
-def test_wrong_arguments_are_named() -> None:
+def test_wrong_arguments_are_named():
     model = foot()
     mode = backbone(model, [1e-9, 1e-8], 0.5)
     for wrong in (0.0, -1.0, np.nan, np.inf):

@@ -1,16 +1,13 @@
 """Nonlinear modes against closed forms, the linear limits, energy, and forced responses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
-from solver import Backbone, Outcome, ReducedModel, SolverSettings, backbone, build_model, frequency_response
+from solver import Outcome, SolverSettings, backbone, build_model, frequency_response
 from solver.contact.alternating_frequency_time import friction_work
-from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.modes.points import follow_mode
 from solver.structure.condensation import condense, relative_indices
 from solver.structure.fourier import to_complex
@@ -25,7 +22,7 @@ FIRST = np.array([1.23322403, 1.51974485, 2.01257092, 3.00760511, 5.00436220, 10
 DAMPING = np.log((PEAKS + 1.0) / (PEAKS - 1.0)) / np.pi
 
 
-def slider(damping: float = 0.0) -> ReducedModel:
+def slider(damping=0.0):
     """A mass on a rigid slider. damping: N s/m."""
     contact = [[-1, 0, -1]]
     return build_model(
@@ -33,7 +30,7 @@ def slider(damping: float = 0.0) -> ReducedModel:
     )
 
 
-def foot(loss: float = 1e-5, mass: float = 1e-3) -> ReducedModel:
+def foot(loss=1e-5, mass=1e-3):
     """A pressed foot, kg, with a tip on a spring above it; damping: `loss` times stiffness."""
     stiffness = np.array([[1e7, 0.0, 0.0], [0.0, 4e6, -2e6], [0.0, -2e6, 2e6]])
     return build_model(
@@ -52,18 +49,18 @@ FOOT_AMPLITUDES = np.array([1e-8, 8e-6, 2e-5, 1e-4, 3e-3])
 
 
 @lru_cache
-def slider_modes() -> Backbone:
+def slider_modes():
     settings = SolverSettings(rtol=1e-3)
     return backbone(slider(), FIRST * SIZE * np.sqrt(MASS), 0.5, direction="down", settings=settings)
 
 
 @lru_cache
-def foot_modes() -> Backbone:
+def foot_modes():
     return backbone(foot(), FOOT_AMPLITUDES, 0.5)
 
 
 @pytest.mark.slow
-def test_a_mass_on_a_rigid_slider_has_the_closed_form() -> None:
+def test_a_mass_on_a_rigid_slider_has_the_closed_form():
     found = slider_modes()
     assert set(found.outcome) == {Outcome.CONVERGED}
     exact = NATURAL / np.sqrt(1.0 + DAMPING**2) / (2.0 * np.pi)
@@ -74,14 +71,14 @@ def test_a_mass_on_a_rigid_slider_has_the_closed_form() -> None:
     assert (found.frequency_error >= 0.5 * abs(found.frequency - exact)).all()
 
 
-def test_below_the_friction_limit_the_slider_has_no_mode() -> None:
+def test_below_the_friction_limit_the_slider_has_no_mode():
     found = backbone(slider(), [0.5 * SIZE * np.sqrt(MASS)], 0.5, direction="down")
     assert found.outcome[0] is Outcome.BRANCH_LOST
     assert np.isnan(found.frequency).all()
     assert found.message[0]
 
 
-def test_negative_damping_gives_the_limit_cycle_of_the_closed_form() -> None:
+def test_negative_damping_gives_the_limit_cycle_of_the_closed_form():
     """Where the mass grows by as much as friction takes: zeta is zero."""
     grows = 0.1
     exponent = np.pi * grows / np.sqrt(1.0 - grows**2)
@@ -100,7 +97,7 @@ def test_negative_damping_gives_the_limit_cycle_of_the_closed_form() -> None:
 
 
 @pytest.mark.slow
-def test_small_and_large_amplitudes_have_the_linear_modes_and_their_damping() -> None:
+def test_small_and_large_amplitudes_have_the_linear_modes_and_their_damping():
     found, model = foot_modes(), foot().linear[0]
     glued = np.sqrt(2e6 / 0.2)
     assert found.frequency[0] == pytest.approx(glued / (2.0 * np.pi), rel=1e-9)
@@ -116,14 +113,14 @@ def test_small_and_large_amplitudes_have_the_linear_modes_and_their_damping() ->
     assert found.damping_ratio[2] > 3.0 * found.damping_ratio[0]
 
 
-def test_a_joint_without_damping_and_slip_has_none() -> None:
+def test_a_joint_without_damping_and_slip_has_none():
     found = backbone(foot(0.0), [1e-6], 0.5)
     assert found.outcome == (Outcome.CONVERGED,)
     assert abs(found.damping_ratio[0]) < 1e-12
 
 
 @pytest.mark.slow
-def test_amplitude_is_that_of_the_shape_and_the_response_belongs_to_it() -> None:
+def test_amplitude_is_that_of_the_shape_and_the_response_belongs_to_it():
     found, mass = foot_modes(), foot().linear[0].mass
     modal = np.sqrt(np.einsum("ai,ij,aj->a", found.shape.conj(), mass, found.shape).real)
     np.testing.assert_allclose(modal, FOOT_AMPLITUDES, rtol=1e-6)
@@ -131,7 +128,7 @@ def test_amplitude_is_that_of_the_shape_and_the_response_belongs_to_it() -> None
 
 
 @pytest.mark.slow
-def test_an_oscillator_with_a_wall_has_the_period_of_its_two_springs() -> None:
+def test_an_oscillator_with_a_wall_has_the_period_of_its_two_springs():
     """Without damping the mode is the free motion: a spring of 1 N/m, and from the gap on one of 100 N/m beside it."""
     gap, stiff = 0.1, 101.0
     speed = np.array([0.15, 0.2])  # m/s at the wall
@@ -154,7 +151,7 @@ def test_an_oscillator_with_a_wall_has_the_period_of_its_two_springs() -> None:
     np.testing.assert_allclose(1.0 - found.open_fraction[:, 0], half_closed / half, atol=0.03)
 
 
-def energies(problem: ModeProblem, state: ModeState) -> tuple[float, float]:
+def energies(problem, state):
     """Energy fed in by the negative damping, and dissipated by damping and contact, J in a period."""
     model, omega, at = problem.model, state.omega, state.point.evaluation
     joint = problem.joint_of(state)
@@ -184,7 +181,7 @@ def energies(problem: ModeProblem, state: ModeState) -> tuple[float, float]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("joint", ["foot", "slider", "travelling wave"])
-def test_the_negative_damping_feeds_in_what_damping_and_friction_take(joint: str) -> None:
+def test_the_negative_damping_feeds_in_what_damping_and_friction_take(joint):
     if joint == "foot":
         model, amplitudes, way, friction = foot(), FOOT_AMPLITUDES[2:4], "up", 0.5
     elif joint == "slider":
@@ -204,7 +201,7 @@ def test_the_negative_damping_feeds_in_what_damping_and_friction_take(joint: str
 
 @pytest.mark.slow
 @pytest.mark.parametrize("direction", ["up", "down"])
-def test_a_point_does_not_depend_on_the_others(direction: str) -> None:
+def test_a_point_does_not_depend_on_the_others(direction):
     up = direction == "up"
     amplitudes = FOOT_AMPLITUDES if up else FOOT_AMPLITUDES[2:]
     together = foot_modes() if up else backbone(foot(), amplitudes, 0.5, direction="down")
@@ -215,7 +212,7 @@ def test_a_point_does_not_depend_on_the_others(direction: str) -> None:
 
 
 @pytest.mark.parametrize(("n_sectors", "nodal_diameter"), [(7, 2), (7, 5)])
-def test_a_small_travelling_wave_has_the_mode_of_the_glued_sector(n_sectors: int, nodal_diameter: int) -> None:
+def test_a_small_travelling_wave_has_the_mode_of_the_glued_sector(n_sectors, nodal_diameter):
     model = cyclic_model(3, ("3d", "3d"), n_sectors, nodal_diameter)
     linear = model.linear[2]
     free = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs.ravel())
@@ -228,7 +225,7 @@ def test_a_small_travelling_wave_has_the_mode_of_the_glued_sector(n_sectors: int
 
 
 @pytest.mark.slow
-def test_wear_opens_the_joint_as_a_gap_does() -> None:
+def test_wear_opens_the_joint_as_a_gap_does():
     model = foot()
     depth = 2e-6  # m; 20 of the 50 N are left
     worn = backbone(model, FOOT_AMPLITUDES[2], 0.5, wear_depth=[depth])
@@ -241,7 +238,7 @@ def test_wear_opens_the_joint_as_a_gap_does() -> None:
     assert worn.frequency[0] == pytest.approx(less.frequency[0], rel=1e-3)
 
 
-def test_what_has_no_mode_says_so() -> None:
+def test_what_has_no_mode_says_so():
     found = backbone(foot(), [1e-6], 0.5, mode=4)
     assert found.outcome == (Outcome.START_FAILED,)
     assert "fewer linear modes" in found.message[0]
@@ -251,7 +248,7 @@ def test_what_has_no_mode_says_so() -> None:
 
 
 @pytest.mark.slow
-def test_a_mode_that_is_lost_says_where_and_keeps_its_other_points() -> None:
+def test_a_mode_that_is_lost_says_where_and_keeps_its_other_points():
     """A heavy foot whose own vibration the harmonics meet stops several times in a period."""
     found = backbone(foot(mass=0.05), [1e-4, 1.5e-5], 0.5)
     assert found.outcome == (Outcome.BRANCH_LOST, Outcome.CONVERGED)
@@ -260,7 +257,7 @@ def test_a_mode_that_is_lost_says_where_and_keeps_its_other_points() -> None:
     assert "the mode is followed up to the amplitude" in found.message[0]
 
 
-def test_wrong_arguments_are_named() -> None:
+def test_wrong_arguments_are_named():
     for wrong, said in (
         ({"amplitude": 0.0}, "amplitude: give values above 0"),
         ({"direction": "left"}, "direction: give one of up, down"),
@@ -276,7 +273,7 @@ def test_wrong_arguments_are_named() -> None:
 
 
 @pytest.mark.slow
-def test_the_dovetail_softens_and_damps_and_its_forced_resonance_agrees() -> None:
+def test_the_dovetail_softens_and_damps_and_its_forced_resonance_agrees():
     model = dovetail(21)
     amplitudes = np.array([1e-6, 7e-4, 1e-3])
     found = backbone(model, amplitudes, 0.5)
@@ -296,7 +293,7 @@ def test_the_dovetail_softens_and_damps_and_its_forced_resonance_agrees() -> Non
 
 
 @pytest.mark.slow
-def test_a_travelling_wave_of_the_dovetail_damps_as_it_slips() -> None:
+def test_a_travelling_wave_of_the_dovetail_damps_as_it_slips():
     model = dovetail(3, 20)
     found = backbone(model, [1e-6, 1e-3], 0.5, settings=SolverSettings(harmonics=3, samples=64))
     assert found.frequency[0] == pytest.approx(215.031, abs=2e-3)

@@ -1,42 +1,36 @@
 """Natural continuation along a parameter, and the history that its states leave."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
-from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from tests.solver.models import OMEGA, first_point, random_model, scene
 
-BalanceAt = Callable[[float, FloatArray], Balance]
 TOLERANCE = 1e-9
 WALL_OMEGA = 1.2  # rad/s; without the wall the mass reaches it at 0.1 |1 - 1.2^2 + 0.06i| = 0.0444 N
 GRAZING = 0.1 * abs(1 - WALL_OMEGA**2 + 0.05j * WALL_OMEGA)
 
 
-def wall(omega: float, n_harmonics: int = 5) -> tuple[BalanceAt, Callable[[float], PathPoint], Callable[..., float]]:
+def wall(omega, n_harmonics=5):
     """Vibro-impact along the excitation amplitude: balances, a state found from nothing, and the motion of the mass."""
     model = scene("vibro_impact")
     case = build_case(model, 0.0, WALL_OMEGA, SolverSettings(n_harmonics, 64))
     idle = np.zeros(1)
 
-    def balance_at(amplitude: float, history: FloatArray) -> Balance:
+    def balance_at(amplitude, history):
         return Balance.frozen(case.joint(omega, amplitude), history, idle)
 
-    def first(amplitude: float) -> PathPoint:
+    def first(amplitude):
         found = first_point(case, omega, amplitude, idle)
         return PathPoint(amplitude, found.evaluation, found.history)
 
-    def size(point: PathPoint) -> float:
+    def size(point):
         structure = case.joint(omega, point.parameter).structure
         response = structure.response_h(point.evaluation.displacement_h[0, :1])
         return float(np.hypot(response[0, 1], response[0, 2]))
@@ -44,7 +38,7 @@ def wall(omega: float, n_harmonics: int = 5) -> tuple[BalanceAt, Callable[[float
     return balance_at, first, size
 
 
-def test_a_natural_step_reaches_its_target_from_either_side() -> None:
+def test_a_natural_step_reaches_its_target_from_either_side():
     balance_at, first, size = wall(0.5)
     for start, target in ((0.01, 0.06), (0.06, 0.01)):
         point, arrived = follow_naturally(balance_at, first(start), target, JacobianSolver(), TOLERANCE, Budget())
@@ -55,7 +49,7 @@ def test_a_natural_step_reaches_its_target_from_either_side() -> None:
         assert size(point) == pytest.approx(target / abs(1 - 0.25 + 0.025j), rel=1e-7, abs=0.0)
 
 
-def test_natural_steps_end_before_a_fold_and_say_so() -> None:
+def test_natural_steps_end_before_a_fold_and_say_so():
     balance_at, first, size = wall(WALL_OMEGA)
     point, arrived = follow_naturally(balance_at, first(0.03), 0.06, JacobianSolver(), TOLERANCE, Budget())
     assert not arrived
@@ -65,13 +59,13 @@ def test_natural_steps_end_before_a_fold_and_say_so() -> None:
     assert size(point) == pytest.approx(0.1, rel=0.02, abs=0.0)
 
 
-def test_history_is_handed_on_or_kept() -> None:
+def test_history_is_handed_on_or_kept():
     model = random_model(1, ("3d", "3d"))
     settings = SolverSettings(3, 64)
     case = build_case(model, 0.4, OMEGA, settings)
     idle = np.zeros(2)
 
-    def balance_at(amplitude: float, history: FloatArray) -> Balance:
+    def balance_at(amplitude, history):
         return Balance.frozen(case.joint(OMEGA, amplitude), history, idle)
 
     found = first_point(case, OMEGA, 20.0, idle)

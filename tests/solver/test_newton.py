@@ -1,7 +1,5 @@
 """Newton's method on small piecewise examples that know nothing of contact."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -21,7 +19,7 @@ class Example:
     residual: np.ndarray
     scale: tuple[float, float] = (1.0, 1.0)
 
-    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
+    def scaled_residual(self, scale=None):
         return float(np.linalg.norm(self.residual)) / (scale or self.scale)[0]
 
 
@@ -33,24 +31,24 @@ class Problem:
     derivative: Function
     calls: list[np.ndarray] = field(default_factory=list)
 
-    def evaluate(self, point: np.ndarray) -> Example:
+    def evaluate(self, point):
         self.calls.append(point)
         return Example(point, self.function(point))
 
-    def direction(self, at: Example) -> np.ndarray:
+    def direction(self, at):
         return np.linalg.solve(self.derivative(at.point), -at.residual)
 
 
-def kink(left: float, right: float, value: float) -> Problem:
+def kink(left, right, value):
     """`slope * x - value`, with slopes `left` and `right` of the kink at 0: a spring that stiffens."""
 
-    def slope(x: np.ndarray) -> np.ndarray:
+    def slope(x):
         return np.where(x < 0, left, right)
 
     return Problem(lambda x: slope(x) * x - value, lambda x: np.diag(slope(x)))
 
 
-def plain_newton(problem: Problem, start: np.ndarray, iterations: int) -> np.ndarray:
+def plain_newton(problem, start, iterations):
     point = start
     for _ in range(iterations):
         point = point + problem.direction(problem.evaluate(point))
@@ -58,14 +56,14 @@ def plain_newton(problem: Problem, start: np.ndarray, iterations: int) -> np.nda
 
 
 # Slopes 1, 5, 1 between kinks at -1 and 1, so that the tangent of either outer piece leads to the other one.
-def ramp() -> Problem:
-    def function(x: np.ndarray) -> np.ndarray:
+def ramp():
+    def function(x):
         return 5 * np.clip(x, -1, 1) + (x - np.clip(x, -1, 1))
 
     return Problem(function, lambda x: np.diag(np.where(np.abs(x) < 1, 5.0, 1.0)))
 
 
-def test_a_linear_system_takes_one_iteration() -> None:
+def test_a_linear_system_takes_one_iteration():
     matrix = np.random.default_rng(1).normal(size=(4, 4)) + 4 * np.eye(4)
     problem = Problem(lambda x: matrix @ x - 1.0, lambda _: matrix)
     result = solve_newton(problem.evaluate, problem.direction, np.zeros(4), 1e-12)
@@ -75,7 +73,7 @@ def test_a_linear_system_takes_one_iteration() -> None:
     assert np.array_equal(result.evaluation.point, result.unknown)
 
 
-def test_convergence_is_quadratic_on_a_smooth_function() -> None:
+def test_convergence_is_quadratic_on_a_smooth_function():
     problem = Problem(lambda x: np.exp(x) - 2.0, lambda x: np.diag(np.exp(x)))
     result = solve_newton(problem.evaluate, problem.direction, np.array([1.5]), 1e-14)
     assert result.converged
@@ -85,7 +83,7 @@ def test_convergence_is_quadratic_on_a_smooth_function() -> None:
 
 
 @pytest.mark.parametrize("size", [1, 3])
-def test_a_cycle_of_plain_newton_is_broken(size: int) -> None:
+def test_a_cycle_of_plain_newton_is_broken(size):
     start = np.linspace(2.0, 3.0, size)
     there = plain_newton(ramp(), start, 1)
     back = plain_newton(ramp(), start, 2)
@@ -100,7 +98,7 @@ def test_a_cycle_of_plain_newton_is_broken(size: int) -> None:
     assert result.unknown == pytest.approx(np.zeros(size), abs=1e-10)
 
 
-def test_no_solution_is_a_value() -> None:
+def test_no_solution_is_a_value():
     problem = Problem(lambda x: x**2 + 1.0, lambda x: np.diag(2 * x))
     result = solve_newton(problem.evaluate, problem.direction, np.array([1.3]), 1e-10, 30)
     assert not result.converged
@@ -110,16 +108,16 @@ def test_no_solution_is_a_value() -> None:
     assert result.evaluation.scaled_residual() == min(np.linalg.norm(x**2 + 1) for x in problem.calls)
 
 
-def test_a_direction_that_is_not_finite_is_a_failure() -> None:
+def test_a_direction_that_is_not_finite_is_a_failure():
     problem = Problem(lambda x: x - 1.0, lambda _: np.eye(1))
     result = solve_newton(problem.evaluate, lambda _: np.full(1, np.nan), np.zeros(1), 1e-10)
     assert not result.converged
     assert result.unknown[0] == 0.0
 
 
-def test_a_residual_that_is_not_finite_sends_the_iteration_back() -> None:
+def test_a_residual_that_is_not_finite_sends_the_iteration_back():
     # The full step lands where the logarithm is undefined.
-    def function(x: np.ndarray) -> np.ndarray:
+    def function(x):
         return np.log(x) if x[0] > 0 else np.full(1, np.nan)
 
     problem = Problem(function, lambda x: np.diag(1 / x))

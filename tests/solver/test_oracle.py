@@ -1,18 +1,13 @@
 """The same wear with every system solved densely: fast solves change nothing but the time."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from solver.harmonic_balance.dlft import Linearisation
 from solver.loading_history.start_states import follow_branch
-from solver.model import FloatArray, ReducedModel
 from solver.newton.cost import is_dense_cheapest
 from solver.newton.linear_solver import JacobianSolver
 from solver.outcome import Outcome
-from solver.results.history import StartState, WearHistory
-from solver.settings import Scheme, SolverSettings
+from solver.settings import SolverSettings
 from studies.scenes import build_scene, scene_parameters
 from tests.solver.models import march_wear
 
@@ -23,13 +18,13 @@ CYCLES = np.linspace(0.0, 6000.0, 4)
 WEAR = 1.1e-11
 
 
-def dense_solve(self: JacobianSolver, tangent: Linearisation, right: FloatArray, rtol: float = 0.0) -> FloatArray:
+def dense_solve(self, tangent, right, rtol=0.0):
     """The whole Jacobian, all pairs, all harmonics."""
     matrix = tangent.dense(np.arange(tangent.joint.contact.n_contact))
     return np.linalg.solve(matrix, right.ravel()).reshape(right.shape)
 
 
-def sector() -> ReducedModel:
+def sector():
     """The dovetail sector with a coarse mesh: 264 unknowns, above the size that is always solved densely."""
     model = build_scene("dovetail_sector", scene_parameters("dovetail_sector")(mesh=1), 5)
     n_rel = 3 * model.contact.n_contact
@@ -37,13 +32,13 @@ def sector() -> ReducedModel:
     return model
 
 
-def worn(model: ReducedModel, starts: list[StartState], scheme: Scheme) -> list[WearHistory]:
+def worn(model, starts, scheme):
     return [march_wear(model, 0.5, start, WEAR, 2000.0, scheme, CYCLES, SETTINGS) for start in starts]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["implicit", "adaptive"])
-def test_wear_is_that_of_dense_solves(scheme: Scheme, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wear_is_that_of_dense_solves(scheme, monkeypatch):
     model = sector()
     # the same start: a sweep chooses its steps by what happens, and by every digit of that
     starts = [start for _, start in follow_branch(model, 0.5, 0.5, FREQUENCIES, "up", SETTINGS)]

@@ -1,7 +1,5 @@
 """The progress of a history and of a sweep survives being kept, and what goes on from there ends with equal numbers."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import fields, replace
@@ -10,13 +8,11 @@ import numpy as np
 import pytest
 
 from solver.loading_history.start_states import follow_branch
-from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
-from solver.results.history import StartState, WearHistory
-from solver.settings import Resolution, Scheme, SolverSettings
+from solver.results.history import StartState
+from solver.settings import Resolution, SolverSettings
 from solver.wear import integrate
-from solver.wear.solutions import Saved
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.test_branch_loss import start as impacting_start
 from tests.solver.test_branch_loss import worn_wall
@@ -43,13 +39,13 @@ MOST_STOPS = 2
         np.float64(0.1),
     ],
 )
-def test_plain_values_come_back(value: object) -> None:
+def test_plain_values_come_back(value):
     found = unpack(pack(value))
     assert found == value
     assert type(found) is type(value)
 
 
-def test_arrays_come_back_in_rows_and_as_copies() -> None:
+def test_arrays_come_back_in_rows_and_as_copies():
     array = np.asfortranarray(np.random.default_rng(0).normal(size=(3, 4)))
     packed = pack((array, array[:, ::2], np.array([True]), np.array([1j])))
     found = unpack(packed)
@@ -63,34 +59,25 @@ def test_arrays_come_back_in_rows_and_as_copies() -> None:
 
 
 @pytest.mark.parametrize("value", [object(), {1, 2}, np.random.default_rng(0), AUTO])
-def test_what_nobody_knows_is_refused(value: object) -> None:
+def test_what_nobody_knows_is_refused(value):
     with pytest.raises(TypeError, match="packed"):
         pack(value)
 
 
 @pytest.mark.parametrize("text", ["{", '{"what": 1}', '{"class": "Path", "fields": {}}', '{"array": 3}'])
-def test_other_texts_are_refused(text: str) -> None:
+def test_other_texts_are_refused(text):
     with pytest.raises((ValueError, KeyError, IndexError)):
         unpack(Packed(text, ()))
 
 
-def assert_same(found: object, expected: object) -> None:
+def assert_same(found, expected):
     """Equal to the last bit, but for the time that it took."""
     for entry in fields(expected):
         if entry.name != "run_time":
             np.testing.assert_array_equal(getattr(found, entry.name), getattr(expected, entry.name), err_msg=entry.name)
 
 
-def from_every_stop(
-    model: ReducedModel,
-    friction: float,
-    start: StartState,
-    wear: float,
-    step: float,
-    scheme: Scheme,
-    end: float,
-    settings: SolverSettings,
-) -> tuple[WearHistory, list[Saved]]:
+def from_every_stop(model, friction, start, wear, step, scheme, end, settings):
     """History, and the progress that was kept: from some of them it has to end the same way."""
     cycles = np.linspace(0.0, end, 5)
     kept: list[Packed] = []
@@ -107,7 +94,7 @@ def from_every_stop(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), [("implicit", 800.0), ("adaptive", 1.0)])
-def test_a_history_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_history_goes_on_to_the_same_numbers(scheme, step, monkeypatch):
     monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=8))
     (start,) = branch_states(dovetail(7), 0.5, 0.5, [2 * np.pi * 213.0], AUTO)
     whole, kept = from_every_stop(dovetail(7), 0.5, start, 1.1e-11, step, scheme, 8e3, AUTO)
@@ -118,7 +105,7 @@ def test_a_history_goes_on_to_the_same_numbers(scheme: Scheme, step: float, monk
 
 
 @pytest.mark.slow
-def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch):
     monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=30))
     settings = SolverSettings(11, 128)
     whole, kept = from_every_stop(worn_wall(1.0), 1e-3, impacting_start(), 1e-7, 100.0, "implicit", 1000.0, settings)
@@ -127,7 +114,7 @@ def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.slow
-def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_oscillation_is_seen_across_a_stop(monkeypatch):
     monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=1))
     monkeypatch.setattr(sys.modules[__name__], "MOST_STOPS", 10)
     (start,) = branch_states(seesaw(), 1e-4, 1.0, [100.0], SolverSettings(3, 128))
@@ -140,21 +127,23 @@ def test_oscillation_is_seen_across_a_stop(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.slow
-def test_a_sweep_over_a_fold_goes_on_to_the_same_numbers() -> None:
+def test_a_sweep_over_a_fold_goes_on_to_the_same_numbers():
     model, frequencies = scene("vibro_impact"), np.array([0.2, 0.255])
     kept: list[tuple[frozenset[int], Packed]] = []
     whole: dict[int, StartState] = {}
 
-    def keep(progress: Packed | str) -> None:
+    def keep(progress):
         if not isinstance(progress, str):
             kept.append((frozenset(whole), progress))
 
-    for index, start in follow_branch(model, 0.0, 0.02, frequencies, "up", AUTO, keep=keep):
+    for index, start in follow_branch(model, 0.0, 0.02, frequencies, "up", SolverSettings(7, 64), keep=keep):
         whole[index] = start
     assert [whole[index].branch for index in (0, 1)] == [0, 1]
     for done, progress in (kept[0], kept[-1]):
         left = [index for index in range(frequencies.size) if index not in done]
-        for place, start in follow_branch(model, 0.0, 0.02, frequencies[left], "up", AUTO, resume=progress):
+        for place, start in follow_branch(
+            model, 0.0, 0.02, frequencies[left], "up", SolverSettings(7, 64), resume=progress
+        ):
             wanted = whole[left[place]]
             assert_same(replace(start, state=None, reference=None), replace(wanted, state=None, reference=None))
             assert_same(start.state, wanted.state)

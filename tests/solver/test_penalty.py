@@ -1,7 +1,5 @@
 """Which formulation the scene leads to, and the motion that belongs to a force in each of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -24,15 +22,13 @@ DOVETAIL_OMEGA = 2 * np.pi * 212.0
         ("vibro_impact", {}, 1.2, False),
     ],
 )
-def test_a_mass_directly_on_a_slider_is_marched_with_its_mass(
-    name: str, values: dict[str, float], omega: float, inertial: bool, n_harmonics: int
-) -> None:
+def test_a_mass_directly_on_a_slider_is_marched_with_its_mass(name, values, omega, inertial, n_harmonics):
     penalty = build_penalty(scene(name, n_harmonics, **values), omega, n_harmonics)
     assert penalty.inertial.tolist() == [inertial]
 
 
 @pytest.mark.parametrize("n_harmonics", [1, 3, 7])
-def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness(n_harmonics: int) -> None:
+def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness(n_harmonics):
     model = dovetail()
     penalty = build_penalty(model, DOVETAIL_OMEGA, n_harmonics)
     assert not penalty.inertial.any()
@@ -50,7 +46,7 @@ def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness(n_ha
 
 @pytest.mark.parametrize("orders", [(1, 2, 3), (1, 3, 5), (1,)])
 @pytest.mark.parametrize("free", [[], [0, 2], [0, 1, 2]])
-def test_motion_and_surplus_of_a_joint_are_inverse(free: list[int], orders: tuple[int, ...]) -> None:
+def test_motion_and_surplus_of_a_joint_are_inverse(free, orders):
     model = with_free_masses(random_model(4), free)
     case = build_case(model, 0.4, OMEGA, SolverSettings(), Resolution(orders, 16))
     penalty = case.penalty
@@ -70,7 +66,7 @@ def test_motion_and_surplus_of_a_joint_are_inverse(free: list[int], orders: tupl
             assert motion[pair, 1] == pytest.approx(correction[pair, 1] / penalty.tangential[pair], rel=1e-12, abs=0.0)
 
 
-def test_the_motion_of_a_marched_mass_is_that_of_newtons_law_as_the_steps_get_short() -> None:
+def test_the_motion_of_a_marched_mass_is_that_of_newtons_law_as_the_steps_get_short():
     model = scene("sdof_slider")
     errors = []
     for samples in (32, 64, 128):

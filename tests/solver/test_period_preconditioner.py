@@ -1,7 +1,5 @@
 """The march through the period that preconditions, against the contact law, plain solves and the exact Jacobian."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,15 +7,10 @@ import pytest
 
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.model import FloatArray
 from solver.newton import linear_solver, period_preconditioner, preconditioner
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
-from solver.newton.period_preconditioner import (
-    PeriodFactor,
-    build_period_factor,
-    stiffness_of_most,
-)
+from solver.newton.period_preconditioner import PeriodFactor, build_period_factor, stiffness_of_most
 from solver.newton.preconditioner import SlipFactor, build_factor
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -28,22 +21,22 @@ SETTINGS = SolverSettings(3, 24)
 KINDS = ("3d", "constant_load", "normal_only", "3d", "one_tangent", "second_tangent", "3d", "3d")
 
 
-def tangent_of(balance: Balance, predicted: FloatArray) -> Linearisation:
+def tangent_of(balance, predicted):
     return balance.linearise(balance.evaluate(predicted))
 
 
-def case(seed: int, highest: int = 3, samples: int = 24, kinds: tuple[str, ...] = KINDS) -> tuple[Balance, FloatArray]:
+def case(seed, highest=3, samples=24, kinds=KINDS):
     resolution = Resolution(all_orders(highest), samples)
     return random_balance(random_model(seed, kinds, 4), SETTINGS, seed, wear=False, resolution=resolution)
 
 
-def factor_of(tangent: Linearisation) -> PeriodFactor:
+def factor_of(tangent):
     found = build_period_factor(tangent)
     assert found is not None
     return found
 
 
-def test_the_harmonics_that_differ_are_taken_in_exactly(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_harmonics_that_differ_are_taken_in_exactly(monkeypatch):
     # with every direction and nothing cut off it is the inverse, whatever the harmonics see
     everything = replace(NEWTON, resonant_difference=1e-9, resonances=100)
     monkeypatch.setattr(period_preconditioner, "NEWTON", everything)
@@ -57,7 +50,7 @@ def test_the_harmonics_that_differ_are_taken_in_exactly(monkeypatch: pytest.Monk
     assert np.linalg.norm(without - step) > 1e-2 * np.linalg.norm(step)
 
 
-def test_it_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see_one_stiffness() -> None:
+def test_it_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see_one_stiffness():
     # as many harmonics as samples; lines on which slip forgets all that was before it
     balance, predicted = case(5, highest=12, samples=25, kinds=("constant_load_one_tangent",) * 9)
     structure = balance.joint.structure
@@ -78,12 +71,12 @@ def test_it_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see_one_st
     assert np.linalg.norm(tangent.apply(step) - step) > 0.1 * np.linalg.norm(step)
 
 
-def products(monkeypatch: pytest.MonkeyPatch, tangent: Linearisation, right: FloatArray, accuracy: float) -> int:
+def products(monkeypatch, tangent, right, accuracy):
     """Products with the Jacobian that a direction takes; its residual is checked."""
     counted = [0]
     plain = Linearisation.apply_roughly
 
-    def apply(self: Linearisation, step: FloatArray) -> FloatArray:
+    def apply(self, step):
         counted[0] += 1
         return plain(self, step)
 
@@ -95,13 +88,13 @@ def products(monkeypatch: pytest.MonkeyPatch, tangent: Linearisation, right: Flo
 
 
 @pytest.fixture
-def large_slip_space(monkeypatch: pytest.MonkeyPatch) -> None:
+def large_slip_space(monkeypatch):
     """Every slip space is too large to be factorised."""
     monkeypatch.setattr(preconditioner, "worthwhile_directions", lambda _: 0)
 
 
 @pytest.mark.usefixtures("large_slip_space")
-def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch):
     model = dovetail()
     omega = 2.0 * np.pi * 213.0
     joint = build_case(model, 0.5, omega, SETTINGS, Resolution(all_orders(13), 128)).joint(omega, 5.0)
@@ -124,7 +117,7 @@ def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch: pytest.
 
 
 @pytest.mark.usefixtures("large_slip_space")
-def test_a_kept_one_serves_states_nearby_and_the_sign_of_the_determinant(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kept_one_serves_states_nearby_and_the_sign_of_the_determinant(monkeypatch):
     monkeypatch.setattr(linear_solver, "is_dense_cheapest", lambda *_: False)
     balance, predicted = case(8, highest=5, samples=64)
     solver = JacobianSolver()
@@ -139,7 +132,7 @@ def test_a_kept_one_serves_states_nearby_and_the_sign_of_the_determinant(monkeyp
         predicted = predicted * 1.05
 
 
-def test_masses_on_sliders_are_left_to_the_slip_space() -> None:
+def test_masses_on_sliders_are_left_to_the_slip_space():
     model = with_free_masses(random_model(10, ("3d", "3d"), 4), [0])
     balance, predicted = random_balance(model, SETTINGS, 10, wear=False)
     assert balance.joint.penalty.inertial.any()

@@ -5,8 +5,6 @@ Symmetries are checked on the state itself: it is turned, scaled or permuted and
 depend on the way by which it was found, and there may be several of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 
@@ -17,16 +15,13 @@ from hypothesis import strategies as st
 
 from solver.accuracy.options import ACCURACY
 from solver.continuation.first_state import solve_first_state
-from solver.harmonic_balance.converged import PathPoint
-from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.model import ReducedModel
+from solver.harmonic_balance.dlft import Balance
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
-from solver.results.history import WearHistory
-from solver.settings import Scheme, SolverSettings
-from solver.structure.joint import Joint, build_case
-from tests.random_scenes import RandomScene, random_scene
+from solver.settings import SolverSettings
+from solver.structure.joint import build_case
+from tests.random_scenes import random_scene
 from tests.solver.models import march_wear, start_state
 
 # for the module: a mark on a test itself would change its source, and with it what hypothesis draws
@@ -40,7 +35,7 @@ scales = st.sampled_from([2.0**-20, 2.0**-3, 2.0, 2.0**10])
 
 
 @lru_cache(maxsize=64)
-def found(seed: int) -> tuple[RandomScene, Joint, PathPoint] | None:
+def found(seed):
     """First state of a scene, without wear; None where there is none."""
     scene = random_scene(seed)
     omega = 2.0 * np.pi * scene.frequency_hz
@@ -53,7 +48,7 @@ def found(seed: int) -> tuple[RandomScene, Joint, PathPoint] | None:
     return scene, case.joint(omega, scene.amplitude), point
 
 
-def state(seed: int) -> tuple[RandomScene, Joint, Evaluation]:
+def state(seed):
     result = found(seed)
     assume(result is not None)
     assert result is not None
@@ -62,7 +57,7 @@ def state(seed: int) -> tuple[RandomScene, Joint, Evaluation]:
 
 
 @lru_cache(maxsize=64)
-def history(seed: int, scheme: Scheme, factor: float = 1.0) -> WearHistory:
+def history(seed, scheme, factor=1.0):
     """A march of three steps; wear coefficient times `factor`, cycles and step over it."""
     scene, joint, _ = state(seed)
     result = found(seed)
@@ -74,27 +69,25 @@ def history(seed: int, scheme: Scheme, factor: float = 1.0) -> WearHistory:
     return march_wear(scene.model, scene.friction, start, wear, step, scheme, cycles, SETTINGS)
 
 
-def largest_force(evaluation: Evaluation) -> float:
+def largest_force(evaluation):
     """Largest contact or predicted force, N: what round-off is compared with."""
     return max(float(np.abs(evaluation.force_t).max()), float(np.abs(evaluation.predicted_t).max()))
 
 
-def elastic_work(joint: Joint, evaluation: Evaluation) -> float:
+def elastic_work(joint, evaluation):
     """Contact forces times what they flex the pairs by, J."""
     force = joint.to_relative(evaluation.force_h)
     flexed = joint.to_relative(joint.motion(evaluation.force_h))
     return float((np.linalg.norm(force[:, 1:], axis=1) * np.linalg.norm(flexed[:, 1:], axis=1)).sum())
 
 
-def series_work(force: np.ndarray, moved: np.ndarray) -> float:
+def series_work(force, moved):
     """Work of a period, J, of series of forces and displacements (n_rel, 2H+1)."""
     turned = moved[:, 2::2] * force[:, 1::2] - moved[:, 1::2] * force[:, 2::2]
     return np.pi * float((turned * np.arange(1, SETTINGS.harmonics + 1)).sum())
 
 
-def residual_of(
-    model: ReducedModel, scene: RandomScene, evaluation: Evaluation, *, load: float = 1.0, length: float = 1.0
-) -> tuple[float, Evaluation]:
+def residual_of(model, scene, evaluation, *, load=1.0, length=1.0):
     """Scaled residual of a state in another model: forces `load` times, motion `length` times as large."""
     omega = 2.0 * np.pi * scene.frequency_hz
     case = build_case(model, scene.friction, omega, SETTINGS)
@@ -107,7 +100,7 @@ def residual_of(
 
 @profile
 @given(seeds)
-def test_signorini(seed: int) -> None:
+def test_signorini(seed):
     _, joint, at = state(seed)
     size = largest_force(at)
     assert (at.force_t[:, 0] >= 0.0).all()
@@ -122,7 +115,7 @@ def test_signorini(seed: int) -> None:
 
 @profile
 @given(seeds)
-def test_coulomb(seed: int) -> None:
+def test_coulomb(seed):
     scene, joint, at = state(seed)
     size = largest_force(at)
     tangential = np.hypot(at.force_t[:, 1], at.force_t[:, 2])
@@ -141,7 +134,7 @@ def test_coulomb(seed: int) -> None:
 
 @profile
 @given(seeds)
-def test_friction_and_wear_only_take(seed: int) -> None:
+def test_friction_and_wear_only_take(seed):
     _, joint, at = state(seed)
     assert (at.slip_work >= 0.0).all()
     # the work that the contact takes from the series of the motion, and that of the damping
@@ -163,7 +156,7 @@ def test_friction_and_wear_only_take(seed: int) -> None:
 
 @profile
 @given(seeds, st.sampled_from(["implicit", "explicit"]))
-def test_wear_never_falls(seed: int, scheme: Scheme) -> None:
+def test_wear_never_falls(seed, scheme):
     result = history(seed, scheme)
     if result.outcome is not Outcome.CONVERGED:
         # what was computed of it is kept, and nothing else
@@ -181,7 +174,7 @@ def test_wear_never_falls(seed: int, scheme: Scheme) -> None:
 
 @profile
 @given(seeds, scales)
-def test_loads_gaps_and_motion_scale_together(seed: int, scale: float) -> None:
+def test_loads_gaps_and_motion_scale_together(seed, scale):
     scene, _, at = state(seed)
     model = scene.model
     linear = replace(model.linear[0], load_static=scale * model.linear[0].load_static)
@@ -195,7 +188,7 @@ def test_loads_gaps_and_motion_scale_together(seed: int, scale: float) -> None:
 
 @profile
 @given(seeds, st.floats(0.1, 6.0))
-def test_the_tangents_may_be_turned(seed: int, angle: float) -> None:
+def test_the_tangents_may_be_turned(seed, angle):
     # in place of the tangential displacements (t1, t2) the model has those in axes that are turned by the angle
     scene, joint, at = state(seed)
     model, dofs = scene.model, scene.model.contact.dofs
@@ -233,7 +226,7 @@ def test_the_tangents_may_be_turned(seed: int, angle: float) -> None:
     assert np.abs(other.slip_work - at.slip_work).max() <= 1e-6 * at.slip_work.max() + round_off
 
 
-def test_what_is_drawn_sticks_slips_opens_and_wears() -> None:
+def test_what_is_drawn_sticks_slips_opens_and_wears():
     seen = [found(seed) for seed in range(40)]
     statuses = {int(s) for result in seen if result is not None for s in np.unique(result[2].evaluation.status_t)}
     assert statuses == {0, 1, 2}

@@ -1,7 +1,5 @@
 """Automatic states of random scenes against their exact motions: as accurate as asked for, errors not played down."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -9,12 +7,12 @@ from solver.accuracy.period_events import shortest_contact
 from solver.contact.coulomb import SEPARATED, SLIP, STICK
 from solver.outcome import Outcome
 from tests.references import coulomb_orbit, vibro_impact_orbit
-from tests.solver.random_orbits import KINDS, Scene, behind_spring, drawn, find, wall
+from tests.solver.random_orbits import KINDS, behind_spring, drawn, find, wall
 
 ROUND_OFF = 1e-10
 
 
-def barely_slipping(tangential: float, damping: float, omega: float, over: float) -> Scene:
+def barely_slipping(tangential, damping, omega, over):
     """Elastic dry friction whose limit is exceeded by a share `over` if it sticks."""
     stuck = tangential / abs(1.0 + tangential - omega**2 + 1j * omega * damping)
     return behind_spring(tangential, damping, stuck * (1.0 - over), omega, np.exp(0.7j))
@@ -38,7 +36,7 @@ UNSTABLE = {("grazing", 2): Outcome.PERIOD_DOUBLED}
 """Motions with a multiplier of -1.33, exactly (`test_floquet`): no mass stays at them."""
 
 
-def check(scene: Scene, rtol: float, sweep: str) -> None:
+def check(scene, rtol, sweep):
     found = find(scene, rtol, sweep)
     assert found.outcome is Outcome.CONVERGED
     assert max(found.response, found.wear_rate) <= rtol, found
@@ -50,7 +48,7 @@ def check(scene: Scene, rtol: float, sweep: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "seed", "rtol"), [(kind, *((2, 1e-2), (4, 1e-3))[n % 2]) for n, kind in enumerate(KINDS)]
 )
-def test_a_random_state_is_accurate_and_its_error_not_played_down(kind: str, seed: int, rtol: float) -> None:
+def test_a_random_state_is_accurate_and_its_error_not_played_down(kind, seed, rtol):
     sweep = "up" if seed % 4 else "down"
     if (kind, seed) in UNSTABLE:
         assert find(drawn(kind, seed), rtol, sweep).outcome is UNSTABLE[kind, seed]
@@ -59,12 +57,12 @@ def test_a_random_state_is_accurate_and_its_error_not_played_down(kind: str, see
 
 
 @pytest.mark.parametrize("name", HARD)
-def test_events_shorter_than_a_sample_or_a_harmonic_are_seen(name: str) -> None:
+def test_events_shorter_than_a_sample_or_a_harmonic_are_seen(name):
     check(HARD[name], 1e-2, "up")
 
 
 @pytest.mark.parametrize("kind", ["slider", "stopping slider", "two masses"])
-def test_the_pair_moves_like_the_mass_on_a_slider(kind: str) -> None:
+def test_the_pair_moves_like_the_mass_on_a_slider(kind):
     scene = drawn(kind, 2)
     at = scene.tangent
     masses = np.diag(scene.mass) > 0.0
@@ -79,14 +77,14 @@ def test_the_pair_moves_like_the_mass_on_a_slider(kind: str) -> None:
     assert scene.pair.slip_work(orbit) == pytest.approx(normal * slid, rel=1e-8)
 
 
-def test_the_pair_moves_like_the_mass_at_a_wall() -> None:
+def test_the_pair_moves_like_the_mass_at_a_wall():
     scene = wall(0.9, 1.5, 0.05, 50.0)
     orbit = scene.pair.orbit_near(np.zeros(2), np.zeros(2))
     twin = vibro_impact_orbit(1.0, 0.1, 1.0, 1.0, 50.0, 1.5, 0.9, sweep_start=0.85)
     assert scene.pair.response(orbit) == pytest.approx(np.array([twin.harmonic(0)]), rel=1e-8)
 
 
-def test_the_shortest_contact_is_counted_around_the_period() -> None:
+def test_the_shortest_contact_is_counted_around_the_period():
     status, force = np.full((3, 16), STICK), np.ones((3, 16))
     assert shortest_contact(status, force, 0.1) == 1.0
     status[1, 3:13] = SEPARATED

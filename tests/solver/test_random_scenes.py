@@ -1,18 +1,16 @@
 """A few of the random scenes of the benchmark, and that they are what they are said to be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from studies.model_check import check_model
 from tests.benchmarks.random_scenes import run_scene, solved
-from tests.random_scenes import COMPONENTS, RandomScene, random_scene
+from tests.random_scenes import COMPONENTS, random_scene
 
 SCENES = [random_scene(seed) for seed in range(200)]
 
 
-def arrays(scene: RandomScene) -> list[np.ndarray]:
+def arrays(scene):
     linear, contact = scene.model.linear[0], scene.model.contact
     return [
         *(linear.mass, linear.damping, linear.stiffness, linear.load_static, linear.load_harmonic, linear.response),
@@ -21,14 +19,14 @@ def arrays(scene: RandomScene) -> list[np.ndarray]:
     ]
 
 
-def test_a_seed_gives_one_scene() -> None:
+def test_a_seed_gives_one_scene():
     for seed in range(20):
         for one, other in zip(arrays(random_scene(seed)), arrays(SCENES[seed]), strict=True):
             assert np.array_equal(one, other)
     assert not np.array_equal(arrays(SCENES[0])[-1], arrays(SCENES[1])[-1])
 
 
-def test_all_scenes_are_possible_structures() -> None:
+def test_all_scenes_are_possible_structures():
     for scene in SCENES:
         check_model(scene.model)
         linear = scene.model.linear[0]
@@ -40,7 +38,7 @@ def test_all_scenes_are_possible_structures() -> None:
         assert scene.cycles == pytest.approx(5 * scene.step)
 
 
-def test_all_kinds_are_there() -> None:
+def test_all_kinds_are_there():
     sizes = {scene.model.contact.n_contact for scene in SCENES}
     assert sizes == set(range(1, 9))
     rows = {tuple(row >= 0) for scene in SCENES for row in scene.model.contact.dofs}
@@ -59,14 +57,14 @@ def test_all_kinds_are_there() -> None:
 
 
 @pytest.mark.slow
-def test_some_scenes_are_solved() -> None:
+def test_some_scenes_are_solved():
     # the benchmark runs 1000 of them, of which some take minutes
-    records = [run_scene(random_scene(seed)) for seed in range(105, 113)]
+    records = [run_scene(random_scene(seed)) for seed in range(107, 111)]
     unsolved = {record["seed"]: record["first"] for record in records if not solved(record)}
     # it bounces, the same with any number of harmonics from 13 to 39
     assert unsolved == {109: "period_doubled"}
     for record in records:
         assert "NaN" not in record["march"]
         assert record["march"] != "wear falls"
-    assert sum(record.get("slips", False) for record in records) >= 3
-    assert 1 <= sum(record.get("opens", False) for record in records) <= 7
+    assert sum(record.get("slips", False) for record in records) >= 2
+    assert 1 <= sum(record.get("opens", False) for record in records) <= 3

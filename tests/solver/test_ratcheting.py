@@ -1,7 +1,5 @@
 """Ratcheting of marched masses ends in shakedown, and what a state without it is worth."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,6 @@ from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
 from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
-from solver.results.history import StartState
 from solver.settings import SolverSettings
 from solver.structure.joint import Joint, build_case
 from tests.random_scenes import random_scene
@@ -23,17 +20,17 @@ SLIDING_ON = 178  # seed: it goes on slipping to and fro
 TOLERANCE = SolverSettings().tolerance
 
 
-def started(seed: int) -> StartState:
+def started(seed):
     scene = random_scene(seed)
     frequencies = np.array([scene.frequency_hz])
     return next(follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings()))[1]
 
 
-def ratcheting(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Joint, PathPoint]:
+def ratcheting(seed, monkeypatch):
     """The first state that is refined at the frequency of the scene, before its masses shake down."""
     seen: list[tuple[Joint, PathPoint]] = []
 
-    def note(level: ResolvedState, _: Budget) -> ResolvedState:
+    def note(level, _):
         seen.append((level.joint, level.point))
         return level
 
@@ -45,7 +42,7 @@ def ratcheting(seed: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Joint, PathP
 
 
 @pytest.mark.slow
-def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch):
     joint, point = ratcheting(SHAKEN_DOWN, monkeypatch)
     assert ratcheting_work(joint, point.evaluation) > 0.5 * point.evaluation.slip_work.sum()
     assert "energy_error" in certify(joint, point.evaluation).failures(TOLERANCE)
@@ -56,7 +53,7 @@ def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch: pytest.Mon
 
 
 @pytest.mark.slow
-def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch):
     joint, point = ratcheting(SLIDING_ON, monkeypatch)
     shaken = shake_down(joint, point, 1e-3, TOLERANCE, Budget())
     assert not ratchets(joint, shaken.evaluation, 1e-3)
@@ -71,7 +68,7 @@ def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch: pytest.
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [SHAKEN_DOWN, 371])
-def test_states_whose_slip_was_ratcheting_are_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_states_whose_slip_was_ratcheting_are_found(seed, monkeypatch):
     assert started(seed).outcome is Outcome.CONVERGED
     if seed != SHAKEN_DOWN:
         # without shakedown it tries all harmonics in vain, for minutes
@@ -81,7 +78,7 @@ def test_states_whose_slip_was_ratcheting_are_found(seed: int, monkeypatch: pyte
 
 
 @pytest.mark.slow
-def test_wear_of_other_harmonics_is_not_that_of_ratcheting_to_their_mean_position() -> None:
+def test_wear_of_other_harmonics_is_not_that_of_ratcheting_to_their_mean_position():
     # shaken down with 3 harmonics it slips 1e-12 N m on to where 9 have it, a thousand times what is left there
     start = started(710)
     assert start.outcome is Outcome.CONVERGED

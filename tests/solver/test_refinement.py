@@ -1,7 +1,5 @@
 """How states choose their harmonics and samples, and their error estimates against much finer states."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,17 +10,16 @@ from solver.accuracy import refinement
 from solver.accuracy.certificate import certify
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.options import ACCURACY
-from solver.accuracy.refinement import Refined, refine
+from solver.accuracy.refinement import refine
 from solver.contact.coulomb import SLIP, STICK
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.response_peak import largest_responses
-from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import to_complex
-from solver.structure.joint import Case, build_case
+from solver.structure.joint import build_case
 from tests.solver.models import OMEGA, first_point, random_model, scene
 
 SLIDER_OMEGA = 0.6 * float(np.sqrt(1.6e6))
@@ -30,23 +27,16 @@ SLIPPING = 400.0  # N: excitation at which the pairs of the random models slip
 FRICTION = 0.4
 
 
-def started(
-    model: ReducedModel,
-    friction: float,
-    omega: float,
-    amplitude: float,
-    settings: SolverSettings,
-    resolution: Resolution | None = None,
-) -> tuple[Case, PathPoint]:
+def started(model, friction, omega, amplitude, settings, resolution=None):
     case = build_case(model, friction, omega, settings, resolution)
     return case, first_point(case, omega, amplitude, np.zeros(model.contact.n_contact))
 
 
-def slider(settings: SolverSettings, force: float = 10.0) -> tuple[Case, PathPoint]:
+def slider(settings, force=10.0):
     return started(scene("sdof_slider", normal_stiffness=0.0), 0.5, SLIDER_OMEGA, force, settings)
 
 
-def solved_at(case: Case, omega: float, amplitude: float, point: PathPoint, resolution: Resolution) -> PathPoint:
+def solved_at(case, omega, amplitude, point, resolution):
     """The same state with other harmonics and samples, which must be found."""
     other = case.at(resolution)
     balance, start = transfer(other, other.joint(omega, amplitude), point.evaluation, case.resolution.orders)
@@ -55,12 +45,12 @@ def solved_at(case: Case, omega: float, amplitude: float, point: PathPoint, reso
     return PathPoint(point.parameter, result.evaluation, final_history(balance, result.evaluation))
 
 
-def response(case: Case, omega: float, amplitude: float, point: PathPoint) -> np.ndarray:
+def response(case, omega, amplitude, point):
     joint = case.joint(omega, amplitude)
     return to_complex(joint.structure.response_h(joint.to_relative(point.evaluation.displacement_h)))[:, 0]
 
 
-def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics() -> None:
+def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics():
     case, point = slider(SolverSettings())
     assert case.resolution.orders == (1, 2, 3)
     refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
@@ -81,7 +71,7 @@ def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics() -> 
     assert response(other, SLIDER_OMEGA, 10.0, every) == pytest.approx(ours, rel=1e-6)
 
 
-def test_a_state_with_even_harmonics_keeps_them() -> None:
+def test_a_state_with_even_harmonics_keeps_them():
     case, point = started(random_model(2), FRICTION, OMEGA, SLIPPING, SolverSettings())
     refined = refine(case, OMEGA, SLIPPING, point, Budget())
     orders = refined.case.resolution.orders
@@ -90,7 +80,7 @@ def test_a_state_with_even_harmonics_keeps_them() -> None:
 
 
 @pytest.mark.parametrize("settings", [SolverSettings(), SolverSettings(samples=128)])
-def test_a_stuck_state_keeps_the_first_harmonic_alone(settings: SolverSettings) -> None:
+def test_a_stuck_state_keeps_the_first_harmonic_alone(settings):
     amplitude = 1e-2
     case, point = started(random_model(1), FRICTION, OMEGA, amplitude, settings)
     # the second solve starts from where the first one slipped to: everything sticks
@@ -107,9 +97,7 @@ def test_a_stuck_state_keeps_the_first_harmonic_alone(settings: SolverSettings) 
 
 
 @pytest.mark.parametrize(("name", "most"), [("most_samples", 64), ("node_unknowns", 5)])
-def test_a_state_that_is_not_allowed_what_it_needs_says_so(
-    name: str, most: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_state_that_is_not_allowed_what_it_needs_says_so(name, most, monkeypatch):
     case, point = slider(SolverSettings(rtol=1e-4))
     monkeypatch.setattr(refinement, "ACCURACY", replace(ACCURACY, **{name: most}))
     refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
@@ -124,7 +112,7 @@ def test_a_state_that_is_not_allowed_what_it_needs_says_so(
     assert ACCURACY.harmonic_levels[-1] >= resolution.highest
 
 
-def test_a_state_far_better_than_needed_goes_down_to_fewer() -> None:
+def test_a_state_far_better_than_needed_goes_down_to_fewer():
     model = scene("sdof_slider", normal_stiffness=0.0)
     settings, rich = SolverSettings(rtol=0.05), Resolution((1, 3, 5, 7, 9), 256)
     case, point = started(model, 0.5, SLIDER_OMEGA, 10.0, settings, rich)
@@ -146,7 +134,7 @@ def test_a_state_far_better_than_needed_goes_down_to_fewer() -> None:
 KINDS: Sequence[str] = ("constant_load", "constant_load_one_tangent", "constant_load")
 
 
-def true_error(refined: Refined, amplitude: float, fine: Resolution) -> Estimate:
+def true_error(refined, amplitude, fine):
     """Error against the same state with far more harmonics and samples."""
     case = refined.case
     steps = (Resolution(all_orders(25), 4096), fine)
@@ -166,10 +154,9 @@ def true_error(refined: Refined, amplitude: float, fine: Resolution) -> Estimate
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("amplitude", "rtol", "fine"),
-    [(100.0, 1e-2, 25), (800.0, 1e-2, 25), (200.0, 1e-3, 115), (400.0, 1e-3, 115)],
+    ("amplitude", "rtol", "fine"), [(100.0, 1e-2, 25), (800.0, 1e-2, 25), (200.0, 1e-3, 115), (400.0, 1e-3, 115)]
 )
-def test_estimates_of_elastic_joints_are_at_least_half_the_error(amplitude: float, rtol: float, fine: int) -> None:
+def test_estimates_of_elastic_joints_are_at_least_half_the_error(amplitude, rtol, fine):
     case, point = started(random_model(4, KINDS), FRICTION, OMEGA, amplitude, SolverSettings(rtol=rtol))
     assert SLIP in point.evaluation.status_t
     assert not case.penalty.inertial.any()
@@ -181,7 +168,7 @@ def test_estimates_of_elastic_joints_are_at_least_half_the_error(amplitude: floa
     assert error.wear_rate <= min(rtol, 2.0 * refined.estimate.wear_rate)
 
 
-def test_a_state_of_odd_harmonics_takes_even_ones_again_where_its_forces_have_them() -> None:
+def test_a_state_of_odd_harmonics_takes_even_ones_again_where_its_forces_have_them():
     # as after a state so faint that it looked symmetric: with odd harmonics alone friction exceeds its limit
     model, settings = random_model(1, ("3d", "one_tangent")), SolverSettings()
     case, whole = started(model, FRICTION, OMEGA, SLIPPING, settings, Resolution(all_orders(9), 128))

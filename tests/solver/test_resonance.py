@@ -1,12 +1,9 @@
 """The resonance of a vibration, and marches that end where it has shifted."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from solver import build_model, march_wear
-from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.resonance import resonance_frequency
 from solver.settings import Resolution, SolverSettings, WearTarget, all_orders
@@ -17,7 +14,7 @@ MASS = np.diag([0.05, 0.05, 0.2])
 FREQUENCY, AMPLITUDE, FRICTION, WEAR, END = 505.0, 5.0, 0.5, 1.1e-11, 1e5
 
 
-def foot() -> ReducedModel:
+def foot():
     """A foot pressed by 50 N, and a tip on a spring above it; the response is that of all displacements."""
     return build_model(
         mass=MASS,
@@ -31,7 +28,7 @@ def foot() -> ReducedModel:
     )
 
 
-def resonances(response: np.ndarray, frequency: float) -> FloatArray:
+def resonances(response, frequency):
     """Hz, from first harmonics (n, 3) of all displacements of the foot."""
     in_phase = AMPLITUDE * response[:, 2].real
     inertia = np.real(np.sum(response.conj() * (response @ MASS), axis=1))
@@ -39,7 +36,7 @@ def resonances(response: np.ndarray, frequency: float) -> FloatArray:
 
 
 @pytest.mark.parametrize("nodal_diameter", [None, 0, 3])
-def test_it_is_that_of_the_equation_of_motion(nodal_diameter: int | None) -> None:
+def test_it_is_that_of_the_equation_of_motion(nodal_diameter):
     if nodal_diameter is None:
         balance, predicted = random_balance(random_model(3, ("3d",) * 4, 4), SolverSettings(3, 24), 3, wear=False)
     else:
@@ -69,7 +66,7 @@ def test_it_is_that_of_the_equation_of_motion(nodal_diameter: int | None) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["implicit", "adaptive"])
-def test_a_march_ends_where_the_resonance_has_shifted(scheme: str) -> None:
+def test_a_march_ends_where_the_resonance_has_shifted(scheme):
     model, counts = foot(), np.linspace(0.0, END, 101)
     arguments = {"friction_coefficient": FRICTION, "wear_coefficient": WEAR, "scheme": scheme, "step": 2000.0}
     whole = march_wear(model, FREQUENCY, AMPLITUDE, cycles=counts, **arguments)

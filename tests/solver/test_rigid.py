@@ -1,7 +1,5 @@
 """Rigid friction at the tip of a cantilever, and the peak of a response, against exact motions."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 
@@ -11,10 +9,8 @@ import pytest
 from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.prolongation import carried_history
 from solver.harmonic_balance.response_peak import largest_responses, tail_orders
-from solver.model import ReducedModel
 from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
-from solver.results.history import StartState
 from solver.settings import Resolution, SolverSettings
 from solver.structure.fourier import synthesis
 from solver.structure.joint import build_case
@@ -33,7 +29,7 @@ CASES = [  # spring, force, N, frequency, rad/s, rtol; `python -m tests.benchmar
 
 
 @lru_cache
-def exact(name: str, force: float, omega: float) -> tuple[complex, float]:
+def exact(name, force, omega):
     """First harmonic and largest displacement of the tip, m."""
     beam = Cantilever(spring=SPRINGS[name])
     orbit, tip = beam.orbit(force, omega), beam.tip_of_orbit()
@@ -41,9 +37,7 @@ def exact(name: str, force: float, omega: float) -> tuple[complex, float]:
     return complex(first), float(np.abs(tip @ orbit.sample(4096)[: tip.size]).max())
 
 
-def reported(
-    model: ReducedModel, friction: float, start: StartState, settings: SolverSettings
-) -> tuple[complex, float]:
+def reported(model, friction, start, settings):
     """First harmonic and largest value, m, that are reported of the response of an unworn state."""
     history = march_wear(model, friction, start, 0.0, 1.0, "explicit", np.zeros(1), settings)
     return complex(history.response[0, 0]), float(history.response_peak[0, 0])
@@ -51,9 +45,7 @@ def reported(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "force", "omega", "rtol"), CASES)
-def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(
-    name: str, force: float, omega: float, rtol: float
-) -> None:
+def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(name, force, omega, rtol):
     model, settings = Cantilever(spring=SPRINGS[name]).model(), SolverSettings(rtol=rtol)
     (start,) = branch_states(model, FRICTION, force, [omega], settings)
     assert start.outcome is Outcome.CONVERGED
@@ -65,7 +57,7 @@ def test_a_cantilever_with_rigid_friction_is_as_accurate_as_was_asked_for(
     assert 0.5 * max(error, peak_error) < start.response_error <= rtol
 
 
-def test_a_mass_behind_a_spring_is_marched_as_long_as_it_is_seen() -> None:
+def test_a_mass_behind_a_spring_is_marched_as_long_as_it_is_seen():
     # the spring of 200 N/m and the tip's 0.05 kg are in resonance at 63 rad/s
     sprung, rigid = Cantilever(spring=200.0).model(), Cantilever().model()
     assert [bool(build_penalty(sprung, 1.0, highest).inertial[0]) for highest in (3, 27, 79, 165)] == [1, 1, 0, 0]
@@ -74,7 +66,7 @@ def test_a_mass_behind_a_spring_is_marched_as_long_as_it_is_seen() -> None:
     assert build_penalty(sprung, 1.0, 1000).tangential[0] == pytest.approx(200.0, rel=1e-2)
 
 
-def test_the_tail_of_the_friction_force_belongs_to_the_peak() -> None:
+def test_the_tail_of_the_friction_force_belongs_to_the_peak():
     omega, settings = 0.62 * NATURAL, SolverSettings(harmonics=9, samples=512)
     model = scene("sdof_slider", normal_stiffness=0.0)
     case = build_case(model, 0.5, omega, settings)
@@ -92,7 +84,7 @@ def test_the_tail_of_the_friction_force_belongs_to_the_peak() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("first", "second"), [(79, 27)])
-def test_a_state_is_found_again_where_its_mass_is_no_longer_marched(first: int, second: int) -> None:
+def test_a_state_is_found_again_where_its_mass_is_no_longer_marched(first, second):
     beam, omega, force = Cantilever(spring=200.0), 0.85, 6.0
     rich, poor = (Resolution(tuple(range(1, highest + 1, 2)), 1024) for highest in (first, second))
     case = build_case(beam.model(), FRICTION, omega, SolverSettings(), rich)
@@ -106,7 +98,7 @@ def test_a_state_is_found_again_where_its_mass_is_no_longer_marched(first: int, 
         assert abs(each.response()[0] / exact("stiff spring", force, omega)[0] - 1.0) < 0.02
 
 
-def test_what_a_state_carries_into_the_terms_of_another_penalty() -> None:
+def test_what_a_state_carries_into_the_terms_of_another_penalty():
     omega, force = 0.85, 6.0
     case = build_case(Cantilever(spring=200.0).model(), FRICTION, omega, SolverSettings(), Resolution((1, 3, 5), 64))
     joint = case.joint(omega, force)

@@ -1,16 +1,13 @@
 """Products of three digits, against those with the matrices themselves."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from solver.model import LinearModel
 from solver.structure import condensation
 from solver.structure import rough_forms as room
-from solver.structure.condensation import CondensedStructure, build_structure
+from solver.structure.condensation import build_structure
 from solver.structure.harmonic_stiffness import SharedStiffness
 from solver.structure.options import STRUCTURE
 from tests.solver.models import scene
@@ -20,18 +17,18 @@ ORDERS = tuple(range(1, 14))
 
 
 @pytest.fixture
-def shared(monkeypatch: pytest.MonkeyPatch) -> None:
+def shared(monkeypatch):
     """Even small structures share their matrices."""
     monkeypatch.setattr(condensation, "STRUCTURE", replace(STRUCTURE, dense_bytes=0.0))
 
 
-def structure_of(linear: LinearModel) -> CondensedStructure:
+def structure_of(linear):
     structure = build_structure(replace(scene("dovetail_sector", 13, mesh=1), linear={0: linear}), OMEGA, 0.5, ORDERS)
     assert isinstance(structure.moving, SharedStiffness)
     return structure
 
 
-def error(structure: CondensedStructure) -> float:
+def error(structure):
     """Largest error of a force over the largest force."""
     motion = np.random.default_rng(1).normal(size=(structure.static_force.size, 2 * len(ORDERS) + 1))
     exact = structure.apply(motion)
@@ -40,9 +37,7 @@ def error(structure: CondensedStructure) -> float:
 
 @pytest.mark.usefixtures("shared")
 @pytest.mark.parametrize(("directions", "least", "most"), [(6, 1e-5, 1e-3), (48, 0.0, 1e-6)])
-def test_few_motions_carry_the_mass(
-    monkeypatch: pytest.MonkeyPatch, directions: int, least: float, most: float
-) -> None:
+def test_few_motions_carry_the_mass(monkeypatch, directions, least, most):
     monkeypatch.setattr(room, "STRUCTURE", replace(STRUCTURE, rough_directions=directions))
     # one of its own: forms are kept by structure
     structure = structure_of(replace(scene("dovetail_sector", 13, mesh=1).linear[0]))
@@ -55,9 +50,7 @@ def test_few_motions_carry_the_mass(
 
 
 @pytest.mark.usefixtures("shared")
-def test_where_many_motions_are_damped_in_their_own_way_each_harmonic_has_its_matrix(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_where_many_motions_are_damped_in_their_own_way_each_harmonic_has_its_matrix(monkeypatch):
     monkeypatch.setattr(room, "STRUCTURE", replace(STRUCTURE, rough_directions=4))
     model = scene("dovetail_sector", 13, mesh=1)
     relative = model.contact.dofs.ravel()

@@ -1,14 +1,10 @@
 """Factorisation in the slip space against a dense one of the whole Jacobian."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.model import FloatArray
 from solver.newton import preconditioner
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
@@ -22,7 +18,7 @@ KINDS = ("3d", "constant_load", "normal_only", "3d", "3d", "3d", "3d", "3d", "3d
 MANY = 10**6
 
 
-def case(seed: int, wear: bool = True) -> tuple[Balance, FloatArray]:
+def case(seed, wear=True):
     """12 pairs of all kinds, of which the last three stay pressed and stuck."""
     balance, predicted = random_balance(random_model(seed, KINDS, 4), SETTINGS, seed, wear=wear)
     pressed = (balance.joint.component_index // 3 >= 9) & (balance.joint.component_index % 3 == 0)
@@ -31,17 +27,17 @@ def case(seed: int, wear: bool = True) -> tuple[Balance, FloatArray]:
     return balance, predicted
 
 
-def tangent_of(balance: Balance, predicted: FloatArray) -> Linearisation:
+def tangent_of(balance, predicted):
     return balance.linearise(balance.evaluate(predicted))
 
 
-def dense_of(tangent: Linearisation) -> FloatArray:
+def dense_of(tangent):
     return tangent.dense(np.arange(tangent.joint.contact.n_contact))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("wear", [False, True])
-def test_the_whole_slip_space_gives_the_solution_and_the_determinant(seed: int, wear: bool) -> None:
+def test_the_whole_slip_space_gives_the_solution_and_the_determinant(seed, wear):
     balance, predicted = case(seed, wear)
     tangent = tangent_of(balance, predicted)
     space = find_slip_space(tangent, MANY)
@@ -58,7 +54,7 @@ def test_the_whole_slip_space_gives_the_solution_and_the_determinant(seed: int, 
     assert found.sign == np.linalg.slogdet(dense)[0]
 
 
-def test_the_sign_of_the_determinant_is_followed_through_zero() -> None:
+def test_the_sign_of_the_determinant_is_followed_through_zero():
     balance, predicted = case(4)
     signs = set()
     for scale in np.linspace(-3.0, 3.0, 13):
@@ -69,7 +65,7 @@ def test_the_sign_of_the_determinant_is_followed_through_zero() -> None:
     assert signs == {1.0, -1.0}
 
 
-def test_the_largest_directions_steer_the_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_largest_directions_steer_the_iteration(monkeypatch):
     balance, predicted = case(5)
     tangent = tangent_of(balance, predicted)
     whole = find_slip_space(tangent, MANY)
@@ -92,7 +88,7 @@ def test_the_largest_directions_steer_the_iteration(monkeypatch: pytest.MonkeyPa
     assert JacobianSolver().determinant_sign(tangent) == np.linalg.slogdet(dense_of(tangent))[0]
 
 
-def test_where_everything_sticks_there_is_no_slip_space() -> None:
+def test_where_everything_sticks_there_is_no_slip_space():
     balance, predicted = case(9, wear=False)
     pressed = predicted.copy()
     pressed[balance.joint.component_index % 3 == 0, 0] += 1e4 * PRELOAD

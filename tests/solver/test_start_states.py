@@ -1,9 +1,5 @@
 """Sweeps against exact motions, and their convergence with samples and harmonics."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -11,7 +7,6 @@ from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.results.history import PeriodicState
 from solver.settings import SolverSettings
 from tests.references import coulomb_orbit, vibro_impact_orbit
 from tests.solver.models import branch_states, converged_state, scene
@@ -22,12 +17,12 @@ TWO_MASSES = ([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1
 VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
 
 
-def first_harmonic(model: str, state: PeriodicState, **values: float) -> np.ndarray:
+def first_harmonic(model, state, **values):
     return np.abs(full_motion(scene(model, **values), state).displacement[1])
 
 
 @pytest.mark.slow
-def test_two_masses_converge_with_the_square_of_the_harmonics_at_least() -> None:
+def test_two_masses_converge_with_the_square_of_the_harmonics_at_least():
     orbit = coulomb_orbit(*TWO_MASSES, 0.5)
     expected = abs(orbit.harmonic(1))
     harmonics = np.array([3, 5, 9, 15])
@@ -39,7 +34,7 @@ def test_two_masses_converge_with_the_square_of_the_harmonics_at_least() -> None
 
 
 @pytest.mark.slow
-def test_a_sweep_up_stays_on_the_branch_with_impacts() -> None:
+def test_a_sweep_up_stays_on_the_branch_with_impacts():
     omegas = np.round(np.arange(0.85, 1.501, 0.05), 10)
     starts = branch_states(scene("vibro_impact"), 0.0, 0.02, omegas, FINE, "up")
     for omega, start in zip(omegas, starts, strict=True):
@@ -51,7 +46,7 @@ def test_a_sweep_up_stays_on_the_branch_with_impacts() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("omega", [1.5])
-def test_a_single_frequency_deep_in_the_bistable_range_knows_its_branch(omega: float) -> None:
+def test_a_single_frequency_deep_in_the_bistable_range_knows_its_branch(omega):
     # both branches exist from 1.0919 to 1.5576 rad/s
     model = scene("vibro_impact")
     (rising,), (falling,) = (branch_states(model, 0.0, 0.02, [omega], FINE, sweep) for sweep in ("up", "down"))
@@ -67,7 +62,7 @@ def test_a_single_frequency_deep_in_the_bistable_range_knows_its_branch(omega: f
 @pytest.mark.parametrize(
     ("sweep", "omegas", "fold"), [("up", [1.5, 1.54, 1.58, 1.65], 1.5576), ("down", [1.0, 1.05, 1.12, 1.2], 1.09195)]
 )
-def test_a_fold_is_found_and_the_branch_behind_it_counted(sweep: str, omegas: list[float], fold: float) -> None:
+def test_a_fold_is_found_and_the_branch_behind_it_counted(sweep, omegas, fold):
     starts = branch_states(scene("vibro_impact"), 0.0, 0.02, omegas, FINE, sweep)
     in_order = starts if sweep == "up" else starts[::-1]
     assert [start.outcome for start in starts] == [Outcome.CONVERGED] * 4
@@ -82,7 +77,7 @@ def test_a_fold_is_found_and_the_branch_behind_it_counted(sweep: str, omegas: li
     assert with_impacts == ([True, True, False, False] if sweep == "up" else [False, False, True, True])
 
 
-def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be() -> None:
+def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be():
     # Mass 1 between two springs, mass 2 held: K + i w C - w^2 M is exactly zero at 2 rad/s.
     model = scene("two_masses", stiffness_1=3.0, stiffness_2=1.0, damping_1=0.0, damping_2=0.0)
     frequency = 2.0 / (2 * np.pi)
@@ -92,8 +87,8 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be() -> Non
     assert starts[0].state is None
 
 
-def test_a_sweep_that_finds_no_state_has_nothing_to_keep(monkeypatch: pytest.MonkeyPatch) -> None:
-    def in_vain(*given: Any) -> tuple[Outcome, None]:
+def test_a_sweep_that_finds_no_state_has_nothing_to_keep(monkeypatch):
+    def in_vain(*given):
         given[-1].iterations += 1000
         return Outcome.STATIC_FAILED, None
 

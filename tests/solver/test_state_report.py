@@ -1,7 +1,5 @@
 """Static and periodic states against equilibrium, the contact law and the energy; reports against time signals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 
@@ -10,15 +8,11 @@ import pytest
 
 from solver.accuracy.certificate import certify
 from solver.continuation.first_state import solve_static_state
-from solver.harmonic_balance.converged import PathPoint
-from solver.harmonic_balance.dlft import Evaluation
-from solver.model import FloatArray, ReducedModel
 from solver.newton.solve_balance import Budget
-from solver.results.history import PeriodicState
 from solver.results.state_report import periodic_state, report_state
 from solver.settings import RESOLUTION, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
-from solver.structure.joint import Case, Joint, build_case
+from solver.structure.joint import build_case
 from tests.solver.contact_twin import pair_period, status
 from tests.solver.models import OMEGA, first_point, random_model
 from tests.solver.reconstruction import contact_work, full_motion, series
@@ -32,12 +26,12 @@ KINDS = {
 }
 
 
-def case_of(kinds: str, seed: int) -> Case:
+def case_of(kinds, seed):
     return build_case(random_model(seed, KINDS[kinds]), FRICTION, OMEGA, SETTINGS)
 
 
 @lru_cache
-def periodic(kinds: str, seed: int) -> tuple[Joint, PathPoint, PeriodicState]:
+def periodic(kinds, seed):
     case = case_of(kinds, seed)
     worn = np.random.default_rng(seed).uniform(0.0, 2e-6, case.model.contact.n_contact)
     point = first_point(case, OMEGA, AMPLITUDE, worn)
@@ -45,13 +39,13 @@ def periodic(kinds: str, seed: int) -> tuple[Joint, PathPoint, PeriodicState]:
     return joint, point, periodic_state(joint, point)
 
 
-def static_point(case: Case, wear_depth: FloatArray, tolerance: float = 1e-10) -> PathPoint:
+def static_point(case, wear_depth, tolerance=1e-10):
     point = solve_static_state(case.joint(OMEGA, 0.0), wear_depth, tolerance, Budget())
     assert point is not None
     return point
 
 
-def check_static(model: ReducedModel, evaluation: Evaluation, friction: float) -> None:
+def check_static(model, evaluation, friction):
     """Equilibrium of the full structure, Signorini and Coulomb, in displacements and forces."""
     contact, linear = model.contact, model.linear[0]
     force, moved = evaluation.force_h[:, :, 0], evaluation.displacement_h[:, :, 0]
@@ -77,7 +71,7 @@ def check_static(model: ReducedModel, evaluation: Evaluation, friction: float) -
 
 @pytest.mark.parametrize("kinds", KINDS)
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_the_static_state_is_in_equilibrium_and_obeys_the_contact_law(kinds: str, seed: int) -> None:
+def test_the_static_state_is_in_equilibrium_and_obeys_the_contact_law(kinds, seed):
     case = case_of(kinds, seed)
     n_contact = case.model.contact.n_contact
     worn = np.random.default_rng(seed).uniform(0.0, 4e-5, n_contact)
@@ -87,7 +81,7 @@ def test_the_static_state_is_in_equilibrium_and_obeys_the_contact_law(kinds: str
 
 @pytest.mark.parametrize("kinds", KINDS)
 @pytest.mark.parametrize("seed", [1, 2])
-def test_a_periodic_state_is_in_equilibrium_in_every_harmonic(kinds: str, seed: int) -> None:
+def test_a_periodic_state_is_in_equilibrium_in_every_harmonic(kinds, seed):
     _, point, state = periodic(kinds, seed)
     assert point.parameter == 1.0
     motion = full_motion(case_of(kinds, seed).model, state)
@@ -100,7 +94,7 @@ def test_a_periodic_state_is_in_equilibrium_in_every_harmonic(kinds: str, seed: 
 
 @pytest.mark.parametrize("kinds", KINDS)
 @pytest.mark.parametrize("seed", [1, 2])
-def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds: str, seed: int) -> None:
+def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds, seed):
     joint, _, state = periodic(kinds, seed)
     model = case_of(kinds, seed).model
     motion = full_motion(model, state)
@@ -134,29 +128,17 @@ def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds: str, s
 
 @pytest.mark.parametrize("kinds", KINDS)
 @pytest.mark.parametrize("seed", [1, 2])
-def test_every_sample_of_a_periodic_state_obeys_the_contact_law(kinds: str, seed: int) -> None:
+def test_every_sample_of_a_periodic_state_is_what_the_plain_law_says(kinds, seed):
+    """That samples obey Signorini and Coulomb is in `test_properties`."""
     at = periodic(kinds, seed)[1].evaluation
-    normal = at.force_t[:, 0]
-    assert (normal >= 0).all()
-    assert (np.hypot(at.force_t[:, 1], at.force_t[:, 2]) <= FRICTION * normal * (1 + 1e-15)).all()
-    # pressed: no opening left in the predicted force; open: no force at all
-    assert np.array_equal(normal, np.maximum(at.predicted_t[:, 0], 0.0))
-    assert not at.force_t[:, 1:][np.repeat((normal == 0)[:, None], 2, axis=1)].any()
-    # slip along the friction force; none while it is below the limit
-    slip = np.diff(at.state_t)
-    along = np.einsum("pcn,pcn->pn", slip, at.force_t[:, 1:])
-    sizes = np.hypot(slip[:, 0], slip[:, 1]) * np.hypot(at.force_t[:, 1], at.force_t[:, 2])
-    assert along == pytest.approx(sizes, abs=1e-9 * max(sizes.max(), 1.0))
-    assert not slip[:, :][np.repeat((at.status_t == 1)[:, None], 2, axis=1)].any()
-    # what the state repeats, and what the statuses mean
-    assert at.periodicity_error <= 1e-9 * max(float(normal.max()), 1.0)
-    for pair in range(normal.shape[0]):
+    assert at.periodicity_error <= 1e-9 * max(float(at.force_t[:, 0].max()), 1.0)
+    for pair in range(len(at.force_t)):
         expected = status(at.predicted_t[pair], FRICTION, at.state_t[pair, :, :-1])
         assert np.array_equal(at.status_t[pair], expected)
 
 
 @pytest.mark.parametrize("kinds", KINDS)
-def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
+def test_the_report_is_that_of_the_time_signals(kinds):
     joint, point, state = periodic(kinds, 1)
     report = report_state(joint, point.evaluation, certify(joint, point.evaluation))
     model = case_of(kinds, 1).model
@@ -181,7 +163,7 @@ def test_the_report_is_that_of_the_time_signals(kinds: str) -> None:
     assert np.array_equal(report.wear_depth, state.wear_depth)
 
 
-def test_a_structure_that_only_friction_holds_slides_until_its_weak_springs_carry_the_rest() -> None:
+def test_a_structure_that_only_friction_holds_slides_until_its_weak_springs_carry_the_rest():
     model = random_model(7, ("constant_load", "constant_load"), n_inner=0)
     linear = model.linear[0]
     loose = replace(linear, stiffness=1e-6 * linear.stiffness, load_static=np.full(4, 1e4))

@@ -1,18 +1,14 @@
 """Steps that wear off too much: seen by the share of the preload that they move, and never reported as results."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
 from solver.continuation.first_state import solve_static_state
-from solver.model import FloatArray
 from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
-from solver.results.history import StartState
-from solver.settings import Scheme, SolverSettings
+from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from solver.wear.options import WEAR
 from solver.wear.step_limit import moved_fraction, too_long
@@ -25,14 +21,14 @@ CYCLES = np.array([0.0, 1000.0, 5000.0])
 
 
 @lru_cache
-def start() -> StartState:
+def start():
     omegas = 2.0 * np.pi * np.array([FREQUENCY])
     (state,) = branch_states(dovetail(), FRICTION, 0.5, omegas, SETTINGS)
     assert state.outcome is Outcome.CONVERGED
     return state
 
 
-def test_the_share_is_that_by_which_the_normal_forces_change() -> None:
+def test_the_share_is_that_by_which_the_normal_forces_change():
     # without friction the pairs stay closed and slide freely: the static state is linear in the depth
     case = build_case(dovetail(), 0.0, 2.0 * np.pi * FREQUENCY, SETTINGS)
     joint = case.joint(2.0 * np.pi * FREQUENCY, 0.0)
@@ -48,7 +44,7 @@ def test_the_share_is_that_by_which_the_normal_forces_change() -> None:
     assert moved_fraction(joint, states[0], depth) == pytest.approx(change, rel=1e-6, abs=0.0)
 
 
-def test_the_reason_names_the_step_and_one_that_would_do() -> None:
+def test_the_reason_names_the_step_and_one_that_would_do():
     case = build_case(dovetail(), FRICTION, 2.0 * np.pi * FREQUENCY, SETTINGS)
     joint = case.joint(2.0 * np.pi * FREQUENCY, 0.0)
     point = solve_static_state(joint, np.zeros(16), 1e-10, Budget())
@@ -64,21 +60,21 @@ def test_the_reason_names_the_step_and_one_that_would_do() -> None:
     assert "at most 5 cycles" in said
 
 
-def last_volume(wear_coefficient: float, scheme: Scheme, step: float, cycles: FloatArray) -> tuple[Outcome, float, str]:
+def last_volume(wear_coefficient, scheme, step, cycles):
     history = march_wear(dovetail(), FRICTION, start(), wear_coefficient, step, scheme, cycles, SETTINGS)
     return history.outcome, float(history.worn_volume[-1]), history.message
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["explicit", "implicit"])
-def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long(scheme: Scheme) -> None:
+def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long(scheme):
     outcome, _, message = last_volume(1.1e-5, scheme, 1000.0, CYCLES)
     assert outcome is Outcome.STEP_TOO_LONG
     assert "from cycle 0 on" in message
 
 
 @pytest.mark.slow
-def test_the_step_that_is_advised_is_none_too_long() -> None:
+def test_the_step_that_is_advised_is_none_too_long():
     _, _, message = last_volume(1.1e-5, "explicit", 1000.0, CYCLES)
     advised = float(message.split("at most ")[1].split()[0])
     assert 1e-4 < advised < 1e-2

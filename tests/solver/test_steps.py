@@ -1,9 +1,6 @@
 """Single steps on the slow time scale, their control, and the state that they take and give."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -15,16 +12,16 @@ from solver.packing import in_rows, pack, unpack
 from solver.settings import Scheme, SolverSettings
 from solver.wear import control
 from solver.wear.check import chosen_for_another
-from solver.wear.control import AdaptiveSteps, Control, GivenSteps
+from solver.wear.control import AdaptiveSteps, GivenSteps
 from solver.wear.options import WEAR as OPTIONS
-from solver.wear.state import Choice, WearState
+from solver.wear.state import Choice
 from solver.wear.step import Step
 from tests.solver.worn_slider import AREA, END, WEAR, begun
 
 SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit")
 
 
-def steps_of(plan: Control, n_steps: int, wear: float = WEAR) -> tuple[list[WearState], list[Step]]:
+def steps_of(plan, n_steps, wear=WEAR):
     """The unworn state and those behind each of the first steps, and the steps."""
     work, state = begun(wear)
     states, steps = [plan.begin(work, state)], []
@@ -37,27 +34,27 @@ def steps_of(plan: Control, n_steps: int, wear: float = WEAR) -> tuple[list[Wear
     return states, steps
 
 
-def depths(states: list[WearState]) -> np.ndarray:
+def depths(states):
     return np.array([state.depth[0] for state in states])
 
 
-def rates(states: list[WearState]) -> np.ndarray:
+def rates(states):
     """m per cycle."""
     return np.array([state.rates.value[-1] for state in states]) / AREA
 
 
-def counts(states: list[WearState]) -> np.ndarray:
+def counts(states):
     return np.array([state.cycle for state in states])
 
 
-def bdf2_depth(length: float, before: float, grown: float, depth: float, rate: float) -> float:
+def bdf2_depth(length, before, grown, depth, rate):
     """Depth behind a step; grown: in the step before, whose length is `before`. rate: at its end."""
     w = length / before
     return depth + w**2 / (1 + 2 * w) * grown + (1 + w) / (1 + 2 * w) * length * rate
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_a_given_step_follows_its_own_equation(scheme: Scheme) -> None:
+def test_a_given_step_follows_its_own_equation(scheme):
     states, steps = steps_of(GivenSteps(scheme, 4000.0, END), 3)
     assert counts(states).tolist() == [0.0, 4000.0, 8000.0, 12000.0]
     rate = rates(states)
@@ -68,7 +65,7 @@ def test_a_given_step_follows_its_own_equation(scheme: Scheme) -> None:
     assert [step.error for step in steps] == pytest.approx(expected, rel=1e-9)
 
 
-def test_by_the_largest_depth_every_explicit_step_wears_this_depth() -> None:
+def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
     # Eq. (22): one pair, so each step wears just that depth
     states, _ = steps_of(GivenSteps("explicit", 1.0, END, 2e-6), 4)
     assert np.diff(depths(states)) == pytest.approx(np.full(4, 2e-6), rel=1e-9)
@@ -76,7 +73,7 @@ def test_by_the_largest_depth_every_explicit_step_wears_this_depth() -> None:
     assert counts(steps_of(GivenSteps("implicit", 1000.0, END, 1e-8), 1)[0]).tolist() == [0.0, 1000.0]
 
 
-def test_without_an_end_each_step_wears_as_much_as_the_first_and_is_at_most_twice_the_last() -> None:
+def test_without_an_end_each_step_wears_as_much_as_the_first_and_is_at_most_twice_the_last():
     states, steps = steps_of(GivenSteps("implicit", 2e4, np.inf), 12)
     lengths, rate = np.array([step.length for step in steps]), rates(states)
     slower = np.maximum.accumulate(rate) / rate
@@ -85,7 +82,7 @@ def test_without_an_end_each_step_wears_as_much_as_the_first_and_is_at_most_twic
     assert lengths[-1] > 2.0 * lengths[0]
 
 
-def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter() -> None:
+def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     rtol = 1e-2
     states, steps = steps_of(AdaptiveSteps(rtol), 12)
     at, worn = counts(states), depths(states) * AREA
@@ -98,11 +95,11 @@ def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter() -> None:
     assert (steps_of(AdaptiveSteps(1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
 
 
-def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch):
     first = steps_of(AdaptiveSteps(1e-2), 0)[0][0].length
     own, tried = control.bdf2_attempt, []
 
-    def lose(*given: object, most: int) -> object:
+    def lose(*given, most):
         tried.append(given[2])
         return None if len(tried) <= most else own(*given)  # type: ignore[arg-type]
 
@@ -116,7 +113,7 @@ def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monk
     assert depths(states)[1] == pytest.approx(euler.length * rates(states)[1], rel=1e-6)
 
 
-def test_a_step_of_second_order_solves_its_own_equation(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
     # no error is refused, so that steps grow as they may
     monkeypatch.setattr(control, "COMMON", replace(COMMON, step_error_fraction=1e9))
     states, steps = steps_of(AdaptiveSteps(1e-2), 3)
@@ -132,11 +129,11 @@ def test_a_step_of_second_order_solves_its_own_equation(monkeypatch: pytest.Monk
     [GivenSteps("explicit", 4000.0, END), GivenSteps("implicit", 4000.0, np.inf), AdaptiveSteps(1e-2)],
     ids=["explicit", "implicit", "adaptive"],
 )
-def test_a_state_is_data_that_survives_being_kept(plan: Control) -> None:
+def test_a_state_is_data_that_survives_being_kept(plan):
     """The step from an unpacked state is equal to the last bit, in a joint that has computed nothing before."""
     kept = in_rows(steps_of(plan, 3)[0][-1])
 
-    def next_of(state: WearState) -> WearState:
+    def next_of(state):
         work, _ = begun()
         work.drop_factor()
         step = plan.step(work, state)
@@ -163,9 +160,7 @@ def test_a_state_is_data_that_survives_being_kept(plan: Control) -> None:
         (5, 0.01, 0.8e-2, False),
     ],
 )
-def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(
-    harmonics: int | Literal["auto"], share: float, error: float, anew: bool
-) -> None:
+def test_harmonics_are_chosen_again_by_the_force_that_is_left_out(harmonics, share, error, anew):
     """share: what was left out of the force when harmonics were chosen, over what is now."""
     work, state = begun()
     work.case = replace(work.case, settings=SolverSettings(harmonics, 64, rtol=1e-2))

@@ -1,7 +1,5 @@
 """Histories that end at a wear: the count at which it is reached."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -10,7 +8,6 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from solver.outcome import Outcome
-from solver.results.history import WearHistory
 from solver.settings import Scheme, WearTarget
 from tests.solver.worn_slider import AREA, CYCLES, END, march, rate_of_depth
 
@@ -18,18 +15,18 @@ STEP = 4000.0
 SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit", "adaptive")
 
 
-def march_until(target: WearTarget, scheme: Scheme = "adaptive") -> WearHistory:
+def march_until(target, scheme="adaptive"):
     return march(STEP, scheme, until=target)
 
 
 @lru_cache
-def whole_history(scheme: Scheme = "adaptive") -> WearHistory:
+def whole_history(scheme="adaptive"):
     return march(STEP, scheme)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("quantity", ["wear_depth", "worn_volume"])
-def test_the_count_is_that_at_which_the_history_has_the_wear(quantity: str, scheme: Scheme) -> None:
+def test_the_count_is_that_at_which_the_history_has_the_wear(quantity, scheme):
     depth = 2.3e-5
     target = WearTarget("wear_depth", depth) if quantity == "wear_depth" else WearTarget("worn_volume", depth * AREA)
     found = march_until(target, scheme)
@@ -49,7 +46,7 @@ def test_the_count_is_that_at_which_the_history_has_the_wear(quantity: str, sche
 
 
 @pytest.mark.slow
-def test_the_count_is_that_of_the_differential_equation() -> None:
+def test_the_count_is_that_of_the_differential_equation():
     rate = rate_of_depth()
     fine_depths = np.linspace(0.0, rate.x[-1], 4001)
     # cycles over depth: the integral of 1 / rate
@@ -60,7 +57,7 @@ def test_the_count_is_that_of_the_differential_equation() -> None:
     assert march_until(WearTarget("wear_depth", by_depth)).cycles_to_target == pytest.approx(0.5 * END, rel=1e-2)
 
 
-def test_a_wear_that_is_not_reached_changes_nothing() -> None:
+def test_a_wear_that_is_not_reached_changes_nothing():
     far, none = march_until(WearTarget("wear_depth", 1.0)), march_until(WearTarget("worn_volume", 1e3))
     whole = whole_history()
     for found in (far, none):

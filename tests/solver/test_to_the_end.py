@@ -1,21 +1,16 @@
 """Histories until nothing wears any more: where they end, what they keep, and joints that wear without end."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
 
 from solver import march_wear as march_from_model
 from solver.loading_history.start_states import follow_branch
-from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.results.history import StartState, WearHistory
-from solver.settings import Scheme, SolverSettings, ToTheEnd, WearTarget
+from solver.settings import SolverSettings, ToTheEnd, WearTarget
 from solver.wear.final_state.find import find_final_state
 from solver.wear.options import WEAR
 from solver.wear.solutions import SlowTime
@@ -28,20 +23,20 @@ STRIPS, PER_PRESSURE = 12, 1e-13
 
 
 @cache
-def unworn() -> tuple[ReducedModel, StartState]:
+def unworn():
     """A cylinder in partial slip."""
     model = build_scene("cylinder_on_flat", strips=STRIPS)
     ((_, start),) = follow_branch(model, 0.6, 1.0, np.array([20.0]), "ramp", COARSE)
     return model, start
 
 
-def worn(cycles: FloatArray | ToTheEnd, scheme: Scheme = "adaptive", **more: Any) -> WearHistory:
+def worn(cycles, scheme="adaptive", **more):
     model, start = unworn()
     return march_wear(model, 0.6, start, PER_PRESSURE, 1000.0, scheme, cycles, COARSE, **more)
 
 
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
-def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme: Scheme) -> None:
+def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme):
     found = worn(ToTheEnd(9), scheme)
     assert found.outcome is Outcome.CONVERGED
     limit = limit_depth(unworn()[0], found.slip_range[0] == 0.0)
@@ -57,7 +52,7 @@ def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme: Scheme) -> N
 
 
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
-def test_a_march_that_goes_on_is_the_same_to_the_last_bit(scheme: Scheme, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_march_that_goes_on_is_the_same_to_the_last_bit(scheme, monkeypatch):
     monkeypatch.setattr("solver.wear.integrate.WEAR", replace(WEAR, iterations_per_save=30))
     kept: list[Packed] = []
     whole = worn(ToTheEnd(9), scheme, keep=kept.append)
@@ -67,7 +62,7 @@ def test_a_march_that_goes_on_is_the_same_to_the_last_bit(scheme: Scheme, monkey
         assert np.array_equal(getattr(again, name), getattr(whole, name)), name
 
 
-def test_a_target_ends_it_at_its_count() -> None:
+def test_a_target_ends_it_at_its_count():
     half = WearTarget("worn_volume", 0.5 * float(worn(ToTheEnd(2)).worn_volume[-1]))
     found = worn(ToTheEnd(5), until=half)
     assert found.outcome is Outcome.CONVERGED
@@ -75,19 +70,19 @@ def test_a_target_ends_it_at_its_count() -> None:
     assert found.worn_volume[-1] == pytest.approx(half.value, rel=1e-6)
 
 
-def slider(**parameters: float) -> WearHistory:
+def slider(**parameters):
     model = build_scene("sdof_slider", **parameters)
     settings = SolverSettings(harmonics=3, samples=64)
     return march_from_model(model, 160.0, 10.0, 0.5, 1.1e-11, np.inf, settings=settings, outputs=4)
 
 
-def test_a_spring_that_presses_wears_until_it_is_relaxed() -> None:
+def test_a_spring_that_presses_wears_until_it_is_relaxed():
     found = slider()
     assert found.outcome is Outcome.CONVERGED
     assert found.wear_depth[-1, 0] == pytest.approx(10.0 / 1e5, rel=1e-3)
 
 
-def test_a_constant_load_wears_without_end_at_the_rate_of_its_path() -> None:
+def test_a_constant_load_wears_without_end_at_the_rate_of_its_path():
     found = slider(normal_stiffness=0.0)
     assert found.outcome is Outcome.NO_FINAL_STATE
     assert not found.outcome.complete
@@ -98,7 +93,7 @@ def test_a_constant_load_wears_without_end_at_the_rate_of_its_path() -> None:
 
 
 @pytest.mark.slow
-def test_gross_slip_of_a_pressed_body_has_no_end() -> None:
+def test_gross_slip_of_a_pressed_body_has_no_end():
     # shallow enough to be worn flat: every strip bears, and all wear alike
     model = build_scene("cylinder_on_flat", strips=8, P=18.5e3, stroke=25e-6, half_width=0.15e-3)
     found = march_from_model(
@@ -111,7 +106,7 @@ def test_gross_slip_of_a_pressed_body_has_no_end() -> None:
     assert steady == pytest.approx(2.9e-14 * 185.0 * 4.0 * 25e-6, rel=0.05)
 
 
-def test_what_cannot_be_marched_to_the_end_is_told() -> None:
+def test_what_cannot_be_marched_to_the_end_is_told():
     model = build_scene("sdof_slider")
     with pytest.raises(ValueError, match="explicit scheme cannot grow"):
         march_from_model(model, 160.0, 10.0, 0.5, 1e-11, np.inf, scheme="explicit", step=10.0)
@@ -119,7 +114,7 @@ def test_what_cannot_be_marched_to_the_end_is_told() -> None:
         march_from_model(model, 160.0, 10.0, 0.5, 1e-11, np.inf, outputs=1)
 
 
-def test_without_a_start_state_there_is_nothing() -> None:
+def test_without_a_start_state_there_is_nothing():
     model, start = unworn()
     failed = replace(start, outcome=Outcome.START_FAILED, state=None)
     for found in (

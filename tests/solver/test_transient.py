@@ -1,7 +1,5 @@
 """Relaxation in time: steps against the exact motion, states behind a fold against exact branches."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +13,6 @@ from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
-from solver.model import ReducedModel
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
@@ -23,7 +20,7 @@ from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
 from solver.stability.hill import is_stable
 from solver.structure.fourier import change_orders
-from solver.structure.joint import Case, build_case
+from solver.structure.joint import build_case
 from tests.references import coulomb_orbit, slider_orbit
 from tests.solver.models import converged_state, first_point, scene
 from tests.solver.reconstruction import full_motion
@@ -33,7 +30,7 @@ FORCE = 0.02
 NATURAL = np.sqrt(1.6e6)
 
 
-def from_rest(model: ReducedModel, friction: float, amplitude: float, omega: float, settings: SolverSettings) -> float:
+def from_rest(model, friction, amplitude, omega, settings):
     """First harmonics, m, that build up from rest."""
     case = build_case(model, friction, omega, settings)
     idle = np.zeros(model.contact.n_contact)
@@ -54,14 +51,14 @@ def from_rest(model: ReducedModel, friction: float, amplitude: float, omega: flo
 
 
 @pytest.mark.parametrize("omega", [0.3, 0.6, 1.3])
-def test_two_masses_relax_from_rest_to_their_exact_motion(omega: float) -> None:
+def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
     orbit = coulomb_orbit([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2, omega)
     found = from_rest(scene("two_masses"), 0.5, 20.0, omega, SolverSettings(21, 256))
     assert found == pytest.approx([abs(orbit.harmonic(dof)) for dof in (0, 1)], rel=0.02, abs=0.0)
 
 
 @pytest.mark.parametrize("ratio", [0.3, 0.8, 1.1])
-def test_the_slider_relaxes_from_rest_to_its_exact_motion(ratio: float) -> None:
+def test_the_slider_relaxes_from_rest_to_its_exact_motion(ratio):
     # 0.3: with stops
     exact = abs(slider_orbit(0.1, 0.0, 1.6e5, 10.0, 3.0, ratio * NATURAL).harmonic(0))
     model = scene("sdof_slider", normal_stiffness=0.0)
@@ -69,7 +66,7 @@ def test_the_slider_relaxes_from_rest_to_its_exact_motion(ratio: float) -> None:
     assert found == pytest.approx([exact], rel=0.02, abs=0.0)
 
 
-def upper_state(case: Case, omega: float) -> PathPoint:
+def upper_state(case, omega):
     """Vibro-impact on the branch with impacts."""
     state = converged_state(case.model, 0.0, FORCE, omega, case.settings)
     idle = np.zeros(1)
@@ -81,7 +78,7 @@ def upper_state(case: Case, omega: float) -> PathPoint:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("omega", [1.56, 1.60])
-def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega: float) -> None:
+def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega):
     # the branch with impacts ends at 1.5576 rad/s
     settings = SolverSettings(21, 256)
     case = build_case(scene("vibro_impact"), 0.0, omega, settings)
@@ -98,10 +95,10 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega: flo
 
 
 @pytest.mark.parametrize("change", [1e-4, -1e-4])
-def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(change: float) -> None:
+def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(change):
     balance_at, first, size = wall(WALL_OMEGA)
 
-    def grows(point: PathPoint) -> bool:
+    def grows(point):
         return not is_stable(balance_at(point.parameter, point.history).linearise(point.evaluation), JacobianSolver())
 
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
@@ -122,7 +119,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
 
 
 @pytest.mark.slow
-def test_steps_in_time_converge_to_the_motion_of_the_structure() -> None:
+def test_steps_in_time_converge_to_the_motion_of_the_structure():
     # the open joint is linear: Re(sum Y_n(t) exp(i n w t)) against the matrix exponential, of first order in the step
     model = scene("vibro_impact", gap=1e3)
     omega, end = 1.3, 2.0
@@ -152,7 +149,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure() -> None:
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.15, abs=0.0)
 
 
-def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch):
     model, settings = scene("sdof_slider", normal_stiffness=0.0), SolverSettings(5, 64)
     case = build_case(model, 0.3, 0.8 * NATURAL, settings)
     quiet, joint = case.joint(0.8 * NATURAL, 0.0), case.joint(0.8 * NATURAL, 10.0)

@@ -1,7 +1,5 @@
 """Travelling waves on the coarse dovetail sector: states over the resonances, what they wear, and how it all ends."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -14,9 +12,8 @@ from solver.harmonic_balance.dlft import Balance
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
-from solver.results.history import StartState, WearHistory
 from solver.settings import SolverSettings
-from solver.structure.joint import Case, build_case
+from solver.structure.joint import build_case
 from tests.solver.models import branch_states, dovetail, march_wear
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)
@@ -29,13 +26,13 @@ OFFSETS = (-0.2, 0.0, 1.0)  # Hz
 
 
 @lru_cache
-def starts(nodal_diameter: int, amplitude: float) -> tuple[StartState, ...]:
+def starts(nodal_diameter, amplitude):
     omegas = 2.0 * np.pi * (RESONANCE[nodal_diameter] + np.array(OFFSETS))
     return tuple(branch_states(dovetail(3, nodal_diameter), FRICTION, amplitude, omegas, SETTINGS))
 
 
 @lru_cache
-def histories(nodal_diameter: int, amplitude: float) -> tuple[WearHistory, ...]:
+def histories(nodal_diameter, amplitude):
     return tuple(
         march_wear(dovetail(3, nodal_diameter), FRICTION, start, WEAR, 1000.0, "adaptive", CYCLES, SETTINGS)
         for start in starts(nodal_diameter, amplitude)
@@ -43,7 +40,7 @@ def histories(nodal_diameter: int, amplitude: float) -> tuple[WearHistory, ...]:
 
 
 @lru_cache
-def state(nodal_diameter: int) -> tuple[Case, PathPoint]:
+def state(nodal_diameter):
     """A state in which pairs slip, a little below the resonance."""
     omega = 2.0 * np.pi * (RESONANCE[nodal_diameter] - 0.3)
     case = build_case(dovetail(3, nodal_diameter), FRICTION, omega, SETTINGS)
@@ -55,7 +52,7 @@ def state(nodal_diameter: int) -> tuple[Case, PathPoint]:
 
 
 @pytest.mark.slow
-def test_every_point_is_marched_to_its_end_or_keeps_what_it_had() -> None:
+def test_every_point_is_marched_to_its_end_or_keeps_what_it_had():
     for offset, history in zip(OFFSETS, histories(20, 0.5), strict=True):
         assert history.last_cycle >= 0.0
         reached = history.cycles <= history.last_cycle
@@ -68,14 +65,14 @@ def test_every_point_is_marched_to_its_end_or_keeps_what_it_had() -> None:
 
 
 @pytest.mark.slow
-def test_what_wears_does_so_at_the_resonance() -> None:
+def test_what_wears_does_so_at_the_resonance():
     volumes = [float(history.worn_volume[-1]) for history in histories(20, 0.5)]
     assert 1e-11 < volumes[1] < 1e-8
     assert volumes[2] < 1e-6 * volumes[1]
 
 
 @pytest.mark.slow
-def test_the_structure_settles_to_the_state_that_the_balance_has() -> None:
+def test_the_structure_settles_to_the_state_that_the_balance_has():
     """Steps in time know nothing of the balance of a travelling wave but its matrices: from rest they lead to a state
     whose motion differs from that raised gradually by the friction history alone.
     """

@@ -1,7 +1,5 @@
 """Limits that are changed for a while from Python."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ from solver.wear.options import WEAR
 from studies import build_scene
 
 
-def test_a_limit_holds_inside_and_not_behind() -> None:
+def test_a_limit_holds_inside_and_not_behind():
     before = WEAR.history_iterations
     model = build_scene("sdof_slider")
     with pytest.raises(ValueError, match="finite"), solver.tuned(history_iterations=7, change_limits=(0.1, 0.1)):
@@ -25,7 +23,7 @@ def test_a_limit_holds_inside_and_not_behind() -> None:
     assert given_up.outcome is Outcome.MARCH_FAILED
 
 
-def test_all_names_are_those_of_constants() -> None:
+def test_all_names_are_those_of_constants():
     assert all(hasattr(options, name) for name, options in TUNABLE.items())
 
 
@@ -37,6 +35,6 @@ def test_all_names_are_those_of_constants() -> None:
         ({"near_iterations": "many"}, "near_iterations: give a value like 10 instead of 'many'"),
     ],
 )
-def test_a_typing_error_is_told(values: dict[str, object], said: str) -> None:
+def test_a_typing_error_is_told(values, said):
     with pytest.raises(ValueError, match=said), solver.tuned(**values):  # type: ignore[arg-type]
         pass

@@ -1,7 +1,5 @@
 """Wear laws: rate and gain, the work that wears, its derivatives, and histories against differential equations."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +11,6 @@ from scipy.optimize import brentq
 from solver import march_wear as march_model
 from solver.contact.archard import slip_work_rate, slip_work_slopes
 from solver.contact.wear_law import ARCHARD, ARCHARDS_WORK, WearingWork, WearLaw, WearTable, wearing_work
-from solver.results.history import WearHistory
 from solver.settings import Scheme, SolverSettings
 from tests.solver.models import march_wear, random_balance, random_model
 from tests.solver.test_balance import jacobian_by_differences
@@ -29,14 +26,14 @@ TABLE = WearTable((2e4, 5e4, 9e4), (0.0, 1e-5, 6e-5), ((0.8, 0.2, 0.5), (1.0, 0.
 THRESHOLD = 20.0  # J/m2: the slider begins with about 45 of them
 
 
-def test_the_slopes_are_the_derivatives_of_the_slip_work() -> None:
+def test_the_slopes_are_the_derivatives_of_the_slip_work():
     normal, speed, step = 12.0, 0.3, 1e-4
     by_normal = (slip_work_rate(normal + step, speed) - slip_work_rate(normal - step, speed)) / (2 * step)
     by_speed = (slip_work_rate(normal, speed + step) - slip_work_rate(normal, speed - step)) / (2 * step)
     assert slip_work_slopes(normal, speed) == pytest.approx((by_normal, by_speed), rel=1e-9)
 
 
-def random_work(seed: int, n_contact: int, n_pressures: int = 4, n_depths: int = 5) -> WearingWork:
+def random_work(seed, n_contact, n_pressures=4, n_depths=5):
     """All that a law can have, for forces of about 100 N on 1e-4 m2 and depths of micrometres."""
     random = np.random.default_rng(seed)
     return WearingWork(
@@ -49,7 +46,7 @@ def random_work(seed: int, n_contact: int, n_pressures: int = 4, n_depths: int =
     )
 
 
-def test_a_table_is_bilinear_and_constant_beyond_its_ends() -> None:
+def test_a_table_is_bilinear_and_constant_beyond_its_ends():
     law, random = replace(random_work(0, 200), factor=None, least=None), np.random.default_rng(1)
     force, depth = random.uniform(0.0, 400.0, 200), random.uniform(-1e-6, 6e-6, 200)
     assert law.pressure is not None
@@ -64,7 +61,7 @@ def test_a_table_is_bilinear_and_constant_beyond_its_ends() -> None:
     assert not np.any(single.slopes(np.ones(200), force, depth)[1:])
 
 
-def test_the_slopes_of_the_work_are_its_derivatives() -> None:
+def test_the_slopes_of_the_work_are_its_derivatives():
     law, random = random_work(2, 300), np.random.default_rng(3)
     given = random.uniform(0.0, 3e-4, 300), random.uniform(0.0, 300.0, 300), random.uniform(0.0, 6e-6, 300)
     for place, step in enumerate((1e-9, 1e-3, 1e-12)):
@@ -82,7 +79,7 @@ def test_the_slopes_of_the_work_are_its_derivatives() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_step_grows_by_the_least_root_of_its_own_equation(seed: int) -> None:
+def test_a_step_grows_by_the_least_root_of_its_own_equation(seed):
     law, random = random_work(seed, 60), np.random.default_rng(seed + 10)
     work, force = random.uniform(0.0, 3e-4, 60), random.uniform(0.0, 300.0, 60)
     before, gain = random.uniform(0.0, 6e-6, 60), 10.0 ** random.uniform(-5.0, -1.0, 60)
@@ -92,7 +89,7 @@ def test_a_step_grows_by_the_least_root_of_its_own_equation(seed: int) -> None:
     for pair in range(60):
         last = int(np.argmax(excess[:, pair] >= 0.0))
 
-        def left(y: float, pair: int = pair) -> float:
+        def left(y, pair=pair):
             return y - float((gain * law.work(work, force, before + y))[pair])
 
         expected = brentq(left, scan[last - 1], scan[last], xtol=1e-20) if last else 0.0
@@ -109,7 +106,7 @@ LAWS = {
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_the_jacobian_of_an_implicit_step_is_that_of_central_differences(name: str) -> None:
+def test_the_jacobian_of_an_implicit_step_is_that_of_central_differences(name):
     model = random_model(2, ("3d", "constant_load", "one_tangent"))
     balance, predicted = random_balance(model, SolverSettings(3, 24), 102, wear=True)
     joint = balance.joint
@@ -131,14 +128,14 @@ def test_the_jacobian_of_an_implicit_step_is_that_of_central_differences(name: s
     assert np.abs(plain - differences).max() > 1e-4 * np.abs(differences).max()
 
 
-def march_by(law: WearLaw, scheme: Scheme, wear: float = COEFFICIENT, step: float = 1000.0) -> WearHistory:
+def march_by(law, scheme, wear=COEFFICIENT, step=1000.0):
     model, start = slider_start(COARSE)
     settings = replace(COARSE, rtol=1e-3)
     return march_wear(model, FRICTION, start, wear, step, scheme, CYCLES, settings, law=law)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_by_energy_the_joint_wears_as_by_archard_with_friction_times_the_coefficient(scheme: Scheme) -> None:
+def test_by_energy_the_joint_wears_as_by_archard_with_friction_times_the_coefficient(scheme):
     energy, archard = march_by(WearLaw("energy"), scheme), march_by(ARCHARD, scheme, FRICTION * COEFFICIENT)
     for name in ("wear_depth", "wear_rate", "worn_volume", "step_limit", "mean_pressure"):
         assert getattr(energy, name) == pytest.approx(getattr(archard, name), rel=1e-12, abs=0.0)
@@ -146,14 +143,14 @@ def test_by_energy_the_joint_wears_as_by_archard_with_friction_times_the_coeffic
     assert energy.error_estimate == pytest.approx(archard.error_estimate, rel=1e-9)
 
 
-def depth_by_equation(law: WearLaw) -> float:
+def depth_by_equation(law):
     """Depth of the slider at the end: slip work and pressure are functions of the depth alone, whatever wore it."""
     fine = march(250.0, "implicit", np.linspace(0.0, 1.25 * END, 401))
     depth = fine.wear_depth[:, 0]
     work = CubicSpline(depth, fine.wear_rate / COEFFICIENT)
     pressure = CubicSpline(depth, fine.mean_pressure[:, 0])
 
-    def rate(_: float, depth: list[float]) -> float:
+    def rate(_, depth):
         (w,) = depth
         worn, factor = float(work(w)), 1.0
         if law.name == "threshold":
@@ -172,7 +169,7 @@ def depth_by_equation(law: WearLaw) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", [WearLaw("threshold", THRESHOLD), WearLaw("table", table=TABLE)], ids=lambda x: x.name)
-def test_histories_are_those_of_the_differential_equation(law: WearLaw) -> None:
+def test_histories_are_those_of_the_differential_equation(law):
     exact = depth_by_equation(law)
     assert exact < 0.9 * depth_by_equation(ARCHARD) or exact > 1.1 * depth_by_equation(ARCHARD)
     adaptive = march_by(law, "adaptive")
@@ -188,7 +185,7 @@ def test_histories_are_those_of_the_differential_equation(law: WearLaw) -> None:
     assert errors[0][1] / errors[1][1] == pytest.approx(-1.0, rel=0.15)
 
 
-def test_the_sides_of_a_pair_add_up_and_every_surface_has_a_factor() -> None:
+def test_the_sides_of_a_pair_add_up_and_every_surface_has_a_factor():
     model = random_model(1)
     sides = replace(model.contact, surface=("flat/cylinder", "flat/cylinder", "flat"))
     law = WearLaw(surfaces=(("flat", 1.0), ("cylinder", 0.5)))
@@ -201,7 +198,7 @@ def test_the_sides_of_a_pair_add_up_and_every_surface_has_a_factor() -> None:
             wearing_work(WearLaw(surfaces=wrong), sides, np.zeros(3))
 
 
-def test_a_law_that_does_not_exist_names_those_that_do() -> None:
+def test_a_law_that_does_not_exist_names_those_that_do():
     model, _ = slider_start(COARSE)
     with pytest.raises(ValueError, match='"reye": give one of archard, energy, threshold, table'):
         march_model(model, 160.0, 10.0, FRICTION, COEFFICIENT, [10.0], law=WearLaw("reye"))

@@ -1,7 +1,5 @@
 """Whole response curves, and balances as functions: against finite differences, exact motions and each other."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -9,16 +7,14 @@ import pytest
 from scipy.optimize import root
 
 from solver import (
-    HarmonicBalance,
     Outcome,
-    ResponseCurve,
     SolverSettings,
     balance_of,
     frequency_response,
     response_curve,
 )
 from solver.stability.multipliers import Multipliers
-from tests.event_driven import Orbit, close_orbit
+from tests.event_driven import close_orbit
 from tests.references import vibro_impact_orbit
 from tests.solver.models import OMEGA, cyclic_model, random_model, scene
 from tests.solver.test_natural import GRAZING, WALL_OMEGA
@@ -28,19 +24,19 @@ WALL = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)  # mass, damping, stiffness, force, wa
 
 
 @lru_cache
-def wall_curve() -> ResponseCurve:
+def wall_curve():
     """From the branch with impacts at 0.2 Hz through both folds to the one without impacts at 0.26 Hz."""
     return response_curve(scene("vibro_impact"), (0.2, 0.26), 0.02, 0.0, settings=SETTINGS, errors=False)
 
 
 @lru_cache
-def slipping() -> HarmonicBalance:
+def slipping():
     """A random structure whose pairs stick, slip and open."""
     model = random_model(3, ("3d", "one_tangent", "constant_load"))
     return balance_of(model, OMEGA / (2.0 * np.pi), 150.0, 0.4, settings=SolverSettings(harmonics=3, samples=64))
 
 
-def test_the_jacobian_is_the_derivative_of_the_residual() -> None:
+def test_the_jacobian_is_the_derivative_of_the_residual():
     balance = slipping()
     assert set(np.unique(balance.motion().status_t)) >= {1, 2}
     exact = balance.jacobian(balance.state)
@@ -52,7 +48,7 @@ def test_the_jacobian_is_the_derivative_of_the_residual() -> None:
         assert np.linalg.norm(0.5 * (ahead - back) - exact @ step) < 1e-4 * np.linalg.norm(exact @ step)
 
 
-def test_any_root_finder_comes_to_the_state() -> None:
+def test_any_root_finder_comes_to_the_state():
     balance = slipping()
     assert balance.outcome is Outcome.CONVERGED
     assert balance.motion().residual < 1e-8
@@ -63,7 +59,7 @@ def test_any_root_finder_comes_to_the_state() -> None:
 
 
 @pytest.mark.parametrize("kind", ["random", "travelling wave"])
-def test_all_coefficients_obey_the_equation_of_motion(kind: str) -> None:
+def test_all_coefficients_obey_the_equation_of_motion(kind):
     if kind == "random":
         balance, model = slipping(), random_model(3, ("3d", "one_tangent", "constant_load"))
     else:
@@ -97,7 +93,7 @@ def test_all_coefficients_obey_the_equation_of_motion(kind: str) -> None:
     assert (motion.contact_force_t[:, 0] >= 0.0).all()
 
 
-def exact_orbit(curve: ResponseCurve, index: int) -> Orbit:
+def exact_orbit(curve, index):
     """The exact motion next to a point of the curve."""
     motion = curve.balance(index).motion()
     omega = 2.0 * np.pi * motion.frequency
@@ -108,7 +104,7 @@ def exact_orbit(curve: ResponseCurve, index: int) -> Orbit:
     return found
 
 
-def multipliers_of(orbit: Orbit) -> np.ndarray:
+def multipliers_of(orbit):
     """Multipliers of an exact motion, by differences of its period map."""
     y, name, system = orbit.segments[0].start, orbit.segments[0].phase, orbit.system
     columns = []
@@ -122,7 +118,7 @@ def multipliers_of(orbit: Orbit) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("unstable", [False, True])
-def test_motions_and_multipliers_are_the_exact_ones_also_of_an_unstable_branch(unstable: bool) -> None:
+def test_motions_and_multipliers_are_the_exact_ones_also_of_an_unstable_branch(unstable):
     curve = wall_curve()
     upper, lower = np.flatnonzero(curve.is_fold)
     index = (upper + lower) // 2 if unstable else 0
@@ -136,7 +132,7 @@ def test_motions_and_multipliers_are_the_exact_ones_also_of_an_unstable_branch(u
 
 
 @pytest.mark.slow
-def test_a_multiplier_passes_one_at_the_fold() -> None:
+def test_a_multiplier_passes_one_at_the_fold():
     curve = wall_curve()
     assert curve.outcome is Outcome.CONVERGED
     assert curve.frequency[-1] == pytest.approx(0.26, rel=1e-12)
@@ -152,7 +148,7 @@ def test_a_multiplier_passes_one_at_the_fold() -> None:
 
 
 @pytest.mark.slow
-def test_over_the_amplitude_the_curve_folds_where_the_mass_grazes_the_wall() -> None:
+def test_over_the_amplitude_the_curve_folds_where_the_mass_grazes_the_wall():
     at, settings = WALL_OMEGA / (2.0 * np.pi), SolverSettings(harmonics=5, samples=64)
     found = response_curve(scene("vibro_impact"), at, (0.03, 0.06), 0.0, settings=settings, errors=False)
     assert found.outcome is Outcome.CONVERGED
@@ -166,10 +162,10 @@ def test_over_the_amplitude_the_curve_folds_where_the_mass_grazes_the_wall() -> 
 
 
 @pytest.mark.slow
-def test_both_parameters_lead_to_the_same_states() -> None:
+def test_both_parameters_lead_to_the_same_states():
     slider, settings = scene("sdof_slider", damping=2.0), SolverSettings(harmonics=5, samples=64)
-    by_frequency = response_curve(slider, (145.0, 150.0), 10.0, 0.5, settings=settings)
-    by_amplitude = response_curve(slider, 150.0, (8.0, 10.0), 0.5, settings=settings, errors=False)
+    by_frequency = response_curve(slider, (148.0, 150.0), 10.0, 0.5, settings=settings)
+    by_amplitude = response_curve(slider, 150.0, (9.0, 10.0), 0.5, settings=settings, errors=False)
     swept = frequency_response(slider, 150.0, 10.0, 0.5, settings=settings)
     for curve in (by_frequency, by_amplitude):
         assert curve.outcome is Outcome.CONVERGED
@@ -180,7 +176,7 @@ def test_both_parameters_lead_to_the_same_states() -> None:
 
 
 @pytest.mark.slow
-def test_on_unstable_branches_as_well() -> None:
+def test_on_unstable_branches_as_well():
     """Over the amplitude the unstable branch passes the one over the frequency at 0.02 N."""
     model, settings = scene("vibro_impact"), SolverSettings(harmonics=7, samples=128)
     frequency = response_curve(model, (0.215, 0.26), 0.02, 0.0, settings=settings, errors=False)
@@ -191,7 +187,7 @@ def test_on_unstable_branches_as_well() -> None:
     assert len(seen[0]) == 3
 
 
-def crossings(curve: ResponseCurve, parameter: np.ndarray, value: float) -> list[float]:
+def crossings(curve, parameter, value):
     """Responses at which a curve passes a value of its parameter, by cubic interpolation."""
     passed = np.flatnonzero((parameter[:-1] - value) * (parameter[1:] - value) <= 0.0)
     found = []
@@ -202,7 +198,7 @@ def crossings(curve: ResponseCurve, parameter: np.ndarray, value: float) -> list
 
 
 @pytest.mark.slow
-def test_a_joint_that_bounces_doubles_its_period() -> None:
+def test_a_joint_that_bounces_doubles_its_period():
     curve = response_curve(scene("vibro_impact"), (0.146, 0.148), 0.02, 0.0, settings=SETTINGS, errors=False)
     assert curve.stability == ()
     assert curve.outcome is Outcome.PERIOD_DOUBLED
@@ -212,7 +208,7 @@ def test_a_joint_that_bounces_doubles_its_period() -> None:
     assert curve.multipliers[-1][0].real < -1.0
 
 
-def test_multipliers_name_the_kind_of_stability() -> None:
+def test_multipliers_name_the_kind_of_stability():
     for values, odd, kind in (
         ([0.9], False, "stable"),
         ([0.9], True, "fold"),
@@ -226,7 +222,7 @@ def test_multipliers_name_the_kind_of_stability() -> None:
     assert Multipliers(np.array([1.2 + 0j]), 0.3).stability(False) == "stable"
 
 
-def test_curves_and_balances_without_a_state_say_why() -> None:
+def test_curves_and_balances_without_a_state_say_why():
     model = scene("vibro_impact")
     curve = response_curve(model, (0.2, 0.26), 0.02, 0.0, settings=SETTINGS, errors=False, most_points=4)
     assert curve.outcome is Outcome.BRANCH_LOST
@@ -241,7 +237,7 @@ def test_curves_and_balances_without_a_state_say_why() -> None:
     assert np.isfinite(doubled.residual(np.zeros(doubled.size))).all()
 
 
-def test_wrong_arguments_are_named() -> None:
+def test_wrong_arguments_are_named():
     model, settings = scene("vibro_impact"), SolverSettings(harmonics=3)
     for frequency, amplitude, said in (
         (0.2, 0.02, "one number for one of them, two for the other one"),

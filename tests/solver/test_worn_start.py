@@ -1,7 +1,5 @@
 """Responses and marches that begin with a worn joint."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,7 @@ SETTINGS = SolverSettings(harmonics=3, samples=128)
 WEAR, END = 1.1e-11, 4e4  # 1/Pa, cycles
 
 
-def test_a_response_at_a_depth_is_that_of_less_normal_force() -> None:
+def test_a_response_at_a_depth_is_that_of_less_normal_force():
     """The spring of the slider presses by 10 N less 1e5 N/m times the depth."""
     worn = frequency_response(scene("sdof_slider"), 150.0, 10.0, 0.5, settings=SETTINGS, wear_depth=[4e-5])
     less = frequency_response(scene("sdof_slider", normal_load=6.0), 150.0, 10.0, 0.5, settings=SETTINGS)
@@ -21,7 +19,7 @@ def test_a_response_at_a_depth_is_that_of_less_normal_force() -> None:
     assert set(worn.outcome) == {Outcome.CONVERGED}
 
 
-def test_a_march_goes_on_from_a_depth() -> None:
+def test_a_march_goes_on_from_a_depth():
     model = scene("sdof_slider")
     whole = march_wear(model, 160.0, 10.0, 0.5, WEAR, [0.0, END / 2, END], settings=SETTINGS)
     rest = march_wear(model, 160.0, 10.0, 0.5, WEAR, [END / 2], settings=SETTINGS, wear_depth=whole.wear_depth[1])
@@ -32,7 +30,7 @@ def test_a_march_goes_on_from_a_depth() -> None:
     assert error < 1e-2 * depth
 
 
-def test_a_law_that_depends_on_the_depth_is_refused() -> None:
+def test_a_law_that_depends_on_the_depth_is_refused():
     law = WearLaw("table", table=WearTable((0.0, 1e6), (0.0, 1e-5), ((1.0, 1.0), (1.0, 1.0))))
     with pytest.raises(ValueError, match="wear_depth: give another law"):
         march_wear(scene("sdof_slider"), 160.0, 10.0, 0.5, WEAR, [END], law=law, wear_depth=0.0)

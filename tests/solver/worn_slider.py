@@ -1,7 +1,5 @@
 """The textbook slider under a spring that presses: its wear histories, and the differential equation of its wear."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two half-spaces in contact, apart from the solver: pressures by an active set, and the profile worn in the end."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from solver.model import FloatArray, ReducedModel

@@ -1,7 +1,5 @@
 """Small random reduced models, and scene files made from them by changing single datasets."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

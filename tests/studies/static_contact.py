@@ -1,7 +1,5 @@
 """Static frictional contact of a reduced model by a plain alternating projection, apart from the solver."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from solver.model import FloatArray, ReducedModel

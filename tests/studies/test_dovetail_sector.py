@@ -1,7 +1,5 @@
 """The bundled scene `dovetail_sector`."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -158,12 +156,7 @@ def test_parameters_that_do_not_go_together(key, value):
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [
-        ("friction_coefficient", -0.1),
-        ("rotation_speed", float("nan")),
-        ("mesh", 0),
-        ("no_such_key", 1.0),
-    ],
+    [("friction_coefficient", -0.1), ("rotation_speed", float("nan")), ("mesh", 0), ("no_such_key", 1.0)],
 )
 def test_parameters_out_of_range(key, value):
     with pytest.raises(ValidationError):
@@ -173,7 +166,7 @@ def test_parameters_out_of_range(key, value):
 def test_every_parameter_is_described_with_a_unit():
     fields = Parameters.model_fields
     assert next(iter(fields)) == "friction_coefficient"
-    units = {"-", "m", "rpm", "Pa", "kg/m3", "degrees", "N/m"}
+    units = {"-", "m", "rpm", "Pa", "kg/m3", "degrees", "N/m", "N/m3"}
     assert {(field.description or "").rpartition(", ")[2] for field in fields.values()} == units
 
 

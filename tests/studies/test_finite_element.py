@@ -1,7 +1,5 @@
 """Bending, cyclic symmetry and reduction, each on the smallest mesh that shows it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import linalg

@@ -1,7 +1,5 @@
 """Cylinder and sphere on a flat: compliances against quadrature, contact, stick zone and wear against closed forms."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
@@ -10,9 +8,7 @@ from pydantic import ValidationError
 from scipy.integrate import dblquad, quad
 
 from solver import march_wear
-from solver.model import ReducedModel
 from solver.outcome import Outcome
-from solver.results.history import WearHistory
 from solver.settings import SolverSettings
 from studies import SceneError, build_scene
 from studies.model_check import check_model
@@ -36,7 +32,7 @@ A_LINE = line_half_width(LINE["P"], LINE["R"], MODULUS)
 A_POINT = point_radius(POINT["P"], POINT["R"], MODULUS)
 
 
-def test_strips_move_as_the_integral_over_their_traction_says() -> None:
+def test_strips_move_as_the_integral_over_their_traction_says():
     edges = np.array([0.0, 0.5, 1.1, 1.4, 2.3]) * 1e-3
     found = strip_compliance(np.linspace(0.0, 1e-3, 9), 1e11, 0.01, 0.05)
     assert np.linalg.eigvalsh(found)[0] > 0.0
@@ -45,7 +41,7 @@ def test_strips_move_as_the_integral_over_their_traction_says() -> None:
     middle, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
     for i, j in ((0, 0), (0, 3), (2, 1), (3, 3)):
 
-        def mean(i: int, j: int) -> float:
+        def mean(i, j):
             at = [middle[i]] if i == j else None
             own, _ = quad(lambda s: np.log(0.05 / abs(middle[i] - s)), edges[j], edges[j + 1], points=at)
             image, _ = quad(lambda s: np.log(0.05 / abs(middle[i] + s)), edges[j], edges[j + 1])
@@ -55,7 +51,7 @@ def test_strips_move_as_the_integral_over_their_traction_says() -> None:
         assert wide[i, j] == pytest.approx(expected, rel=1e-9)
 
 
-def test_patches_move_as_the_integrals_of_boussinesq_and_cerruti_say() -> None:
+def test_patches_move_as_the_integrals_of_boussinesq_and_cerruti_say():
     width, position = 2e-4, np.array([[1e-4, 1e-4], [5e-4, 3e-4]])
     normal, tangential = patch_compliance(position, width, E, NU)
     shear = E / (2.0 * (1.0 + NU))
@@ -64,10 +60,10 @@ def test_patches_move_as_the_integrals_of_boussinesq_and_cerruti_say() -> None:
         for sign_y in (1.0, -1.0):
             dx, dy = position[1] - np.array([sign_x, sign_y]) * position[0]
 
-            def over_r(y: float, x: float) -> float:
+            def over_r(y, x):
                 return 1.0 / np.hypot(x, y)
 
-            def over_r3(y: float, x: float) -> float:
+            def over_r3(y, x):
                 return x**2 / np.hypot(x, y) ** 3
 
             bounds = dx - width / 2, dx + width / 2, dy - width / 2, dy + width / 2
@@ -84,12 +80,12 @@ def test_patches_move_as_the_integrals_of_boussinesq_and_cerruti_say() -> None:
         assert np.linalg.eigvalsh(each)[0] > 0.0
 
 
-def observed_order(errors: list[float]) -> float:
+def observed_order(errors):
     """Slope of the errors over meshes that double."""
     return float(-np.polyfit(np.arange(len(errors)) * np.log(2.0), np.log(np.abs(errors)), 1)[0])
 
 
-def test_the_pressure_of_the_cylinder_is_that_of_hertz() -> None:
+def test_the_pressure_of_the_cylinder_is_that_of_hertz():
     peak, errors = 2.0 * LINE["P"] / (np.pi * A_LINE), []
     for strips in (40, 80, 160):
         model = build_scene("cylinder_on_flat", strips=strips, half_width=1.5 * A_LINE)
@@ -108,7 +104,7 @@ def test_the_pressure_of_the_cylinder_is_that_of_hertz() -> None:
     assert pytest.approx(0.09134e-3, rel=1e-4) == A_LINE
 
 
-def test_the_pressure_of_the_sphere_is_that_of_hertz() -> None:
+def test_the_pressure_of_the_sphere_is_that_of_hertz():
     peak, errors = 1.5 * POINT["P"] / (np.pi * A_POINT**2), []
     for patches in (6, 12, 24):
         model = build_scene("sphere_on_flat", patches=patches, half_width=1.4 * A_POINT)
@@ -123,7 +119,7 @@ def test_the_pressure_of_the_sphere_is_that_of_hertz() -> None:
 
 
 @lru_cache
-def worn(name: str, cycles: float, harmonics: int, rtol: float, **values: float) -> tuple[ReducedModel, WearHistory]:
+def worn(name, cycles, harmonics, rtol, **values):
     """Unworn and worn state. 1e-13 1/Pa: the joint has worn all that it can after some 1e5 cycles."""
     model = build_scene(name, **values)
     counts = [0.0] if cycles == 0.0 else [0.0, cycles]
@@ -132,7 +128,7 @@ def worn(name: str, cycles: float, harmonics: int, rtol: float, **values: float)
 
 
 @pytest.mark.slow
-def test_the_stick_zone_of_the_cylinder_is_that_of_cattaneo() -> None:
+def test_the_stick_zone_of_the_cylinder_is_that_of_cattaneo():
     model, history = worn("cylinder_on_flat", 0.0, 5, 1e-2, strips=40)
     assert history.outcome is Outcome.CONVERGED
     x, c = np.abs(model.contact.position[:, 0]), line_stick_width(A_LINE, 0.5)
@@ -148,7 +144,7 @@ def test_the_stick_zone_of_the_cylinder_is_that_of_cattaneo() -> None:
 
 
 @pytest.mark.slow
-def test_the_sphere_moves_as_mindlin_says() -> None:
+def test_the_sphere_moves_as_mindlin_says():
     model, history = worn("sphere_on_flat", 1e6, 5, 1e-3, patches=8)
     assert history.outcome is Outcome.CONVERGED
     radius, c = np.linalg.norm(model.contact.position, axis=1), point_stick_radius(A_POINT, 0.5)
@@ -167,7 +163,7 @@ def test_the_sphere_moves_as_mindlin_says() -> None:
     assert limit.max() == pytest.approx(exact.max(), rel=0.05)
 
 
-def test_the_limit_state_of_strips_is_that_of_the_half_plane() -> None:
+def test_the_limit_state_of_strips_is_that_of_the_half_plane():
     for share in (0.5, 0.75, 0.91):
         c, errors = line_stick_width(A_LINE, share), []
         fine = np.linspace(c, 2.5 * A_LINE, 40001)
@@ -183,7 +179,7 @@ def test_the_limit_state_of_strips_is_that_of_the_half_plane() -> None:
         assert max(np.abs(errors)) < 0.01
 
 
-def test_the_closed_forms_have_their_published_values() -> None:
+def test_the_closed_forms_have_their_published_values():
     for ratio, edge, deepest, area in (
         (0.9, 1.0524, 0.0429, 0.0045),
         (np.sqrt(0.5), 1.1692, 0.2255, 0.0726),
@@ -204,7 +200,7 @@ def test_the_closed_forms_have_their_published_values() -> None:
     assert not line_worn_depth(np.array([0.0, 0.5]), 0.5, 1.0, 0.7).any()
 
 
-def test_the_frequency_has_no_influence() -> None:
+def test_the_frequency_has_no_influence():
     model = build_scene("cylinder_on_flat", strips=12)
     settings = SolverSettings(harmonics=3, samples=64)
     slow, fast = (
@@ -215,7 +211,7 @@ def test_the_frequency_has_no_influence() -> None:
 
 @pytest.mark.parametrize("name", ["cylinder_on_flat", "sphere_on_flat"])
 @pytest.mark.parametrize("values", [{}, {"stroke": 1e-6}])
-def test_the_scenes_are_possible_structures_with_described_parameters(name: str, values: dict[str, float]) -> None:
+def test_the_scenes_are_possible_structures_with_described_parameters(name, values):
     check_model(build_scene(name, **values), n_harmonics=3)
     kind = scene_parameters(name)
     assert next(iter(kind.model_fields)) == "friction_coefficient"
@@ -227,7 +223,7 @@ def test_the_scenes_are_possible_structures_with_described_parameters(name: str,
             kind(**wrong)
 
 
-def test_what_does_not_go_together_is_one_sentence() -> None:
+def test_what_does_not_go_together_is_one_sentence():
     for name in ("cylinder_on_flat", "sphere_on_flat"):
         with pytest.raises(SceneError, match="give Q or stroke, not both"):
             build_scene(name, Q=1.0, stroke=1e-6)

@@ -1,7 +1,5 @@
 """Notebooks run from nothing, quietly and quickly, and hold what they say and draw, as a forge shows it."""
 
-from __future__ import annotations
-
 import ast
 import re
 import resource
@@ -13,11 +11,10 @@ from studyrunner.cli import main
 from tests.benchmarks.notebooks import LANGUAGE, NOTEBOOKS, execute, settle
 
 SMALL = [
-    *("dovetail", "scene.mesh=1", 'axes.sweep=["up", "down"]', "axes.frequency=[209.0, 212.5, 213.0]"),
-    *("slow_time.cycles=8000", "slow_time.outputs=5", "solver.harmonics=3", "solver.samples=64"),
+    *("dovetail", "scene.mesh=1", 'axes.sweep=["up", "down"]', "axes.frequency=[209.0, 212.5]"),
+    *("slow_time.cycles=3000", "slow_time.outputs=5", "solver.harmonics=3", "solver.samples=64"),
     "outputs.loops=[0, 3]",
 ]
-RUN = ("wear_maps",)  # `python -m tests.benchmarks.notebooks` runs all of them
 READ_A_RESULT = ("read_a_result", "frf_before_and_after", "wear_maps")  # the others run a study of their own
 FIGURES = {
     "read_a_result": 2,
@@ -30,6 +27,7 @@ FIGURES = {
     "python_api": 3,
     "scatter": 3,
     "modes": 3,
+    "followed_resonance": 2,
 }
 LARGEST = 150_000  # bytes of a file
 
@@ -65,17 +63,6 @@ def written_as_warning(cells):
     return [output.text for output in outputs(cells) if output.output_type == "stream" and output.name == "stderr"]
 
 
-def said(cells):
-    """Words and numbers of all that is told as text, but for what stands for a picture."""
-    texts = [
-        output.get("text") or output.data["text/plain"]
-        for output in outputs(cells)
-        if "image/png" not in output.get("data", {})
-    ]
-    words = re.split(r"[\s,()\[\]{}']+", "\n".join(texts))
-    return [float(word) if re.fullmatch(r"-?\d+(\.\d*)?(e[+-]?\d+)?", word) else word for word in words]
-
-
 def tells(source):
     """Whether a cell is to show something: it ends with a value, prints, or draws."""
     last = ast.parse(source).body[-1]
@@ -91,21 +78,14 @@ def children_seconds():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", [path for path in NOTEBOOKS if path.stem in RUN], ids=lambda path: path.stem)
-def test_notebook_runs_without_a_warning_and_draws_its_figures(path, request, tmp_path):
-    reads = path.stem in READ_A_RESULT
-    variables = {"RESULT": str(request.getfixturevalue("small_result"))} if reads else {}
+def test_a_notebook_runs_without_a_warning_and_draws_its_figures(small_result, tmp_path):
+    """One that reads a result; `python -m tests.benchmarks.notebooks` runs all of them."""
+    (path,) = [path for path in NOTEBOOKS if path.stem == "wear_maps"]
     begin = children_seconds()
-    cells = run(path, tmp_path, variables)
+    cells = run(path, tmp_path, {"RESULT": str(small_result)})
     assert children_seconds() - begin < 120.0
     assert not written_as_warning(cells)
     assert count_figures(cells) == FIGURES[path.stem]
-    if not reads:
-        # numbers as on the machine that they were stored on, but for rounding
-        for now, stored in zip(said(cells), said(code_of(path)), strict=True):
-            assert now == (
-                pytest.approx(stored, rel=0.05, abs=2e-3, nan_ok=True) if isinstance(stored, float) else stored
-            )
 
 
 @pytest.mark.slow
@@ -159,7 +139,7 @@ def test_notebook_uses_what_users_have(path):
         if isinstance(node, ast.ImportFrom):
             imported.add(node.module)
     own = {name for name in imported if name.split(".")[0] in ("solver", "studies", "studyrunner", "tests")}
-    doors = {"solver", "studies"} if path.stem in ("python_api", "modes") else set()
+    doors = {"solver", "studies"} if path.stem in ("python_api", "modes", "followed_resonance") else set()
     doors |= set() if path.stem in READ_A_RESULT else {"studyrunner"}
     assert all(
         name in doors or name == "studyrunner.accessor" or name.startswith("studyrunner.report.") for name in own

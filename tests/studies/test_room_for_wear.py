@@ -1,14 +1,10 @@
 """The width of a contact in gross slip against wear that is computed apart from the solver, and what needs none."""
 
-from __future__ import annotations
-
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 
-from solver.model import FloatArray
 from studies import build_scene
 from studies.scenes import scene_parameters, scene_with_room
 from studies.scenes.closed_forms.hertz import (
@@ -27,12 +23,12 @@ A_LINE = line_half_width(1.2e5, 6e-3, MODULUS)
 A_POINT = point_radius(100.0, 10e-3, MODULUS)
 
 
-def room(name: str, expected: ExpectedWear, **values: Any) -> float | None:
+def room(name, expected, **values):
     kind = scene_parameters(name)
     return dict(scene_with_room(name, kind(**values), expected))["half_width"]
 
 
-def worn_by_uniform_slip(name: str, **values: float) -> FloatArray:
+def worn_by_uniform_slip(name, **values):
     """Half-width, volume and largest depth, rows, while all pairs slide alike and wear by their pressure."""
     model = build_scene(name, **values)
     compliance, contact = compliances(model)[0], model.contact
@@ -48,7 +44,7 @@ def worn_by_uniform_slip(name: str, **values: float) -> FloatArray:
         depth = depth + 0.03 * rows[-1][0] ** 2 / (2.0 * values["R"]) * pressure / pressure.max()
 
 
-def solve_pressed(compliance: FloatArray, gap: FloatArray, load: float) -> FloatArray:
+def solve_pressed(compliance, gap, load):
     """Normal forces (n,), N, of a body pressed on pairs with these gaps, m; pairs come and go until none is wrong."""
     touching = np.ones(len(gap), bool)
     while True:
@@ -70,9 +66,7 @@ def solve_pressed(compliance: FloatArray, gap: FloatArray, load: float) -> Float
         ("sphere_on_flat", A_POINT, {"R": 10e-3, "patches": 14, "half_width": 3.0 * A_POINT, "stroke": 1e-5}),
     ],
 )
-def test_the_scar_of_gross_slip_is_as_wide_as_its_volume_and_depth_say(
-    name: str, contact: float, values: dict[str, float]
-) -> None:
+def test_the_scar_of_gross_slip_is_as_wide_as_its_volume_and_depth_say(name, contact, values):
     line = name == "cylinder_on_flat"
     scar = Scar(values["R"], contact, *((3, 1.5) if line else (4, 4.0 / math.pi)))
     rows = worn_by_uniform_slip(name, **values)
@@ -86,7 +80,7 @@ def test_the_scar_of_gross_slip_is_as_wide_as_its_volume_and_depth_say(
     assert rows[-1, 0] > 2.5 * contact
 
 
-def test_a_stroke_slides_where_the_approach_under_the_load_says() -> None:
+def test_a_stroke_slides_where_the_approach_under_the_load_says():
     # the strips move under tangential forces as under normal ones: all slide from mu times the approach on
     model = build_scene("cylinder_on_flat", strips=200, half_width=1.2 * A_LINE)
     _, approach = pressed(model, 1200.0)
@@ -106,7 +100,7 @@ def test_a_stroke_slides_where_the_approach_under_the_load_says() -> None:
 
 
 @pytest.mark.parametrize("name", ["cylinder_on_flat", "sphere_on_flat"])
-def test_what_needs_no_room_stays_as_it_is(name: str) -> None:
+def test_what_needs_no_room_stays_as_it_is(name):
     much = ExpectedWear(1.0, 1e-9)
     assert room(name, much) is None
     assert room(name, much, Q=10.0) is None
@@ -118,7 +112,7 @@ def test_what_needs_no_room_stays_as_it_is(name: str) -> None:
     assert scene_with_room("sdof_slider", slider, much) is slider
 
 
-def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears() -> None:
+def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears():
     stroke = 2.15e-6
     stick = line_stick_under_stroke(stroke, 0.6, 1.2e5, A_LINE, MODULUS, 6e-3)
     assert 0.0 < stick < 0.3 * A_LINE
@@ -133,7 +127,7 @@ def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears() -> N
 @pytest.mark.parametrize(
     ("name", "key", "fewest"), [("cylinder_on_flat", "strips", 10), ("sphere_on_flat", "patches", 4)]
 )
-def test_a_few_pairs_hold_what_partial_slip_wears(name: str, key: str, fewest: int) -> None:
+def test_a_few_pairs_hold_what_partial_slip_wears(name, key, fewest):
     load, contact = (1.2e5, A_LINE) if key == "strips" else (100.0, A_POINT)
     for share in (0.1, 0.5, 0.8, 0.9):
         for number in range(fewest, 25, 2):

@@ -1,14 +1,11 @@
 """What scenes tell beside their models: the mesh, natural frequencies, exact answers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import linalg
 
-from solver.model import ReducedModel
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_has, scene_mesh, scene_parameters
@@ -80,12 +77,7 @@ def test_a_constant_force_wears_at_a_constant_rate():
 
 @pytest.mark.parametrize(
     "changes",
-    [
-        {"damping": 1.0},
-        {"amplitude": 6.0},
-        {"frequency": 60.0},
-        {"frequency": np.sqrt(1.6e6) / (6 * np.pi)},
-    ],
+    [{"damping": 1.0}, {"amplitude": 6.0}, {"frequency": 60.0}, {"frequency": np.sqrt(1.6e6) / (6 * np.pi)}],
     ids=["damped", "stops", "stops far below resonance", "singular"],
 )
 def test_where_the_closed_form_does_not_hold_there_is_no_answer(changes):
@@ -122,7 +114,7 @@ def test_the_model_with_its_joint_stuck_has_the_frequencies_of_the_glued_sector(
     assert own.frequencies == pytest.approx(whole.frequencies[[0, 4]], rel=1e-9, abs=0.0)
 
 
-def chain(mass: np.ndarray, stiffness: np.ndarray) -> ReducedModel:
+def chain(mass, stiffness):
     """The two masses with others behind them."""
     model = build_scene("two_masses", scene_parameters("two_masses")(), 1)
     n = len(mass)

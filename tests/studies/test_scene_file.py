@@ -1,23 +1,18 @@
 """Scene files: bitwise round trip and other writers' habits."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import fields, replace
-from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
-from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.model import ContactInterface, LinearModel
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from studies.scene_file import read_scene, write_scene
 from tests.studies.scene_models import changed, drop, plain, put, sector
 
 
-def assert_same_bits(one: ReducedModel, other: ReducedModel) -> None:
+def assert_same_bits(one, other):
     assert (one.response_names, one.n_sectors, one.nodal_diameter) == (
         other.response_names,
         other.n_sectors,
@@ -39,38 +34,38 @@ def assert_same_bits(one: ReducedModel, other: ReducedModel) -> None:
         assert first.tobytes() == second.tobytes(), name
 
 
-def rough() -> ReducedModel:
+def rough():
     model = plain()
     return replace(model, contact=replace(model.contact, friction_coefficient=np.array([0.0, 0.1 + 0.2, 1.5])))
 
 
-def open_ended() -> ReducedModel:
+def open_ended():
     model = plain()
     return replace(model, contact=replace(model.contact, edge=np.array([False, True, True])))
 
 
 @pytest.mark.parametrize("build", [plain, sector, rough, open_ended])
-def test_round_trip_is_bitwise(tmp_path: Path, build: Callable[[], ReducedModel]) -> None:
+def test_round_trip_is_bitwise(tmp_path, build):
     model = build()
     write_scene(model, tmp_path / "scene.h5")
     assert_same_bits(read_scene(tmp_path / "scene.h5", 5), model)
     assert [path.name for path in tmp_path.iterdir()] == ["scene.h5"]
 
 
-def test_writing_twice_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_writing_twice_gives_the_same_bytes(tmp_path):
     for name in ("a.h5", "b.h5"):
         write_scene(sector(), tmp_path / name)
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
-def test_an_impossible_model_is_not_written(tmp_path: Path) -> None:
+def test_an_impossible_model_is_not_written(tmp_path):
     model = plain()
     with pytest.raises(SceneError, match="contact/area"):
         write_scene(replace(model, contact=replace(model.contact, area=-model.contact.area)), tmp_path / "scene.h5")
     assert not list(tmp_path.iterdir())
 
 
-def test_an_unwritable_file_leaves_the_old_one(tmp_path: Path) -> None:
+def test_an_unwritable_file_leaves_the_old_one(tmp_path):
     with pytest.raises(OSError, match="no_such_folder"):
         write_scene(plain(), tmp_path / "no_such_folder" / "scene.h5")
     (tmp_path / "folder.h5").mkdir()
@@ -79,8 +74,8 @@ def test_an_unwritable_file_leaves_the_old_one(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["folder.h5"]
 
 
-def test_optional_datasets_have_defaults(tmp_path: Path) -> None:
-    def change(file: h5py.File) -> None:
+def test_optional_datasets_have_defaults(tmp_path):
+    def change(file):
         drop("damping", "contact/gap", "contact/position", "contact/surface", "contact/normal_load")(file)
         file["contact/dofs"][1, 0] = 6
 
@@ -92,24 +87,24 @@ def test_optional_datasets_have_defaults(tmp_path: Path) -> None:
     assert model.contact.surface == ("", "", "")
 
 
-def test_responses_can_be_indices(tmp_path: Path) -> None:
+def test_responses_can_be_indices(tmp_path):
     model = read_scene(changed(tmp_path, plain(), put("response/dofs", np.array([6, 2], dtype=np.int32))))
     assert model.linear[0].response.tolist() == np.eye(7)[[6, 2]].tolist()
 
 
-def test_damping_can_be_coefficients_of_mass_and_stiffness(tmp_path: Path) -> None:
+def test_damping_can_be_coefficients_of_mass_and_stiffness(tmp_path):
     linear = read_scene(changed(tmp_path, plain(), put("damping", np.array([3.0, 1e-5])))).linear[0]
     assert np.array_equal(linear.damping, 3.0 * plain().linear[0].mass + 1e-5 * plain().linear[0].stiffness)
 
 
 @pytest.mark.parametrize("given", [np.array([np.nan, 1e-5]), np.array([1j, 1e-5])])
-def test_coefficients_of_damping_are_finite_and_real(tmp_path: Path, given: np.ndarray) -> None:
+def test_coefficients_of_damping_are_finite_and_real(tmp_path, given):
     with pytest.raises(SceneError, match="two finite numbers"):
         read_scene(changed(tmp_path, plain(), put("damping", given)))
 
 
-def test_other_types_of_numbers_are_read(tmp_path: Path) -> None:
-    def change(file: h5py.File) -> None:
+def test_other_types_of_numbers_are_read(tmp_path):
+    def change(file):
         put("contact/dofs", np.array([[0, 1, 2], [-1, 3, 4], [5, -1, -1]], dtype=np.float64))(file)
         put("mass", np.eye(7, dtype=np.float32))(file)
         put("damping", np.eye(7, dtype=np.int16))(file)
@@ -126,7 +121,7 @@ def test_other_types_of_numbers_are_read(tmp_path: Path) -> None:
     assert linear.stiffness.tobytes() == plain().linear[0].stiffness.tobytes()
 
 
-def test_complex_numbers_of_octave_are_read(tmp_path: Path) -> None:
+def test_complex_numbers_of_octave_are_read(tmp_path):
     values = plain().linear[0].load_harmonic
     compound = np.empty(7, dtype=[("real", "f8"), ("imag", "f8")])
     compound["real"], compound["imag"] = values.real, values.imag
@@ -134,15 +129,15 @@ def test_complex_numbers_of_octave_are_read(tmp_path: Path) -> None:
     assert model.linear[0].load_harmonic.tobytes() == values.tobytes()
 
 
-def test_the_users_own_attributes_are_left_alone(tmp_path: Path) -> None:
-    def change(file: h5py.File) -> None:
+def test_the_users_own_attributes_are_left_alone(tmp_path):
+    def change(file):
         file.attrs["code"] = "CalculiX"
         file["mass"].attrs["unit"] = "kg"
 
     assert_same_bits(read_scene(changed(tmp_path, plain(), change)), plain())
 
 
-def test_what_is_unusual_but_possible_passes() -> None:
+def test_what_is_unusual_but_possible_passes():
     model = plain()
     # A rigid body motion with mass that contact pairs can hold.
     free = model.linear[0].stiffness.copy()

@@ -1,7 +1,5 @@
 """The page of bundled scenes is what the scenes say, and the command prints the same."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -13,12 +11,12 @@ from studyrunner.cli import main
 PAGE = Path(__file__).parents[2] / "studies" / "SCENES.md"
 
 
-def test_the_page_is_what_the_scenes_say() -> None:
+def test_the_page_is_what_the_scenes_say():
     assert PAGE.read_text(encoding="utf-8") == all_scenes(), "python -m studies.scene_help > studies/SCENES.md"
 
 
 @pytest.mark.parametrize("model", BUNDLED)
-def test_every_parameter_has_a_row_with_its_default(model: str) -> None:
+def test_every_parameter_has_a_row_with_its_default(model):
     rows = [line.split(" | ") for line in scene_help(model).splitlines() if line.startswith("| `")]
     fields = scene_parameters(model).model_fields
     assert [row[0].strip("| `") for row in rows] == list(fields)
@@ -28,12 +26,12 @@ def test_every_parameter_has_a_row_with_its_default(model: str) -> None:
             assert float(row[1]) == field.default
 
 
-def test_the_command_prints_one_scene(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_one_scene(capsys):
     assert main(["--scene-help", "two_masses"]) == 0
     assert capsys.readouterr().out == scene_help("two_masses") + "\n"
 
 
-def test_an_unknown_scene_names_those_that_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_scene_names_those_that_there_are(capsys):
     assert main(["--scene-help", "two_mases"]) == 2
     told = capsys.readouterr().err
     assert "two_mases" in told

@@ -1,7 +1,5 @@
 """The registry of scenes and the three textbook scenes against their equations and exact motions."""
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys
@@ -10,34 +8,30 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from solver.model import ReducedModel
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from studies.scenes import BUNDLED, build_scene, scene_parameters
-from tests.references import (
-    coulomb_orbit,
-    vibro_impact_orbit,
-)
+from tests.references import coulomb_orbit, vibro_impact_orbit
 
 TEXTBOOK = ("sdof_slider", "two_masses", "vibro_impact")
 
 
-def build(model: str, **values: float) -> ReducedModel:
+def build(model, **values):
     return build_scene(model, scene_parameters(model)(**values), n_harmonics=3)
 
 
-def dynamic_stiffness(model: ReducedModel, omega: float) -> np.ndarray:
+def dynamic_stiffness(model, omega):
     linear = model.linear[0]
     return linear.stiffness - omega**2 * linear.mass + 1j * omega * linear.damping
 
 
 @pytest.mark.parametrize("model", TEXTBOOK)
-def test_textbook_scenes_are_possible_structures(model: str) -> None:
+def test_textbook_scenes_are_possible_structures(model):
     check_model(build(model), n_harmonics=21)
 
 
 @pytest.mark.parametrize("model", TEXTBOOK)
-def test_parameters_are_frozen_strict_and_have_units(model: str) -> None:
+def test_parameters_are_frozen_strict_and_have_units(model):
     parameters = scene_parameters(model)
     first = next(iter(parameters.model_fields))
     assert first == "friction_coefficient"
@@ -57,30 +51,30 @@ def test_parameters_are_frozen_strict_and_have_units(model: str) -> None:
             parameters(**wrong)
 
 
-def test_an_unknown_scene_is_named_with_the_known_ones() -> None:
+def test_an_unknown_scene_is_named_with_the_known_ones():
     with pytest.raises(SceneError, match="bladeless") as caught:
         scene_parameters("bladeless")
     assert caught.value.key == "model"
     assert all(name in caught.value.remedy for name in BUNDLED)
 
 
-def test_parameters_of_another_scene_are_a_bug() -> None:
+def test_parameters_of_another_scene_are_a_bug():
     with pytest.raises(TypeError, match="two_masses"):
         build_scene("two_masses", scene_parameters("sdof_slider")(), 1)
 
 
-def test_a_scene_error_survives_the_way_between_ranks_and_is_one_sentence() -> None:
+def test_a_scene_error_survives_the_way_between_ranks_and_is_one_sentence():
     error = pickle.loads(pickle.dumps(SceneError("contact/area", "-1.0 at index 3", "give a positive area in m2")))
     assert (error.key, error.value, error.remedy) == ("contact/area", "-1.0 at index 3", "give a positive area in m2")
     assert str(error) == "contact/area: -1.0 at index 3; give a positive area in m2."
 
 
-def test_listing_the_scenes_imports_nothing_heavy() -> None:
+def test_listing_the_scenes_imports_nothing_heavy():
     code = "import sys, studies.scenes; sys.exit(bool({'numpy', 'scipy', 'pydantic', 'h5py'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_the_slider_on_a_spring_has_the_normal_force_of_the_wear_equation() -> None:
+def test_the_slider_on_a_spring_has_the_normal_force_of_the_wear_equation():
     model = build("sdof_slider", normal_load=8.0, normal_stiffness=2e4)
     linear, depth = model.linear[0], 1e-4
     assert model.contact.dofs.tolist() == [[0, 1, -1]]
@@ -88,7 +82,7 @@ def test_the_slider_on_a_spring_has_the_normal_force_of_the_wear_equation() -> N
     assert linear.load_static - linear.stiffness @ [depth, 0.0] == pytest.approx([8.0 - 2e4 * depth, 0.0])
 
 
-def test_two_masses_are_those_of_the_reference() -> None:
+def test_two_masses_are_those_of_the_reference():
     model = build("two_masses")
     linear = model.linear[0]
     assert linear.mass.tolist() == [[1, 0], [0, 1]]
@@ -105,7 +99,7 @@ def test_two_masses_are_those_of_the_reference() -> None:
     assert 7.2 < abs(taken_up[1]) <= 7.2 * 4 / np.pi
 
 
-def test_the_vibro_impact_scene_is_the_bilinear_spring() -> None:
+def test_the_vibro_impact_scene_is_the_bilinear_spring():
     gap = 0.1
     model = build("vibro_impact", gap=gap)
     omega, n_samples = 1.1, 2048

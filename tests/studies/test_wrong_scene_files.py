@@ -1,36 +1,30 @@
 """Every wrong scene file is refused and named by its dataset."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-
 import h5py
 import numpy as np
 import pytest
 
-from solver.model import ReducedModel
 from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scene_file import read_mesh, read_scene, write_scene
 from tests.studies.scene_models import Change, changed, drop, general_model, linear_model, plain, poke, put, sector
 
 
-def asymmetric(file: h5py.File) -> None:
+def asymmetric(file):
     file["stiffness"][0, 1] *= 1 + 1e-6
 
 
-def not_hermitian(file: h5py.File) -> None:
+def not_hermitian(file):
     file["nd/2/stiffness"][0, 1] = np.conj(file["nd/2/stiffness"][0, 1])
 
 
-def without_stiffness_and_mass(file: h5py.File) -> None:
+def without_stiffness_and_mass(file):
     for key in ("stiffness", "mass"):
         file[key][0, :] = 0
         file[key][:, 0] = 0
 
 
-def rank_deficient(file: h5py.File) -> None:
+def rank_deficient(file):
     # The motion (1, 1, 0, ...) gets neither stiffness nor mass.
     motion = np.zeros(7)
     motion[:2] = np.sqrt(0.5)
@@ -40,44 +34,44 @@ def rank_deficient(file: h5py.File) -> None:
         file[key][...] = (matrix + matrix.T) / 2
 
 
-def free_where_no_contact_is(file: h5py.File) -> None:
+def free_where_no_contact_is(file):
     file["stiffness"][6, :] = 0
     file["stiffness"][:, 6] = 0
 
 
-def external(file: h5py.File) -> None:
+def external(file):
     del file["mass"]
     file["mass"] = h5py.ExternalLink("other.h5", "/mass")
 
 
-def soft(file: h5py.File) -> None:
+def soft(file):
     del file["mass"]
     file["mass"] = h5py.SoftLink("/stiffness")
 
 
-def external_storage(file: h5py.File) -> None:
+def external_storage(file):
     del file["mass"]
     file.create_dataset("mass", (7, 7), "f8", external=[("/dev/zero", 0, 392)])
 
 
-def virtual(file: h5py.File) -> None:
+def virtual(file):
     del file["mass"]
     layout = h5py.VirtualLayout((7, 7), "f8")
     layout[...] = h5py.VirtualSource("other.h5", "mass", (7, 7))
     file.create_virtual_dataset("mass", layout)
 
 
-def circle(file: h5py.File) -> None:
+def circle(file):
     file["contact/again"] = file["/"]
 
 
-def huge(file: h5py.File) -> None:
+def huge(file):
     del file["mass"]
     file.create_dataset("mass", (10**6, 10**6), "f8", chunks=True)
 
 
-def attribute(name: str, value: object) -> Change:
-    def change(file: h5py.File) -> None:
+def attribute(name, value):
+    def change(file):
         if value is None:
             del file.attrs[name]
         else:
@@ -110,11 +104,7 @@ WRONG_PLAIN: list[tuple[Change, str, str]] = [
     (poke("contact/area", 1, -1e-4), "contact/area", "-0.0001 at index 1"),
     (put("contact/area", np.ones(4)), "contact/area", "shape (4,)"),
     (put(FRICTION, np.full(2, 0.5)), FRICTION, "shape (2,)"),
-    (
-        put(FRICTION, np.array([0.5, 0.5, -0.1])),
-        FRICTION,
-        "-0.1 at index 2",
-    ),
+    (put(FRICTION, np.array([0.5, 0.5, -0.1])), FRICTION, "-0.1 at index 2"),
     (put("contact/edge", np.ones(2)), "contact/edge", "shape (2,)"),
     (put("contact/edge", np.array([0, 1, 2])), "contact/edge", "2"),
     (put("contact/dofs", np.array([[0, 1.5, 2]] * 3)), "contact/dofs", "1.5"),
@@ -171,9 +161,7 @@ WRONG_SECTOR: list[tuple[Change, str, str]] = [
     ("build", "change", "key", "value"),
     [(plain, *case) for case in WRONG_PLAIN] + [(sector, *case) for case in WRONG_SECTOR],
 )
-def test_a_wrong_file_is_named_by_its_dataset(
-    tmp_path: Path, build: Callable[[], ReducedModel], change: Change, key: str, value: str
-) -> None:
+def test_a_wrong_file_is_named_by_its_dataset(tmp_path, build, change, key, value):
     path = changed(tmp_path, build(), change)
     with pytest.raises(SceneError) as caught:
         read_scene(path)
@@ -183,7 +171,7 @@ def test_a_wrong_file_is_named_by_its_dataset(
 
 
 @pytest.mark.parametrize(("change", "key", "value"), WRONG_MESH)
-def test_a_wrong_mesh_is_named_by_its_dataset(tmp_path: Path, change: Change, key: str, value: str) -> None:
+def test_a_wrong_mesh_is_named_by_its_dataset(tmp_path, change, key, value):
     path = tmp_path / "scene.h5"
     nodes = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]])
     mesh = SurfaceMesh(nodes, np.array([[0, 1, 2, 3], [1, 4, 5, 2]]), ("blade", "disk"))
@@ -196,7 +184,7 @@ def test_a_wrong_mesh_is_named_by_its_dataset(tmp_path: Path, change: Change, ke
     assert value in caught.value.value
 
 
-def test_the_harmonics_say_which_nodal_diameters_are_needed(tmp_path: Path) -> None:
+def test_the_harmonics_say_which_nodal_diameters_are_needed(tmp_path):
     # Nodal diameter 1 of 6 sectors: harmonics see 0, 1, 2, 3, 2, 1, 0, ...
     linear = linear_model(7, hermitian=True, seed=3)
     models = {0: linear_model(7, hermitian=False, seed=2), 1: linear, 2: linear}
@@ -209,7 +197,7 @@ def test_the_harmonics_say_which_nodal_diameters_are_needed(tmp_path: Path) -> N
     assert "fewer than 3 harmonics" in caught.value.remedy
 
 
-def test_a_file_that_is_no_hdf5_or_damaged_is_said_so(tmp_path: Path) -> None:
+def test_a_file_that_is_no_hdf5_or_damaged_is_said_so(tmp_path):
     path = tmp_path / "scene.h5"
     write_scene(plain(), path)
     content = path.read_bytes()
@@ -220,7 +208,7 @@ def test_a_file_that_is_no_hdf5_or_damaged_is_said_so(tmp_path: Path) -> None:
         assert caught.value.key == "model"
 
 
-def test_a_missing_file_and_a_folder_are_the_systems_errors(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder_are_the_systems_errors(tmp_path):
     with pytest.raises(FileNotFoundError):
         read_scene(tmp_path / "none.h5")
     with pytest.raises(IsADirectoryError):

@@ -1,7 +1,5 @@
 """The plain twin of the result file: a dataset with everything in memory, written by xarray."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

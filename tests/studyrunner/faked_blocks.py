@@ -1,7 +1,5 @@
 """Blocks of missions whose wear follows a formula, in place of their harmonic balance; and a study of such blocks."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs of the command with a stand-in for the solver, which may do something else at one of its results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import pytest

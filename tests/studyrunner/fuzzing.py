@@ -1,10 +1,8 @@
-"""Mutations of valid study, scene and result files, and what the commands make of them, one after the other.
+"""Mutations of valid study, scene and result files, and what the commands make of each, in a process of its own.
 
 Kinds: "text" a study file, "scene" its scene file, "result" a result file, all under `run-study --plan`; "report" a
 result file under `study-report`; "reader" one that is opened and asked whatever it can be asked.
 """
-
-from __future__ import annotations
 
 import contextlib
 import faulthandler
@@ -13,12 +11,14 @@ import json
 import os
 import random
 import resource
+import shutil
+import signal
+import subprocess
 import sys
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
-
-import xarray as xr
+from typing import NamedTuple
 
 from studies import sandboxed_read
 from studyrunner import cli
@@ -26,41 +26,80 @@ from studyrunner.report.drawing import Drawing, style
 from studyrunner.user_error import UserError
 from tests.studyrunner.own_time import Stopwatch
 from tests.studyrunner.reading_process import read_in_a_fork
-from tests.studyrunner.result_mutations import mutate_result
+from tests.studyrunner.result_mutations import mutate_result, write_result
 
+STUDY = """
+[study]
+name = "s"
+title = "A study"
+[scene]
+model = "scene.h5"
+friction_coefficient = 0.5
+[axes]
+frequency = {start = 150.0, stop = 160.0, num = 3}
+wear_coefficient = [1e-11, 0]
+excitation_amplitude = 10.0
+step = [10, 100]
+scheme = ["implicit", "explicit"]
+sweep = "up"
+harmonics = ["auto", 3]
+[slow_time]
+cycles = 1000
+outputs = 3
+largest_depth = 1e-7
+[solver]
+samples = 64
+tolerance = 1e-8
+time_limit = 10.0
+[outputs]
+variables = ["default", "outcome"]
+loops = [0]
+"""
 NASTY = (
     *("nan", "-inf", "1e308", "-5e-324", "0", "-1", "9" * 400, "0x" + "f" * 300, "1e400", "true", "1979-05-27", "[]"),
-    *(
-        "{}",
-        "[[1]]",
-        '""',
-        '"auto"',
-        '"\\u001b[2J"',
-        "'../../x'",
-        "[1, 'a']",
-        "{start = 1, stop = 2, num = 1e9}",
-        '"default"',
-    ),
-    *(
-        "[" * 60 + "]" * 60,
-        "1e9",
-        '"adaptive"',
-        "[nan]",
-        "{start = nan, stop = 2, num = 3}",
-        "\x00",
-        "]",
-        "=",
-        '"',
-        "#",
-    ),
+    *("{}", "[[1]]", '""', '"auto"', '"\\u001b[2J"', "'../../x'", "[1, 'a']", "{start = 1, stop = 2, num = 1e9}", "="),
+    *('"default"', "[" * 60 + "]" * 60, "1e9", '"adaptive"', "[nan]", "{start = nan, stop = 2, num = 3}", "\x00", "]"),
+    *('"', "#"),
 )
-KINDS = {"text": 0.4, "scene": 0.4, "result": 0.2}
-"""What is fuzzed in the tests, and how much of it."""
-
+FILES = {"text": "study", "scene": "scene.h5", "result": "result", "report": "drawn", "reader": "drawn"}
+"""What is mutated of each kind."""
 SECONDS = {"text": 5.0, "scene": 5.0, "result": 5.0, "report": 10.0, "reader": 10.0}
 PATIENCE = 90
-PAINTED = 0.05
-"""Share of the reports whose figures are painted as well."""
+_ROOT = str(Path(__file__).parents[2])
+
+
+class Answer(NamedTuple):
+    """What became of an input. ended: kind and status. wrong: a text where that is not right. bytes: of its memory."""
+
+    ended: str
+    wrong: str
+    seconds: float = 0.0
+    bytes: int = 0
+
+
+def write_whole_files(folder: Path) -> None:
+    """A study, its scene, its result, and a result to draw."""
+    scene, study, result = (str(folder / name) for name in ("scene.h5", "study", "result"))
+    assert cli.main(["sdof_slider", "--write-scene", scene]) == 0
+    Path(study).write_text(STUDY, encoding="utf-8")
+    small = ("axes.frequency=150", "slow_time.cycles=0", "axes.harmonics=3", "outputs.loops=[]")
+    assert cli.main([study, "-o", result, *(part for text in small for part in ("--set", text))]) == 0
+    Path(f"{result}.progress").unlink()
+    write_result(folder / "drawn")
+
+
+def answers(made: Path, seed: int, numbers: range, kinds: tuple[str, ...]) -> list[Answer]:
+    """What another process, with a folder of its own, says of the inputs of these numbers."""
+    folder = made / f"{numbers.start}"
+    folder.mkdir()
+    for name in set(FILES.values()):
+        shutil.copy(made / name, folder)
+    given = [str(folder), str(seed), str(numbers.start), str(numbers.stop), *kinds]
+    command = [sys.executable, "-m", __name__, *given]
+    environment = {**os.environ, "PYTHONPATH": _ROOT, "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, env=environment, cwd=_ROOT, stdout=subprocess.PIPE, text=True, check=True)
+    shutil.rmtree(folder)
+    return [Answer(*json.loads(line)) for line in done.stdout.splitlines()]
 
 
 def mutate_text(text: str, chance: random.Random) -> bytes:
@@ -78,10 +117,8 @@ def mutate_text(text: str, chance: random.Random) -> bytes:
         else:
             at = chance.randrange(len(lines[place]) + 1)
             lines[place] = lines[place][:at] + chance.choice(NASTY) + lines[place][at:]
-    content = bytearray("\n".join(lines).encode("utf-8", "surrogatepass"))
-    if chance.random() < 0.2:
-        content = bytearray(mutate_bytes(bytes(content), chance))
-    return bytes(content)
+    content = "\n".join(lines).encode("utf-8", "surrogatepass")
+    return mutate_bytes(content, chance) if chance.random() < 0.2 else content
 
 
 def mutate_bytes(content: bytes, chance: random.Random) -> bytes:
@@ -92,26 +129,30 @@ def mutate_bytes(content: bytes, chance: random.Random) -> bytes:
     if way == 0:
         return bytes(changed[: chance.randrange(len(changed))])
     for _ in range(chance.choice([1, 1, 2, 8, 64])):
-        place = chance.randrange(max(1, last))
-        length = chance.choice([1, 2, 4, 8, 64])
-        if way == 1:
-            changed[place : place + 1] = bytes([changed[place] ^ (1 << chance.randrange(8))]) if changed else b""
-        elif way == 2:
-            changed[place : place + length] = chance.randbytes(length)
-        elif way == 3:
-            changed[place : place + length] = b"\xff" * length
-        elif way == 4:
-            changed[place : place + length] = bytes(length)
-        else:
-            source = chance.randrange(max(1, last))
-            changed[place : place + length] = changed[source : source + length]
+        place, source = chance.randrange(max(1, last)), chance.randrange(max(1, last))
+        length = chance.choice([1, 2, 4, 8, 64]) if way > 1 else 1
+        changed[place : place + length] = {
+            1: bytes([changed[place] ^ (1 << chance.randrange(8))]),
+            2: chance.randbytes(length),
+            3: b"\xff" * length,
+            4: bytes(length),
+            5: changed[source : source + length],
+        }[way]
     return bytes(changed)
 
 
-def address_space() -> int:
-    """Bytes that this process has set aside."""
-    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-    return pages * resource.getpagesize()
+def _mutate(kind: str, whole: Mapping[str, bytes], chance: random.Random) -> None:
+    """Writes the files of one input: all of them, one mutated."""
+    for name, content in whole.items():
+        Path(name).write_bytes(content)
+    mutated = Path(FILES[kind])
+    if kind == "text":
+        mutated.write_bytes(mutate_text(whole["study"].decode(), chance))
+    # what stands in a result is taken for what it was; under run-study only its study and scene are read
+    elif kind not in ("report", "reader") or chance.random() < 0.4:
+        mutated.write_bytes(mutate_bytes(whole[FILES[kind]], chance))
+    else:
+        mutate_result(mutated, chance)
 
 
 def ask(path: Path) -> int:
@@ -125,41 +166,21 @@ def ask(path: Path) -> int:
         print(f"reader: {error}", file=sys.stderr)
         return 2
     with dataset:
+        surfaces = []
+        with contextlib.suppress(KeyError):
+            surfaces = list(dataset.fretwear.surfaces[:3])
         questions: list[Callable[[], object]] = [
             dataset.fretwear.response,
             lambda: join_results([dataset, dataset]),
             lambda: join_results([dataset], dim="friction_coefficient"),
             *(lambda pair=pair: dataset.fretwear.loop(pair) for pair in dataset["contact"].values.tolist()[:3]),
-            *(lambda name=name: dataset.fretwear.flank("wear_depth", name) for name in _surfaces(dataset)),
+            *(lambda name=name: dataset.fretwear.flank("wear_depth", name) for name in surfaces),
             *(lambda name=name: dataset[name].load() for name in map(str, dataset.variables)),
         ]
         for question in questions:
             with contextlib.suppress(ValueError, KeyError):
                 question()
     return 0
-
-
-def _surfaces(dataset: xr.Dataset) -> tuple[str, ...]:
-    try:
-        return tuple(dataset.fretwear.surfaces[:3])
-    except KeyError:
-        return ()
-
-
-def _mutate(kind: str, whole: Mapping[str, bytes], chance: random.Random) -> None:
-    """Writes the files of one input: all of them, one mutated."""
-    content = dict(whole)
-    if kind == "text":
-        content["study"] = mutate_text(whole["study"].decode(), chance)
-    else:
-        name = {"scene": "scene.h5", "result": "result"}.get(kind, "drawn")
-        # what stands in a result is taken for what it was; under run-study only its study and scene are read
-        if name != "drawn" or chance.random() < 0.4:
-            content[name] = mutate_bytes(whole[name], chance)
-    for name, what in content.items():
-        Path(name).write_bytes(what)
-    if kind in ("report", "reader") and content["drawn"] is whole["drawn"]:
-        mutate_result(Path("drawn"), chance)
 
 
 def _lay_out(drawing: Drawing, folder: Path) -> tuple[Path, Path]:
@@ -171,75 +192,86 @@ def _lay_out(drawing: Drawing, folder: Path) -> tuple[Path, Path]:
     return paths
 
 
-def _commands() -> dict[str, Callable[[], int]]:
+def command_of(kind: str) -> int:
+    """Exit status of the command on the files in this folder."""
     from studyrunner.report import cli as report
 
-    return {
-        "text": lambda: cli.main(["study", "--plan"]),
-        "scene": lambda: cli.main(["study", "--plan"]),
-        "result": lambda: cli.main(["result", "--plan"]),
-        "report": lambda: report.main(["drawn", "-o", "report"]),
-        "reader": lambda: ask(Path("drawn")),
-    }
+    if kind == "reader":
+        return ask(Path("drawn"))
+    if kind == "report":
+        return report.main(["drawn", "-o", "report"])
+    return cli.main(["result" if kind == "result" else "study", "--plan"])
 
 
-def run(folder: Path, seed: int, numbers: Sequence[int], kinds: Mapping[str, float]) -> dict[str, object]:
-    """Statuses and the worst of the files with these numbers; what is wrong with one is in `wrong`."""
-    os.chdir(folder)
+def _answer(kind: str, name: str) -> Answer:
+    """What the command makes of the files in this folder, within the limits of memory."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    own = pages * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (own + 2**31,) * 2)
     largest, waited = 0, 0.0
 
-    def read(arguments: Sequence[str]) -> tuple[int, str]:
+    def read(arguments: list[str]) -> tuple[int, str]:
         nonlocal largest, waited
         # what this process has already is none of the file's
-        found = read_in_a_fork(arguments, address_space())
+        found = read_in_a_fork(arguments, own)
         largest, waited = max(largest, found.largest), waited + found.waited
         return found.status, found.said
 
     sandboxed_read.run_sandbox = read
+    before, watch = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, Stopwatch()
+    said, printed = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stderr(said), contextlib.redirect_stdout(printed):
+        try:
+            status = command_of(kind)
+        except Exception:
+            status = 1
+            traceback.print_exc()
+    seconds, lines = watch.seconds(waited), said.getvalue().splitlines()
+    right = (status == 2 and len(lines) == 1 and lines[0].isprintable()) or (status == 0 and not lines)
+    right = right and seconds <= SECONDS[kind] and len("".join(lines)) <= 2000 and "\x1b" not in printed.getvalue()
+    wrong = "" if right else f"{name}: status {status}, {seconds:.1f} s: {said.getvalue()[-1500:]}"
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    return Answer(f"{kind} {status}", wrong, seconds, 1024 * max(grown, largest))
+
+
+def answer_in_a_fork(kind: str, name: str, whole: Mapping[str, bytes], chance: random.Random) -> Answer:
+    """What becomes of an input, in a copy of this process that no hang and no crash gets out of."""
+    receive, send = os.pipe()
+    child = os.fork()
+    if child == 0:
+        signal.alarm(PATIENCE)
+        try:
+            # what is made of a file may crash the library that makes it
+            _mutate(kind, whole, chance)
+            os.write(send, b"made\n")
+            os.write(send, json.dumps(_answer(kind, name)).encode())
+        finally:
+            os._exit(0)
+    os.close(send)
+    with os.fdopen(receive) as pipe:
+        made, _, answer = pipe.read().partition("\n")
+    _, status = os.waitpid(child, 0)
+    if answer:
+        return Answer(*json.loads(answer))
+    wrong = f"{name}: the process ended: {os.waitstatus_to_exitcode(status)}" if made else ""
+    return Answer(f"{kind} {'died' if made else 'not made'}", wrong)
+
+
+def run(folder: str, seed: str, first: str, last: str, *kinds: str) -> None:
+    """Prints a line for each input."""
+    os.chdir(folder)
+    faulthandler.enable()
     sandboxed_read.LONGEST = 1
-    whole = {name: Path(name).read_bytes() for name in ("study", "scene.h5", "result", "drawn") if Path(name).exists()}
-    commands = _commands()
-    painted, Drawing.save = Drawing.save, _lay_out  # type: ignore[method-assign]
-    for kind in {"report", "reader"} & set(kinds):
-        # what it loads is none of the file's either
-        assert commands[kind]() == 0
-    statuses: dict[str, int] = {}
-    wrong: list[str] = []
-    slowest = 0.0
-    began_with = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    resource.setrlimit(resource.RLIMIT_AS, (address_space() + 2**31,) * 2)
-    for number in numbers:
+    Drawing.save = _lay_out  # type: ignore[method-assign]
+    # what a command loads is none of the file's
+    with contextlib.redirect_stdout(io.StringIO()):
+        assert all(command_of(kind) == 0 for kind in kinds)
+    whole = {name: Path(name).read_bytes() for name in set(FILES.values())}
+    for number in range(int(first), int(last)):
         chance = random.Random(f"{seed} {number}")
-        kind = chance.choices(list(kinds), list(kinds.values()))[0]
-        # what is made of a file may crash the library that makes it
-        Path("number").write_text(f"making {kind} {seed} {number}", encoding="ascii")
-        _mutate(kind, whole, chance)
-        Drawing.save = painted if chance.random() < PAINTED else _lay_out  # type: ignore[method-assign]
-        Path("number").write_text(f"{kind} {seed} {number}", encoding="ascii")
-        said, printed = io.StringIO(), io.StringIO()
-        # the end of this process, with the place: no hang gets past it
-        faulthandler.dump_traceback_later(PATIENCE, exit=True)
-        watch, waited = Stopwatch(), 0.0
-        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(printed):
-            try:
-                status = commands[kind]()
-            except Exception:
-                status = 1
-                traceback.print_exc()
-        seconds = watch.seconds(waited)
-        faulthandler.cancel_dump_traceback_later()
-        slowest = max(slowest, seconds)
-        lines = said.getvalue().splitlines()
-        right = (status == 2 and len(lines) == 1 and lines[0].isprintable()) or (status == 0 and not lines)
-        if not right or seconds > SECONDS[kind] or len("".join(lines)) > 2000 or "\x1b" in printed.getvalue():
-            wrong.append(f"{kind} {seed} {number}: status {status}, {seconds:.1f} s: {said.getvalue()[-1500:]}")
-        key = f"{kind} {status}"
-        statuses[key] = statuses.get(key, 0) + 1
-    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - began_with
-    return {"statuses": statuses, "wrong": wrong, "slowest": slowest, "largest": 1024 * max(grown, largest)}
+        kind = chance.choice(kinds)
+        print(json.dumps(answer_in_a_fork(kind, f"{kind} {seed} {number}", whole, chance)), flush=True)
 
 
 if __name__ == "__main__":
-    first, last = int(sys.argv[3]), int(sys.argv[4])
-    wanted = json.loads(sys.argv[5]) if len(sys.argv) > 5 else KINDS
-    print(json.dumps(run(Path(sys.argv[1]), int(sys.argv[2]), range(first, last), wanted)))
+    run(*sys.argv[1:])

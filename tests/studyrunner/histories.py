@@ -1,7 +1,5 @@
 """A wear history with numbers that are easy to follow."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from solver.outcome import Outcome

@@ -1,7 +1,5 @@
 """Study, scene and result files that were made to do harm."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import zlib

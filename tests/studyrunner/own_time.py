@@ -1,7 +1,5 @@
 """Time without that in which others of the machine had the processor: limits of time are those of a machine at rest."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -4,8 +4,6 @@ A new process is what `studies.sandboxed_read` starts; most of what it takes is 
 one loads, and nothing else, when it forks.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Result files with parts that are not what they were: attributes, values, types, dimensions, whole variables."""
 
-from __future__ import annotations
-
 import contextlib
 import random
 from collections.abc import Callable

@@ -1,11 +1,9 @@
 """Records of histories with given numbers, for what is collected from them at the end of a run."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studyrunner.checkpoint.records import record_of, record_type
 from studyrunner.plan.planning import build_tasks
@@ -14,8 +12,6 @@ from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from tests.studyrunner.fakes import FACTS, changed, fake_histories
-
-Batch = tuple[list[tuple[Index, ...]], NDArray[np.void]]
 
 
 def results_of(study: Study, **given: Callable[[Index], object]) -> list[MarchResult]:
@@ -32,11 +28,20 @@ def results_of(study: Study, **given: Callable[[Index], object]) -> list[MarchRe
     return results
 
 
-def batches(study: Study, results: Sequence[MarchResult], size: int = 3, facts: SceneFacts = FACTS) -> list[Batch]:
-    """Points and records of the results, some at a time."""
-    kind = record_type(study, facts)
-    found = []
-    for first in range(0, len(results), size):
-        some = results[first : first + size]
-        found.append(([result.points for result in some], np.concatenate([record_of(kind, one) for one in some])))
-    return found
+def told(
+    ask: Callable[[Any], Any],
+    make: Callable[[], Any],
+    study: Study,
+    results: list[MarchResult],
+    facts: SceneFacts = FACTS,
+) -> Any:
+    """What a collector says of results that come three at a time, whatever their order. make: a new collector."""
+    kind, said = record_type(study, facts), []
+    for given in (results, results[::-1]):
+        collector = make()
+        for first in range(0, len(given), 3):
+            some = given[first : first + 3]
+            collector.add([result.points for result in some], np.concatenate([record_of(kind, one) for one in some]))
+        said.append(ask(collector))
+    assert said[0] == said[1]
+    return said[0]

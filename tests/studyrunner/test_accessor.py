@@ -1,7 +1,5 @@
 """The accessor of result files: complex responses, flanks as grids, loops, files joined."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Advice on points that failed, or that are known less well than was asked for: nothing in use, nothing ignored."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest
@@ -22,14 +20,14 @@ ALL = [
 """Everything that a point may be computed with."""
 
 
-def texts_on(used: Used) -> list[str]:
+def texts_on(used):
     """All that may be advised on a point."""
     errors = [advise_error(error, rates, used) for error in (0.013, 0.5) for rates in ([], [0.01, 0.3], [0.0, 0.0])]
     return [*(advise(outcome.meaning, used) for outcome in Outcome), *errors, advise_steps(used)]
 
 
 @pytest.mark.parametrize("used", ALL, ids=str)
-def test_nothing_is_advised_that_is_in_use_or_not_used(used: Used) -> None:
+def test_nothing_is_advised_that_is_in_use_or_not_used(used):
     for text in texts_on(used):
         for scheme in {used.scheme, *used.schemes}:
             assert f'scheme = "{scheme}"' not in text
@@ -44,7 +42,7 @@ def test_nothing_is_advised_that_is_in_use_or_not_used(used: Used) -> None:
             assert "smaller step" not in text
 
 
-def test_settings_of_a_point_are_its_own() -> None:
+def test_settings_of_a_point_are_its_own():
     changes = ("axes.scheme=['implicit', 'explicit']", "axes.harmonics=['auto', 5]", "axes.rtol=[1e-2, 1e-3]")
     study = read_study("sdof_slider", (*changes, "slow_time.largest_depth=1e-6"))
     names = list(study.dimensions)
@@ -76,13 +74,13 @@ def test_settings_of_a_point_are_its_own() -> None:
         (0.0, 0.01, "0 %"),
     ],
 )
-def test_an_error_is_shown_on_its_side_of_rtol(error: float, rtol: float, text: str) -> None:
+def test_an_error_is_shown_on_its_side_of_rtol(error, rtol, text):
     assert show_percent(error, rtol) == text
     if error < 1.0:
         shown, limit = float(text.removesuffix(" %")), float(show_rtol(rtol).removesuffix(" %"))
         assert (shown <= limit) == (error <= rtol)
 
 
-def test_what_is_not_finite_is_not_known() -> None:
+def test_what_is_not_finite_is_not_known():
     assert known_to(0.010003, 0.01) == "is known to 1.0003 % only"
     assert known_to(float("inf"), 0.01) == "is not known"

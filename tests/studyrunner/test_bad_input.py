@@ -1,7 +1,5 @@
 """Bad input: exit status 2 and one line that names the file, the key, the value and what would be right."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -34,12 +32,7 @@ WRONG_KEYS = {
     "unknown key": ("axes.freqency=1", "axes.freqency", "1", "frequency"),
     "unknown table": ("axis.frequency=1", "axis", "frequency", "axes"),
     "a name of the literature": ("axes.k_w=1", "axes.k_w", "1", "unknown key, give wear_coefficient"),
-    "values for a key that is no axis": (
-        "scene.mass=[1.0, 2.0]",
-        "scene.mass",
-        "[1.0, 2.0]",
-        "the list as axes.mass",
-    ),
+    "values for a key that is no axis": ("scene.mass=[1.0, 2.0]", "scene.mass", "[1.0, 2.0]", "the list as axes.mass"),
     "wrong type": ("axes.frequency=fast", "axes.frequency", '"fast"', "number"),
     "NaN": ("axes.wear_coefficient=nan", "axes.wear_coefficient", "nan", "finite"),
     "negative area": ("scene.area=-1e-4", "scene.area", "-0.0001", "above 0"),
@@ -85,7 +78,7 @@ WRONG_KEYS = {
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
     with h5py.File(tmp_path / "s.nc", "w") as earlier:
@@ -93,7 +86,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def line_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+def line_of(arguments, capsys):
     """The one line that bad input ends with; nothing else is said, nothing is written."""
     before = {path: path.stat().st_mtime_ns for path in Path.cwd().iterdir()}
     assert main(arguments) == 2
@@ -106,7 +99,7 @@ def line_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 
 @pytest.mark.parametrize("case", WRONG_KEYS)
-def test_wrong_key(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_key(case, folder, capsys):
     override, key, value, remedy = WRONG_KEYS[case]
     line = line_of(["s.toml", "--set", override], capsys)
     start, _, rest = line.partition(f"s.toml: {key} = ")
@@ -116,7 +109,7 @@ def test_wrong_key(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) 
     assert remedy in advice
 
 
-def test_loops_that_no_message_holds(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_loops_that_no_message_holds(folder, capsys):
     counts = ["--set", "slow_time.cycles=1e6", "--set", "slow_time.outputs=200000"]
     line = line_of(["s.toml", "--set", "outputs.loops=[0]", *counts], capsys)
     assert "outputs.loops = [0]" in line
@@ -131,7 +124,7 @@ def test_loops_that_no_message_holds(folder: Path, capsys: pytest.CaptureFixture
         ("frequency = [150.0]\n", "axes.frequency"),
     ],
 )
-def test_missing_key(removed: str, key: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_key(removed, key, folder, capsys):
     (folder / "s.toml").write_text(
         STUDY.replace(removed, "[other]\nname" if "name" in removed else ""), encoding="utf-8"
     )
@@ -141,7 +134,7 @@ def test_missing_key(removed: str, key: str, folder: Path, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize("value", ["5", "[5, 7]"])
-def test_solver_key_given_twice(value: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_solver_key_given_twice(value, folder, capsys):
     text = STUDY.replace("[slow_time]", "harmonics = [1, 3]\n[slow_time]")
     text = text.replace("harmonics = 5", f"harmonics = {value}")
     (folder / "s.toml").write_text(text, encoding="utf-8")
@@ -153,7 +146,7 @@ def test_solver_key_given_twice(value: str, folder: Path, capsys: pytest.Capture
 @pytest.mark.parametrize(
     ("text", "words"), [("[study\n", "valid TOML"), ("\xff", "UTF-8"), ("a = 1\n", "unknown table")]
 )
-def test_file_that_is_no_study(text: str, words: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_file_that_is_no_study(text, words, folder, capsys):
     (folder / "s.toml").write_bytes(text.encode("latin-1"))
     line = line_of(["s.toml"], capsys)
     assert "s.toml" in line
@@ -181,16 +174,12 @@ def test_file_that_is_no_study(text: str, words: str, folder: Path, capsys: pyte
         (["s.toml", "--write-scene", "nowhere/out.h5"], ("command line", "--write-scene", "folder that exists")),
     ],
 )
-def test_command_line(
-    arguments: list[str], words: tuple[str, ...], folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_line(arguments, words, folder, capsys):
     line = line_of(arguments, capsys)
     for word in words:
         assert word in line
 
 
-def test_write_protected_output(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_write_protected_output(folder, capsys, monkeypatch):
     monkeypatch.setattr(os, "access", lambda *_: False)
     assert "write-protected" in line_of(["s.toml"], capsys)

@@ -1,9 +1,6 @@
 """Every bundled study runs, at a small size, and shows what it is there to show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -42,7 +39,7 @@ SMALL = {
     ],
     "modes": ["axes.modal_amplitude=[2e-4, 4e-4]"],
     "scatter": [
-        "scatter.samples=4",
+        "scatter.samples=2",
         "scene.mesh=1",
         "axes.frequency=212.45",
         "slow_time.cycles=3000",
@@ -74,7 +71,7 @@ SMALL = {
 MAY_FAIL = ("extremes",)
 
 
-def run_small(name: str, folder: Path) -> xr.Dataset:
+def run_small(name, folder):
     path = folder / f"{name}.nc"
     changes = [word for change in SMALL[name] for word in ("--set", change)]
     assert main([name, *changes, "-o", str(path)]) in ((0, 3) if name in MAY_FAIL else (0,))
@@ -86,19 +83,19 @@ def test_all_bundled_studies_are_here():
     assert set(bundled_studies()) == set(SMALL)
 
 
-def wears_near_its_resonance_only(result: xr.Dataset) -> None:
+def wears_near_its_resonance_only(result):
     worn = result.worn_volume.isel(cycle=-1).squeeze()
     beside, near = worn.sel(frequency=207.0), worn.sel(frequency=212.5)
     assert (near > 1e-12).all()
     assert (beside < 1e-6 * near).all()
 
 
-def has_two_branches(result: xr.Dataset) -> None:
+def has_two_branches(result):
     response = result.response_amplitude.squeeze()
     assert (response.sel(sweep="up") > 1.3 * response.sel(sweep="down")).any()
 
 
-def agrees_better_with_smaller_steps(result: xr.Dataset) -> None:
+def agrees_better_with_smaller_steps(result):
     worn = result.worn_volume.isel(cycle=-1).sel(harmonics=5).squeeze()
     assert (worn.sel(scheme="adaptive") == worn.sel(scheme="adaptive").isel(step=0)).all()
     for scheme in ("implicit", "explicit"):
@@ -106,13 +103,13 @@ def agrees_better_with_smaller_steps(result: xr.Dataset) -> None:
         assert fine < 0.7 * coarse
 
 
-def wears_in_each_sample_another_volume(result: xr.Dataset) -> None:
+def wears_in_each_sample_another_volume(result):
     worn = result.worn_volume.isel(cycle=-1).squeeze()
-    assert len(set(worn.values.tolist())) == result.sizes["sample"] == 4
+    assert len(set(worn.values.tolist())) == result.sizes["sample"] == 2
     assert (result.sample_gap.std("sample") > 0.0).all()
 
 
-def resonates_lower_the_more_it_is_worn(result: xr.Dataset) -> None:
+def resonates_lower_the_more_it_is_worn(result):
     assert (
         result.natural_frequency.diff("cycle") + result.natural_frequency_error.isel(cycle=slice(1, None)) < 0
     ).all()

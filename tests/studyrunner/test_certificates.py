@@ -1,21 +1,16 @@
 """The table of the worst certificates: against a plain loop over all points and cycles, and its wording."""
 
-from __future__ import annotations
-
 import itertools
-from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
-from studyrunner.checkpoint.records import record_of, record_type
 from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.results import MarchResult
-from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.certificates import CertificateTable
 from studyrunner.variables import CERTIFICATE
 from tests.studyrunner.fakes import FACTS, changed, fake_histories, without_values
+from tests.studyrunner.results_of import told
 
 GRID = (
     "axes.frequency=[160, 150, 155]",
@@ -28,7 +23,7 @@ GRID = (
 )
 
 
-def study_with_results(overrides: Sequence[str] = GRID) -> tuple[Study, list[MarchResult]]:
+def study_with_results(overrides=GRID):
     """Random certificates, some of them not estimated."""
     study = read_study("sdof_slider", overrides)
     plan = build_tasks(study, FACTS.n_displacements)
@@ -43,23 +38,13 @@ def study_with_results(overrides: Sequence[str] = GRID) -> tuple[Study, list[Mar
     return study, results
 
 
-def summarise_certificates(study: Study, results: Sequence[MarchResult]) -> str:
-    """The table of results that come in some at a time."""
-    table = CertificateTable(study, FACTS)
-    for some in (results[:1], results[1:6], results[6:]):
-        kind = record_type(study, FACTS)
-        records = np.concatenate([np.empty(0, kind), *(record_of(kind, result) for result in some)])
-        table.add([result.points for result in some], records)
-    return table.format()
-
-
-def table_of(study: Study, results: Sequence[MarchResult]) -> dict[str, str]:
-    lines = summarise_certificates(study, results).splitlines()
+def table_of(study, results):
+    lines = told(CertificateTable.format, lambda: CertificateTable(study, FACTS), study, results).splitlines()
     width = len(lines[0]) - len(lines[0].split("  ")[-1].lstrip())
     return {line[:width].strip(): line[width:].strip() for line in lines}
 
 
-def worst_by_plain_loop(study: Study, results: Sequence[MarchResult], name: str) -> str:
+def worst_by_plain_loop(study, results, name):
     """Walks through the points in the order of the file, then through the cycles; the first of equal values counts."""
     by_point = {point: result for result in results for point in result.points}
     best, where = -1.0, ""
@@ -81,24 +66,14 @@ def worst_by_plain_loop(study: Study, results: Sequence[MarchResult], name: str)
 
 
 @pytest.mark.parametrize("name", CERTIFICATE)
-def test_worst_of_all_converged_points_and_where(name: str) -> None:
+def test_worst_of_all_converged_points_and_where(name):
     study, results = study_with_results()
     place = next(index for index, result in enumerate(results) if np.nanmax(result.values[name]) > 0.8)
     results[place] = without_values(results[place], 4)
     assert table_of(study, results)[CERTIFICATE[name]] == worst_by_plain_loop(study, results, name)
 
 
-def test_order_of_the_results_does_not_matter() -> None:
-    study, results = study_with_results()
-    for place, jump in ((3, 700.0), (5, 700.0), (9, 900.0)):
-        results[place] = changed(results[place], jump_cycle=jump, fold_frequency=150.0 + place, oscillates=True)
-    forwards = summarise_certificates(study, results)
-    assert summarise_certificates(study, results[::-1]) == forwards
-    shuffled = [results[place] for place in np.random.default_rng(1).permutation(len(results))]
-    assert summarise_certificates(study, shuffled) == forwards
-
-
-def test_jumps_oscillation_and_unstable_states_are_counted() -> None:
+def test_jumps_oscillation_and_unstable_states_are_counted():
     study, results = study_with_results(("axes.frequency=[150, 160]", "axes.scheme=implicit", "slow_time.outputs=3"))
     results[0] = changed(results[0], jump_cycle=900.0)
     results[1] = changed(results[1], jump_cycle=800.0, oscillates=True)
@@ -109,7 +84,7 @@ def test_jumps_oscillation_and_unstable_states_are_counted() -> None:
     assert table_of(study, results)["unstable states"].startswith("1, the first at frequency 150 Hz")
 
 
-def test_explicit_steps_beyond_their_limit_are_counted() -> None:
+def test_explicit_steps_beyond_their_limit_are_counted():
     overrides = ("axes.frequency=150", "axes.step=[100, 1000, 1e6]", "axes.scheme=['implicit', 'explicit']")
     study, results = study_with_results((*overrides, "slow_time.cycles=5000"))
     limited = [changed(result, step_limit=500.0) for result in results]

@@ -1,19 +1,15 @@
 """What of a study is left to do after an earlier run: by the tasks that are asked for."""
 
-from __future__ import annotations
-
 import contextlib
 import sqlite3
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from solver.outcome import COMPLETE
 from solver.packing import Packed
-from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
+from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS
 from studyrunner.checkpoint.database import RESULTS, STARTS
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.tasks import BranchTask, MarchTask
@@ -31,14 +27,14 @@ BASE = (
 
 
 @contextlib.contextmanager
-def completion_of(folder: Path, *overrides: str) -> Iterator[CompletionIndex]:
+def completion_of(folder, *overrides):
     study = read_study("sdof_slider", (*BASE, *overrides))
     completion = open_completion(study, build_tasks(study, FACTS.n_displacements), folder)
     with contextlib.closing(completion.store):
         yield completion
 
 
-def compute(completion: CompletionIndex, n_tasks: int = 1000, failing: frozenset[int] = frozenset()) -> tuple[int, int]:
+def compute(completion, n_tasks=1000, failing=frozenset()):
     """Does what is left as a run does, up to a number of tasks; how many start states and marches it computed.
 
     failing: numbers of marches that fail.
@@ -64,12 +60,12 @@ def compute(completion: CompletionIndex, n_tasks: int = 1000, failing: frozenset
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     return tmp_path / "out.nc.progress"
 
 
 @pytest.fixture
-def finished(folder: Path) -> Path:
+def finished(folder):
     """The folder of a study that is finished: 2 branches of 3 start states, 2 marches from each."""
     with completion_of(folder) as completion:
         assert compute(completion) == (6, 12)
@@ -77,7 +73,7 @@ def finished(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("n_tasks", [1, 4, 7, 17])
-def test_a_run_that_stopped_anywhere_goes_on_there(n_tasks: int, folder: Path) -> None:
+def test_a_run_that_stopped_anywhere_goes_on_there(n_tasks, folder):
     with completion_of(folder) as completion:
         first = compute(completion, n_tasks)
     with completion_of(folder) as completion:
@@ -105,10 +101,20 @@ def test_a_run_that_stopped_anywhere_goes_on_there(n_tasks: int, folder: Path) -
         ("axes.frequency=[110, 120]", (0, 0)),
         ("axes.sweep=['up', 'ramp']", (3, 6)),
         ("solver.time_limit=100", (0, 0)),
-        ("solver.tolerance=1e-9", (6, 12)),
+        *((f"solver.{key}", (6, 12)) for key in ("tolerance=1e-9", "harmonics=5", "samples=128", "rtol=1e-3")),
+        ("scene.friction_coefficient=0.4", (6, 12)),
+        ("axes.scheme=['explicit']", (0, 12)),
+        ("axes.scheme=['adaptive']", (0, 6)),
+        ("outputs.loops=[0]", (0, 12)),
+        ("slow_time.cycles=2000", (0, 12)),
+        ("slow_time.outputs=[0, 400, 1000]", (0, 12)),
+        *((change, (0, 0)) for change in ("study.title='another'", "axes.frequency=[120, 100, 110]")),
+        *((f"axes.{change}", (0, 0)) for change in ("wear_coefficient=[1e-11, 5e-12]", "sweep=['down', 'up']")),
+        ("axes.excitation_amplitude=[9, 10]", (6, 12)),
+        ("axes.harmonics=['auto', 3]", (6, 12)),
     ],
 )
-def test_a_changed_study_computes_only_what_changed(change: str, expected: tuple[int, int], finished: Path) -> None:
+def test_a_changed_study_computes_only_what_changed(change, expected, finished):
     with completion_of(finished, change) as completion:
         assert compute(completion) == expected
     with completion_of(finished, change) as completion:
@@ -118,7 +124,20 @@ def test_a_changed_study_computes_only_what_changed(change: str, expected: tuple
         assert compute(completion) == (0, 0)
 
 
-def test_points_that_failed_are_tried_again_where_asked_for_only(folder: Path) -> None:
+def test_all_tasks_have_names_of_their_own(folder):
+    axes = ("axes.excitation_amplitude=[9, 10]", "axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.step=[10, 100]")
+    words = (
+        "axes.scheme=['implicit', 'explicit', 'adaptive']",
+        "axes.sweep=['up', 'down', 'ramp']",
+        "axes.harmonics=[3, 5]",
+    )
+    with completion_of(folder, *axes, *words) as completion:
+        n_marches = sum(len(line) for line in completion.plan.marches)
+        assert compute(completion) == (3 * 2 * 3 * 2, n_marches)
+        assert completion.n_points_finished == completion.plan.n_points == 648
+
+
+def test_points_that_failed_are_tried_again_where_asked_for_only(folder):
     with completion_of(folder) as completion:
         compute(completion, failing=frozenset({2, 7}))
     with completion_of(folder) as completion:
@@ -131,7 +150,7 @@ def test_points_that_failed_are_tried_again_where_asked_for_only(folder: Path) -
         assert compute(completion) == (0, 0)
 
 
-def test_a_march_that_ended_its_process_has_failed(folder: Path) -> None:
+def test_a_march_that_ended_its_process_has_failed(folder):
     with completion_of(folder) as completion:
         compute(completion, 5)
         (march, *_) = [m for line in completion.plan.marches for m in line if not completion.is_finished(m)]
@@ -151,7 +170,7 @@ def test_a_march_that_ended_its_process_has_failed(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(("number", "position", "lost"), [(0, 1, {1, 2}), (1, 1, {0, 1}), (0, 0, {0, 1, 2})])
-def test_a_branch_that_ended_its_process_ends_there(number: int, position: int, lost: set[int], folder: Path) -> None:
+def test_a_branch_that_ended_its_process_ends_there(number, position, lost, folder):
     with completion_of(folder) as completion:
         branch = completion.plan.branches[number]
         ended = completion.take_as_failed(completion.key(branch), position, 12, "why")
@@ -164,7 +183,7 @@ def test_a_branch_that_ended_its_process_ends_there(number: int, position: int, 
         assert (n_starts, n_marches) == (6 - len(lost), 12 - 2 * len(lost))
 
 
-def test_only_states_that_something_is_to_be_marched_from_are_asked_for(finished: Path) -> None:
+def test_only_states_that_something_is_to_be_marched_from_are_asked_for(finished):
     with completion_of(finished) as completion:
         branch = completion.plan.branches[0]
         for place in range(3):
@@ -178,7 +197,7 @@ def test_only_states_that_something_is_to_be_marched_from_are_asked_for(finished
 
 
 @pytest.mark.parametrize(("most", "expected"), [(MOST_OF_OTHERS, (0, 0)), (0.0, (6, 12)), (1.0, (6, 12))])
-def test_what_another_study_has_left_stays_up_to_a_size(most: float, expected: tuple[int, int], finished: Path) -> None:
+def test_what_another_study_has_left_stays_up_to_a_size(most, expected, finished):
     other = "axes.excitation_amplitude=11"
     with completion_of(finished, other) as completion:
         assert compute(completion) == (6, 12)
@@ -190,7 +209,7 @@ def test_what_another_study_has_left_stays_up_to_a_size(most: float, expected: t
         assert compute(completion) == expected
 
 
-def test_a_person_can_read_the_file(finished: Path) -> None:
+def test_a_person_can_read_the_file(finished):
     with completion_of(finished) as completion:
         completion.store.note_study("a joint", "sdof_slider", ("hash", "layout"), completion.describe_tasks())
         march = completion.plan.marches[1][2]
@@ -213,7 +232,7 @@ def test_a_person_can_read_the_file(finished: Path) -> None:
             assert set(database.execute(query)) == expected
 
 
-def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder: Path) -> None:
+def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder):
     """What comes behind it on its branch does not depend on it."""
     with completion_of(folder) as completion:
         down = completion.plan.branches[1]

@@ -1,7 +1,5 @@
 """The result file as an archive reads it: compliance-checker, and a header that reads like documentation."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -50,7 +48,7 @@ NOT_OF_THIS_DATA = (
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def result(tmp_path_factory):
     """A result with all that one can have: loops, mesh, group of the scene, text, a point that failed."""
     folder = tmp_path_factory.mktemp("compliance")
     with pytest.MonkeyPatch.context() as patch:
@@ -69,36 +67,27 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-def test_compliance_checker_passes(result: Path) -> None:
+def test_compliance_checker_passes(result):
     done = subprocess.run([sys.executable, CHECK, str(result)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    as_it_is, mended = json.loads(done.stdout).values()
-    assert min(as_it_is["n_checks"], mended["n_checks"]) > 50
+    found = json.loads(done.stdout)
+    assert found["n_checks"] > 50
     left = []
-    for checker, weight, name, message in mended["complaints"]:
-        if checker == "acdd:1.3" and message == "standard_name":
-            # the table of standard names knows geophysics: it has no name for any of these, and inventing one breaks CF
-            continue
-        attribute = message.removeprefix("Attr ").split()[0]
-        if checker == "acdd:1.3" and weight < 3 and attribute.startswith(NOT_OF_THIS_DATA):
-            continue
-        left.append((checker, weight, name, message))
+    for checker, weight, name, message in found["complaints"]:
+        # the table of standard names knows geophysics: it has no name for any of these, and inventing one breaks CF
+        of_names = checker == "acdd:1.3" and message == "standard_name"
+        own = message.removeprefix("Attr ").split()[0].startswith(NOT_OF_THIS_DATA)
+        # a fault of the checker: UDUNITS converts 1/Pa to bar, which is a height then and would stand on the right
+        height = (checker, weight, name) == ("cf:1.11", 2, "§2.4 Dimensions") and "wear_coefficient (Z)" in message
+        if not (of_names or height or (checker == "acdd:1.3" and weight < 3 and own)):
+            left.append((checker, weight, name, message))
     assert left == []
-    assert mended["broken"] == {}
-
-    # What the two faults of the checker cost, which run_compliance_checker.py names: a height would stand on the right,
-    # and the words of `scheme`, `sweep`, `response` and `component` are subtracted from each other.
-    of_faults = [complaint for complaint in as_it_is["complaints"] if complaint not in mended["complaints"]]
-    assert all(
-        (checker, weight, name) == ("cf:1.11", 2, "§2.4 Dimensions") and "wear_coefficient (Z)" in message
-        for checker, weight, name, message in of_faults
-        if message != "standard_name"
-    )
-    assert set(as_it_is["broken"]) <= {"check_coordinate_variables_strict_monotonicity"}
-    assert all("'str'" in message for message in as_it_is["broken"].values())
+    # another fault: words of `scheme`, `sweep`, `response` and `component` are subtracted from each other
+    assert set(found["broken"]) <= {"check_coordinate_variables_strict_monotonicity"}
+    assert all("'str'" in message for message in found["broken"].values())
 
 
-def test_the_header_reads_like_documentation(result: Path) -> None:
+def test_the_header_reads_like_documentation(result):
     with netCDF4.Dataset(result) as file:
         known = {**ASKED, **KEPT, **LOOPS, **COORDINATES}
         known |= {name: entry for entries in SCENE.values() for name, entry in entries.items()}

@@ -1,14 +1,8 @@
 """What takes long is computed once: a later run takes it from the file, equal to the last bit."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import NoReturn
-
 import numpy as np
 import pytest
 
-from solver.model import ReducedModel
 from solver.packing import Packed, pack
 from studyrunner.scene import computed as computed_module
 from studyrunner.scene import scene as scene_module
@@ -16,7 +10,6 @@ from studyrunner.scene import variables as variables_module
 from studyrunner.scene.computed import InMemory
 from studyrunner.scene.scene import _parts, build_study_scene, describe_scene
 from studyrunner.scene.variables import build_scene_variables
-from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 
 SCENES: dict[str, tuple[str, list[str]]] = {
@@ -28,22 +21,22 @@ SCENES: dict[str, tuple[str, list[str]]] = {
 
 
 @pytest.fixture(autouse=True)
-def keep_all(monkeypatch: pytest.MonkeyPatch) -> None:
+def keep_all(monkeypatch):
     """What takes no time is kept as well."""
     monkeypatch.setattr(computed_module, "LEAST_SECONDS", -1.0)
 
 
-def forbid(monkeypatch: pytest.MonkeyPatch) -> None:
+def forbid(monkeypatch):
     """From now on nothing is computed."""
 
-    def compute(*_: object) -> NoReturn:
+    def compute(*_):
         raise AssertionError("computed again")
 
     monkeypatch.setattr(scene_module, "_build_here", compute)
     monkeypatch.setattr(variables_module, "scene_frequencies", compute)
 
 
-def memory(model: ReducedModel) -> list[tuple[object, ...]]:
+def memory(model):
     """All that the last bits of a result depend on."""
     arrays = [(name, np.asarray(value)) for name, value in _parts(model)]
     return [(name, a.dtype.str, a.shape, a.strides, a.flags.c_contiguous, a.tobytes()) for name, a in arrays]
@@ -51,7 +44,7 @@ def memory(model: ReducedModel) -> list[tuple[object, ...]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", SCENES)
-def test_a_scene_is_built_once(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scene_is_built_once(case, monkeypatch):
     study, kept = read_study(*SCENES[case]), InMemory()
     built = build_study_scene(study, computed=kept)
     forbid(monkeypatch)
@@ -63,7 +56,7 @@ def test_a_scene_is_built_once(case: str, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.slow
-def test_natural_frequencies_are_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_natural_frequencies_are_computed_once(monkeypatch):
     study, kept = read_study("dovetail", ["scene.mesh=1", "outputs.variables=['natural_frequency']"]), InMemory()
     model = build_study_scene(study, computed=kept)
     first = build_scene_variables(study, model, kept)
@@ -74,11 +67,11 @@ def test_natural_frequencies_are_computed_once(monkeypatch: pytest.MonkeyPatch) 
         assert one.values.dtype == other.values.dtype
 
 
-def key_of(study: Study) -> set[str]:
+def key_of(study):
     return {computed_module._key("model", study, scene_module.harmonics_to_build(study))}
 
 
-def test_a_changed_file_or_source_makes_another_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_changed_file_or_source_makes_another_scene(tmp_path, monkeypatch):
     before = key_of(read_study("blade_root"))
     from studies.fe_models.from_files import scene as from_files
 
@@ -91,7 +84,7 @@ def test_a_changed_file_or_source_makes_another_scene(tmp_path: Path, monkeypatc
 
 
 @pytest.mark.parametrize("wrong", [Packed("{", ()), pack(None), pack((1, 2)), pack(((0, 1), "model"))])
-def test_what_is_no_model_is_built_again(wrong: Packed) -> None:
+def test_what_is_no_model_is_built_again(wrong):
     study, kept = read_study("two_masses"), InMemory()
     built = build_study_scene(study, computed=kept)
     (key,) = kept

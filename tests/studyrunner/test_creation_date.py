@@ -1,7 +1,5 @@
 """`--date`: an attribute of choice, which changes nothing else."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import netCDF4
@@ -11,12 +9,12 @@ from studyrunner.api import run_study
 from studyrunner.cli import main
 from studyrunner.netcdf.creation_date import check_date
 from studyrunner.user_error import UserError
-from tests.studyrunner.faked_runs import SMALL, Solver
+from tests.studyrunner.faked_runs import SMALL
 
 pytestmark = pytest.mark.usefixtures("reader", "folder")
 
 
-def attributes(path: str = "out.nc") -> dict[str, object]:
+def attributes(path="out.nc"):
     with netCDF4.Dataset(path) as file:
         return {name: file.getncattr(name) for name in file.ncattrs()}
 
@@ -32,12 +30,12 @@ def attributes(path: str = "out.nc") -> dict[str, object]:
         ("now", "now"),
     ],
 )
-def test_dates_are_kept_in_the_extended_form(given: str, kept: str) -> None:
+def test_dates_are_kept_in_the_extended_form(given, kept):
     assert check_date(given, "command line", "--date") == kept
 
 
 @pytest.mark.parametrize("wrong", ["yesterday", "", "23.11.2026", "2026-13-01", "2026-02-29", "2026", "1e9"])
-def test_a_wrong_date_is_bad_input(wrong: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_date_is_bad_input(wrong, capsys):
     assert main(["sdof_slider", f"--date={wrong}"]) == 2
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 1
@@ -48,7 +46,7 @@ def test_a_wrong_date_is_bad_input(wrong: str, capsys: pytest.CaptureFixture[str
         run_study("sdof_slider", date=wrong)
 
 
-def test_a_date_changes_nothing_else(solver: Solver) -> None:
+def test_a_date_changes_nothing_else(solver):
     assert main(SMALL) == 0
     without, n_results = attributes(), solver.n_results
     assert "date_created" not in without
@@ -63,23 +61,3 @@ def test_a_date_changes_nothing_else(solver: Solver) -> None:
     assert main(SMALL) == 0
     assert attributes() == without
     assert solver.n_results == 0 < n_results
-
-
-def test_a_run_that_goes_on_has_the_date_of_its_end(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studyrunner.cli.take_endings", lambda: None)
-
-    def end(_: object, number: int) -> None:
-        if number == 3:
-            raise KeyboardInterrupt
-
-    solver.disturb = end
-    assert main([*SMALL, "--date=2026-11-23"]) == 130
-    part, done = attributes(), solver.n_results - 1
-    assert part["date_created"] == "2026-11-23"
-    assert part["points_not_computed"] > 0  # type: ignore[operator]
-    solver.begin_again()
-    assert main([*SMALL, "--date=2026-11-24"]) == 0
-    whole = attributes()
-    assert whole["date_created"] == "2026-11-24"
-    assert whole["id"] == part["id"]
-    assert done + solver.n_results == 6

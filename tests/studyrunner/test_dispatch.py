@@ -1,13 +1,9 @@
 """Which rank gets which task, and what is learnt of costs: without clock and messages."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
-import pytest
-
 from studyrunner.mpi import dispatch
-from studyrunner.mpi.dispatch import AHEAD_SECONDS, Dispatcher
+from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.plan.cost_model import CostModel
 
 
@@ -18,72 +14,35 @@ class Job:
     n_results: int = 1
     opens_others: bool = False
 
-    def cost_of(self, *, first: bool) -> float:
+    def cost_of(self, *, first):
         del first
         return self.cost / self.n_results
 
     @property
-    def cost_keys(self) -> tuple[tuple[str, ...], ...]:
+    def cost_keys(self):
         return (("all", self.kind),)
 
 
 class Clock:
-    def __init__(self) -> None:
+    def __init__(self):
         self.now = 0.0
 
-    def __call__(self) -> float:
+    def __call__(self):
         return self.now
 
 
-def make(n_ranks: int, *jobs: Job) -> tuple[Dispatcher[Job], Clock]:
+def make(n_ranks, *jobs):
     clock = Clock()
     dispatcher: Dispatcher[Job] = Dispatcher(n_ranks, CostModel(), clock)
     dispatcher.add(jobs)
     return dispatcher, clock
 
 
-def handed_out(dispatcher: Dispatcher[Job]) -> list[tuple[int, int]]:
+def handed_out(dispatcher):
     return [(rank, assignment.number) for rank, assignment in dispatcher.assign()]
 
 
-def test_openers_then_the_longest() -> None:
-    jobs = [Job("a", 5.0), Job("a", 7.0), Job("b", 3.0), Job("b", 9.0), Job("c", 0.5, 2, True)]
-    dispatcher, _ = make(1, *jobs)
-    order = []
-    for _ in jobs:
-        ((rank, number),) = handed_out(dispatcher)
-        order.append(number)
-        for _ in range(jobs[number].n_results):
-            dispatcher.deliver(rank, number, jobs[number].cost / jobs[number].n_results)
-    assert order == [4, 3, 1, 0, 2]
-    assert dispatcher.done
-
-
-def test_every_task_is_handed_out_once_and_no_rank_holds_more_than_two() -> None:
-    jobs = [Job(str(place % 7), 0.01 if place % 3 else 1.0) for place in range(200)]
-    dispatcher, clock = make(5, *jobs)
-    holds: dict[int, list[int]] = {rank: [] for rank in range(5)}
-    seen: list[int] = []
-    while not dispatcher.done:
-        for rank, number in handed_out(dispatcher):
-            holds[rank].append(number)
-            seen.append(number)
-        assert all(1 <= len(held) <= 2 for held in holds.values()) or len(seen) == len(jobs)
-        rank = max(holds, key=lambda rank: len(holds[rank]))
-        clock.now += 0.1
-        number = holds[rank].pop(0)
-        assert dispatcher.deliver(rank, number, jobs[number].cost) is jobs[number]
-    assert sorted(seen) == list(range(200))
-
-
-def test_nothing_waits_behind_a_long_task_or_a_row_of_results() -> None:
-    long, short, row = Job("a", 2.0 * AHEAD_SECONDS), Job("b", 0.5 * AHEAD_SECONDS), Job("c", 0.1, 5, True)
-    for job, n_held in ((long, 1), (short, 2), (row, 1)):
-        dispatcher, _ = make(1, job, *([short] * 5 if job is short else [long] * 5))
-        assert len(handed_out(dispatcher)) == n_held
-
-
-def test_what_waits_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_waits_is_bounded(monkeypatch):
     """A branch does not go first where more waits than all ranks have use for."""
     monkeypatch.setattr(dispatch, "_WAITING", 10)
     monkeypatch.setattr(dispatch, "_WAITING_A_RANK", 0)
@@ -104,7 +63,7 @@ def test_what_waits_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     assert most < 10 + 4
 
 
-def test_a_task_that_does_not_end_teaches_and_is_forgotten_when_it_does() -> None:
+def test_a_task_that_does_not_end_teaches_and_is_forgotten_when_it_does():
     jobs = [Job("a", 2.0), *[Job("b", 2.0)] * 20, *[Job("a", 1.5)] * 20]
     dispatcher, clock = make(2, *jobs)
     first, (rank, number) = handed_out(dispatcher)
@@ -125,7 +84,7 @@ def test_a_task_that_does_not_end_teaches_and_is_forgotten_when_it_does() -> Non
     assert costs.correction((("all", "a"),)) < 2.0 < late
 
 
-def test_the_tasks_of_a_lost_rank_are_done_by_others() -> None:
+def test_the_tasks_of_a_lost_rank_are_done_by_others():
     jobs = [Job(str(place % 7), 0.01 if place % 3 else 1.0, 1 + place % 2) for place in range(100)]
     dispatcher, clock = make(4, *jobs)
     holds: dict[int, list[int]] = {rank: [] for rank in range(4)}
@@ -154,7 +113,7 @@ def test_the_tasks_of_a_lost_rank_are_done_by_others() -> None:
     assert len(holds) == 2
 
 
-def test_tasks_of_a_lost_rank_go_to_rank_0_only_where_there_is_no_other() -> None:
+def test_tasks_of_a_lost_rank_go_to_rank_0_only_where_there_is_no_other():
     dispatcher, _ = make(3, *[Job("a", 1.0)] * 3)
     assert dict(handed_out(dispatcher)) == {0: 0, 1: 1, 2: 2}
     dispatcher.add_lost([task for task, _ in dispatcher.lose(2)])

@@ -1,14 +1,11 @@
 """Signals that end a run come between any two instructions of the main thread, and leave nothing half done."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -45,7 +42,7 @@ print("closed")
 
 
 @pytest.fixture(autouse=True)
-def _as_before() -> Iterator[None]:
+def _as_before():
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
     handlers = [signal.getsignal(number) for number in numbers]
     yield
@@ -55,19 +52,19 @@ def _as_before() -> Iterator[None]:
 
 
 @pytest.fixture
-def end() -> Callable[[], None]:
+def end():
     """Sends this process what ends a run."""
     signal.signal(signal.SIGUSR1, signal.SIG_DFL)
     take_endings()
 
-    def send() -> None:
+    def send():
         os.kill(os.getpid(), signal.SIGUSR1)
         time.sleep(0.0)
 
     return send
 
 
-def test_an_ending_is_raised_once(end: Callable[[], None]) -> None:
+def test_an_ending_is_raised_once(end):
     with pytest.raises(KeyboardInterrupt):
         end()
     end()
@@ -76,7 +73,7 @@ def test_an_ending_is_raised_once(end: Callable[[], None]) -> None:
     raise_ending()
 
 
-def test_an_ending_that_a_library_has_lost_is_raised_again(end: Callable[[], None]) -> None:
+def test_an_ending_that_a_library_has_lost_is_raised_again(end):
     raise_ending()
     # as in a callback of C
     with contextlib.suppress(KeyboardInterrupt):
@@ -92,10 +89,10 @@ def test_an_ending_that_a_library_has_lost_is_raised_again(end: Callable[[], Non
         raise_ending()
 
 
-def test_an_ending_waits_for_the_last_of_what_is_done_as_a_whole(end: Callable[[], None]) -> None:
+def test_an_ending_waits_for_the_last_of_what_is_done_as_a_whole(end):
     done = []
 
-    def work() -> None:
+    def work():
         with uninterrupted():
             with uninterrupted():
                 end()
@@ -114,10 +111,8 @@ def test_an_ending_waits_for_the_last_of_what_is_done_as_a_whole(end: Callable[[
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
-def test_an_ending_is_not_lost_where_something_else_is_raised(
-    end: Callable[[], None], error: type[BaseException]
-) -> None:
-    def work() -> None:
+def test_an_ending_is_not_lost_where_something_else_is_raised(end, error):
+    def work():
         with uninterrupted():
             end()
             raise error
@@ -130,7 +125,7 @@ def test_an_ending_is_not_lost_where_something_else_is_raised(
 
 
 @pytest.mark.slow
-def test_a_writer_whose_owner_is_interrupted_anywhere_does_not_hang() -> None:
+def test_a_writer_whose_owner_is_interrupted_anywhere_does_not_hang():
     ended = subprocess.run(
         [sys.executable, "-c", WRITER], cwd=ROOT, capture_output=True, text=True, timeout=200.0, check=False
     )
@@ -151,6 +146,6 @@ print(run_in_own_process(lambda: time.sleep(600) or 0))
 """
 
 
-def test_a_signal_that_comes_before_the_other_process_is_there_is_handed_on() -> None:
+def test_a_signal_that_comes_before_the_other_process_is_there_is_handed_on():
     ended = subprocess.run([sys.executable, "-c", EARLY], capture_output=True, text=True, timeout=200, check=True)
     assert ended.stdout == "1\n"

@@ -1,8 +1,5 @@
 """Nothing is replaced unasked: what stands where a result is to go, found before anything is computed."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,54 +15,48 @@ FINER = [*SMALL, "--set", "axes.frequency=[100, 105, 110]"]
 
 
 @pytest.fixture(autouse=True)
-def solver(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Solver:
+def solver(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return Solver(monkeypatch)
 
 
-def name_in(path: str) -> str:
+def name_in(path):
     with xr.open_dataset(path) as result:
         return str(result.attrs["study"]).split('"')[1]
 
 
-def end_at_once(solver: Solver) -> None:
+def end_at_once(solver):
     """The first result of the next run is its last."""
 
-    def interrupt(*_: object) -> None:
+    def interrupt(*_):
         raise KeyboardInterrupt
 
     solver.disturb = interrupt
 
 
-def finished(_: Solver) -> None:
+def finished(_):
     assert main(SMALL) == 0
 
 
-def unfinished(solver: Solver) -> None:
+def unfinished(solver):
     end_at_once(solver)
     assert main(SMALL) == 130
     assert Path("out.nc").exists()
 
 
-def killed(solver: Solver) -> None:
+def killed(solver):
     unfinished(solver)
     Path("out.nc").unlink()
 
 
-def without_progress(_: Solver) -> None:
+def without_progress(_):
     assert main(SMALL) == 0
     Path("out.nc.progress").unlink()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("leave", "other"), [(finished, RENAMED), (killed, OTHER), (without_progress, OTHER)])
-def test_what_is_left_of_another_study_stays(
-    leave: Callable[[Solver], None],
-    other: list[str],
-    solver: Solver,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_is_left_of_another_study_stays(leave, other, solver, monkeypatch, capsys):
     leave(solver)
     before = {path: path.read_bytes() for path in Path().rglob("*") if path.is_file() and path.name != "lock"}
     solver.begin_again()
@@ -88,7 +79,7 @@ def test_what_is_left_of_another_study_stays(
 
 
 @pytest.mark.slow
-def test_the_same_study_with_other_values_goes_on(solver: Solver) -> None:
+def test_the_same_study_with_other_values_goes_on(solver):
     assert main(SMALL) == 0
     n_tasks = len(solver.tasks)
     assert main(FINER) == 0
@@ -100,24 +91,42 @@ def test_the_same_study_with_other_values_goes_on(solver: Solver) -> None:
     assert main([*FINER, "-o", "again.nc"]) == 0
 
 
+def a_text(path):
+    path.write_bytes(b"a text")
+
+
+def a_broken_file(path):
+    path.write_bytes(b"\x89HDF\r\n\x1a\nand no more")
+
+
+def a_netcdf_file(path):
+    xr.Dataset({"measured": ("time", [1.0, 2.0])}).to_netcdf(path)
+
+
+def a_scene(path):
+    assert main(["sdof_slider", "--write-scene", str(path)]) == 0
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("content", [b"a text", b"\x89HDF\r\n\x1a\nand no more"])
-def test_what_is_no_result_is_not_replaced_at_all(
-    content: bytes, solver: Solver, capsys: pytest.CaptureFixture[str]
-) -> None:
-    Path("out.nc").write_bytes(content)
+@pytest.mark.parametrize("make", [a_text, a_broken_file, a_netcdf_file, a_scene])
+def test_what_is_no_result_is_not_replaced_at_all(make, solver, capsys):
+    make(Path("out.nc"))
+    before = Path("out.nc").read_bytes()
+    capsys.readouterr()
     for more in ([], ["--overwrite"], ["--fresh"]):
         assert main([*SMALL, *more]) == 2
-        assert "it is no result of run-study" in capsys.readouterr().err
-    assert main(["sdof_slider", "--write-scene", "out.nc"]) == 2
-    assert "this is no scene file, and is left as it is" in capsys.readouterr().err
-    assert Path("out.nc").read_bytes() == content
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith('run-study: command line: -o = "')
+        assert ": remove the file or give another name: it is no result of run-study" in line
+    assert make is a_scene or main(["sdof_slider", "--write-scene", "out.nc"]) == 2
+    assert make is a_scene or "this is no scene file, and is left as it is" in capsys.readouterr().err
+    assert Path("out.nc").read_bytes() == before
     assert not solver.tasks
     assert list(Path().iterdir()) == [Path("out.nc")]
 
 
 @pytest.mark.slow
-def test_a_scene_replaces_scenes_only(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_scene_replaces_scenes_only(capsys):
     for _ in range(2):
         assert main(["sdof_slider", "--write-scene", "scene.h5"]) == 0
     assert main(SMALL) == 0
@@ -126,9 +135,7 @@ def test_a_scene_replaces_scenes_only(capsys: pytest.CaptureFixture[str]) -> Non
     assert Path("out.nc").read_bytes() == before
 
 
-def test_a_folder_of_an_older_version_is_named_and_left_alone(
-    solver: Solver, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_of_an_older_version_is_named_and_left_alone(solver, capsys):
     older = Path("out.nc.parts")
     older.mkdir()
     (older / "00000001.npy").write_bytes(b"of version 0.4.0")
@@ -140,7 +147,7 @@ def test_a_folder_of_an_older_version_is_named_and_left_alone(
 
 
 @pytest.mark.slow
-def test_a_result_of_another_study_is_replaced_by_a_finished_one_only(solver: Solver) -> None:
+def test_a_result_of_another_study_is_replaced_by_a_finished_one_only(solver):
     assert main(SMALL) == 0
     end_at_once(solver)
     assert main([*OTHER, "--overwrite"]) == 130
@@ -150,7 +157,7 @@ def test_a_result_of_another_study_is_replaced_by_a_finished_one_only(solver: So
     assert name_in("out.nc") == "two_masses"
 
 
-def test_progress_that_is_damaged_belongs_to_no_study(solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_that_is_damaged_belongs_to_no_study(solver, capsys):
     killed(solver)
     solver.begin_again()
     Path("out.nc.progress").write_bytes(b"x" * 5000)
@@ -159,7 +166,7 @@ def test_progress_that_is_damaged_belongs_to_no_study(solver: Solver, capsys: py
 
 
 @pytest.mark.slow
-def test_in_python(capsys: pytest.CaptureFixture[str]) -> None:
+def test_in_python(capsys):
     assert main(SMALL) == 0
     overrides = {"axes.scheme": "implicit", "axes.frequency": 0.05}
     with pytest.raises(UserError, match=r'run_study: output = .*overwrite=True.*"two_masses"'):

@@ -1,7 +1,5 @@
 """File systems without locks, and faults of a disk: the run works there, or says what the system says."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil
@@ -86,7 +84,7 @@ STUDY = [
 
 
 @pytest.fixture(scope="module")
-def shim(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def shim(tmp_path_factory):
     """A library that lets calls of the system fail."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None or sys.platform != "linux":
@@ -98,7 +96,7 @@ def shim(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "shim.so"
 
 
-def run_with(shim: Path, folder: Path, **failing: int) -> subprocess.CompletedProcess[str]:
+def run_with(shim, folder, **failing):
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "LD_PRELOAD": str(shim)}
     environment.pop("HDF5_USE_FILE_LOCKING", None)
     environment |= {f"SHIM_{name.upper()}": str(number) for name, number in failing.items()}
@@ -108,7 +106,7 @@ def run_with(shim: Path, folder: Path, **failing: int) -> subprocess.CompletedPr
 
 
 @pytest.mark.slow
-def test_a_run_works_where_there_are_no_locks(shim: Path, tmp_path: Path) -> None:
+def test_a_run_works_where_there_are_no_locks(shim, tmp_path):
     for _ in range(2):  # the second one reads what the first one has written
         ended = run_with(shim, tmp_path, lock=errno.ENOLCK)
         assert ended.returncode == 0, ended.stderr
@@ -118,7 +116,7 @@ def test_a_run_works_where_there_are_no_locks(shim: Path, tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_what_the_system_says_of_a_result_is_said(shim: Path, tmp_path: Path) -> None:
+def test_what_the_system_says_of_a_result_is_said(shim, tmp_path):
     words = "No space left on device: make room there or give another result file with -o"
     ended = run_with(shim, tmp_path, write=errno.ENOSPC)
     assert ended.returncode == 1
@@ -130,7 +128,7 @@ def test_what_the_system_says_of_a_result_is_said(shim: Path, tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_what_the_system_says_of_the_progress_is_said(shim: Path, tmp_path: Path) -> None:
+def test_what_the_system_says_of_the_progress_is_said(shim, tmp_path):
     number = errno.EIO
     ended = run_with(shim, tmp_path, progress=number)
     assert ended.returncode == 1
@@ -154,5 +152,5 @@ def test_what_the_system_says_of_the_progress_is_said(shim: Path, tmp_path: Path
         (ValueError("odd"), "odd: mend that or give another result file with -o"),
     ],
 )
-def test_what_there_is_to_do_depends_on_the_fault(error: Exception, words: str) -> None:
+def test_what_there_is_to_do_depends_on_the_fault(error, words):
     assert words in str(StorageError(Path("out.nc"), error))

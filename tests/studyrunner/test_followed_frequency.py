@@ -1,7 +1,5 @@
 """Studies whose excitation follows the resonance: what they take, what they compute, what they say."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +7,6 @@ import pytest
 import xarray as xr
 
 from studyrunner.cli import main
-from studyrunner.plan.planning import build_tasks
 from studyrunner.report.drawing import Drawing
 from studyrunner.report.figures.excitation import draw_excitation
 from studyrunner.report.reading.result import Result
@@ -17,6 +14,7 @@ from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.studyrunner.test_scene_axes import arguments, compute
 
+pytestmark = pytest.mark.usefixtures("folder")
 SLIDER = {
     "axes.frequency": "resonance",
     "axes.wear_coefficient": [1.1e-11, 5.5e-12],
@@ -32,12 +30,7 @@ SLIDER = {
 SAMPLES = {"scatter.frequency": {"scatter.samples": 3}}
 
 
-@pytest.fixture(autouse=True)
-def _in_folder(folder: Path) -> None:
-    """Results go to a folder of their own."""
-
-
-def computed(path: str, **more: object) -> xr.Dataset:
+def computed(path, **more):
     """The result of a study of the slider."""
     given = {**SLIDER, **{name.replace("__", "."): value for name, value in more.items()}}
     words = [f"{key}='{value}'" if isinstance(value, str) else f"{key}={value}" for key, value in given.items()]
@@ -45,7 +38,7 @@ def computed(path: str, **more: object) -> xr.Dataset:
 
 
 @pytest.mark.slow
-def test_the_frequency_of_each_count_is_in_the_result(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_frequency_of_each_count_is_in_the_result(capsys):
     found = computed("out.nc")
     said = capsys.readouterr()
     assert found.frequency.values.tolist() == [205.0]
@@ -61,7 +54,7 @@ def test_the_frequency_of_each_count_is_in_the_result(capsys: pytest.CaptureFixt
 
 
 @pytest.mark.slow
-def test_every_point_without_a_resonance_says_why(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_point_without_a_resonance_says_why(capsys):
     # so little excitation that the slider sticks: its resonance is far above the range
     given = {**SLIDER, "axes.excitation_amplitude": 1.0, "slow_time.cycles": 10.0}
     words = [f"{key}='{value}'" if isinstance(value, str) else f"{key}={value}" for key, value in given.items()]
@@ -76,7 +69,7 @@ def test_every_point_without_a_resonance_says_why(capsys: pytest.CaptureFixture[
     assert "205 Hz" not in said
 
 
-def test_the_report_draws_the_frequency_over_cycles() -> None:
+def test_the_report_draws_the_frequency_over_cycles():
     found = computed("drawn.nc")
     result = Result(Path("drawn.nc"), found)
     (drawing,) = draw_excitation(result)
@@ -91,7 +84,7 @@ def test_the_report_draws_the_frequency_over_cycles() -> None:
     assert "205" not in result.describe(result.shown_point(), ["frequency"])
 
 
-def test_without_cycles_the_result_is_the_resonance_of_the_unworn_joint() -> None:
+def test_without_cycles_the_result_is_the_resonance_of_the_unworn_joint():
     found = computed("unworn.nc", slow_time__cycles=0, axes__wear_coefficient=1.1e-11)
     at = float(found.excitation_frequency.squeeze())
     assert 198.0 < at < 201.0
@@ -100,7 +93,7 @@ def test_without_cycles_the_result_is_the_resonance_of_the_unworn_joint() -> Non
 
 
 @pytest.mark.slow
-def test_each_scene_and_each_sample_has_its_own_frequency() -> None:
+def test_each_scene_and_each_sample_has_its_own_frequency():
     of_scenes = computed("scenes.nc", slow_time__cycles=0, axes__wear_coefficient=1.1e-11, axes__mass=[0.1, 0.11])
     one, other = of_scenes.excitation_frequency.squeeze().values
     # friction hardly moves the resonance from that of the mass on its spring
@@ -114,7 +107,7 @@ def test_each_scene_and_each_sample_has_its_own_frequency() -> None:
     assert float(samples.excitation_frequency.std()) > 1.0
 
 
-def test_the_effective_study_is_the_same_study() -> None:
+def test_the_effective_study_is_the_same_study():
     study = read_study("sdof_slider", SLIDER)
     text = format_study(study)
     assert 'frequency = "resonance"' in text
@@ -123,16 +116,6 @@ def test_the_effective_study_is_the_same_study() -> None:
     again = read_study("again.toml")
     assert again.follow == study.follow
     assert format_study(again) == text
-
-
-def test_a_task_says_what_it_follows() -> None:
-    for word in ("resonance", "peak"):
-        study = read_study("sdof_slider", {**SLIDER, "axes.frequency": word})
-        plan = build_tasks(study, 2)
-        follows = [task.follow for task in (*plan.branches, *plan.marches[0])]
-        assert follows == [study.follow] * 2
-        assert study.follow is not None
-        assert (study.follow.of, study.follow.low, study.follow.high) == (word, 180.0, 230.0)
 
 
 @pytest.mark.parametrize(
@@ -155,12 +138,12 @@ def test_a_task_says_what_it_follows() -> None:
         ("outputs.variables", ["exact"], "leave it out: it is of given frequencies"),
     ],
 )
-def test_wrong_input_is_one_sentence(key: str, value: object, said: str) -> None:
+def test_wrong_input_is_one_sentence(key, value, said):
     with pytest.raises(UserError) as refused:
         read_study("sdof_slider", {**SLIDER, key: value, **SAMPLES.get(key, {})})
     assert said.replace('{"between": [180.0, 230.0]}', "{between = [180.0, 230.0]}") in str(refused.value)
 
 
-def test_a_word_without_a_range_names_what_is_missing() -> None:
+def test_a_word_without_a_range_names_what_is_missing():
     with pytest.raises(UserError, match=r"loading\.between: missing"):
         read_study("sdof_slider", {"axes.frequency": "peak"})

@@ -1,11 +1,8 @@
 """The result file: dimensions, units, attributes, and that it appears whole or not at all."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +12,8 @@ import xarray as xr
 from solver.outcome import Outcome
 from studyrunner.accessor import FretwearAccessor
 from studyrunner.netcdf import gather
-from studyrunner.netcdf.gather import Gathered
 from studyrunner.netcdf.output import progress_file
 from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.results import MarchResult
 from studyrunner.study.study_file import read_study
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
@@ -38,12 +33,12 @@ WEAR_RATE = "outputs.variables=['wear_rate', 'outcome']"
 SHAPE = (2, 1, 1, 1, 2, 1, 2)
 
 
-def fake_results(*overrides: str) -> list[MarchResult]:
+def fake_results(*overrides):
     plan = build_tasks(read_study("sdof_slider", (*OVERRIDES, *overrides)), FACTS.n_displacements)
     return [result for _, result in fake_histories(plan)]
 
 
-def write(results: Sequence[MarchResult], path: Path, *overrides: str) -> Gathered:
+def write(results, path, *overrides):
     """The file of a run of the study with these results."""
     study = read_study("sdof_slider", (*OVERRIDES, *overrides))
     plan = build_tasks(study, FACTS.n_displacements)
@@ -53,7 +48,7 @@ def write(results: Sequence[MarchResult], path: Path, *overrides: str) -> Gather
 
 
 @pytest.fixture
-def opened(tmp_path: Path) -> xr.Dataset:
+def opened(tmp_path):
     write(fake_results(), tmp_path / "out.nc")
     with xr.open_dataset(tmp_path / "out.nc") as result:
         return result.load()
@@ -98,7 +93,7 @@ CONTRACT = {
 }
 
 
-def test_all_variables_with_their_dimensions_and_units(opened: xr.Dataset) -> None:
+def test_all_variables_with_their_dimensions_and_units(opened):
     assert set(opened.data_vars) == set(CONTRACT)
     for name, (dimensions, units) in CONTRACT.items():
         assert opened[name].dims == (*AXES, *dimensions)
@@ -108,17 +103,7 @@ def test_all_variables_with_their_dimensions_and_units(opened: xr.Dataset) -> No
     assert all(opened[name].attrs["units"] for name in opened.variables)
 
 
-def test_outcome_is_a_flag_variable(opened: xr.Dataset) -> None:
-    attributes = opened.outcome.attrs
-    assert opened.outcome.dtype == np.int8
-    assert attributes["flag_values"].dtype == np.int8
-    assert attributes["flag_values"].tolist() == list(Outcome)
-    assert attributes["flag_meanings"].split()[0] == "converged"
-    assert len(attributes["flag_meanings"].split()) == len(Outcome)
-    assert attributes["sentences"].splitlines() == [ending.sentence for ending in Outcome]
-
-
-def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
+def test_a_point_that_failed_opens_as_nan_and_0(tmp_path):
     results = fake_results()
     results[0] = without_values(results[0], 6)
     assert write(results, tmp_path / "out.nc").outcomes == {0: 7, 6: 1, Outcome.NOT_COMPUTED: 0}
@@ -150,7 +135,7 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path: Path) -> None:
         assert opened.stable.sum() == opened.stable.size - 3
 
 
-def test_attributes(opened: xr.Dataset, tmp_path: Path) -> None:
+def test_attributes(opened, tmp_path):
     attributes = opened.attrs
     assert attributes["Conventions"] == "CF-1.11, ACDD-1.3"
     assert attributes["title"] == read_study("sdof_slider").study.title
@@ -163,9 +148,7 @@ def test_attributes(opened: xr.Dataset, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("overrides", "bytes_a_slab"), [((), 1e9), ((*SHARED, LOOP), 3000.0), ((WEAR_RATE,), 1.0)])
-def test_the_file_is_the_one_of_the_plain_twin(
-    overrides: tuple[str, ...], bytes_a_slab: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_file_is_the_one_of_the_plain_twin(overrides, bytes_a_slab, tmp_path, monkeypatch):
     """Whatever is in memory at once, and in whatever order the results came: every value, attribute and encoding."""
     monkeypatch.setattr(gather, "_BYTES_A_SLAB", bytes_a_slab)
     results = fake_results(*overrides)
@@ -184,13 +167,13 @@ def test_the_file_is_the_one_of_the_plain_twin(
         assert opened.encoding["unlimited_dims"] == twin.encoding["unlimited_dims"]
 
 
-def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "out.nc"
     path.write_text("an earlier result", encoding="utf-8")
 
     replace_file = os.replace
 
-    def fail(source: Path, target: Path) -> None:
+    def fail(source, target):
         if target == path:
             raise OSError("disk full")
         replace_file(source, target)
@@ -202,7 +185,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
     assert sorted(tmp_path.iterdir()) == [path, progress_file(path)]
 
 
-def test_the_examples_of_readme_and_pages_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_examples_of_readme_and_pages_run(tmp_path, monkeypatch):
     pages = ("README.md", "studyrunner/RESULT_FILE.md", "studyrunner/REPORT.md")
     texts = [Path(__file__).parents[2].joinpath(page).read_text(encoding="utf-8") for page in pages]
     (short,), (example,), (of_accessor,) = (re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL) for text in texts)
@@ -219,14 +202,14 @@ def test_the_examples_of_readme_and_pages_run(tmp_path: Path, monkeypatch: pytes
         exec(compile(code, page, "exec"), {})
 
 
-def test_readme_and_ci_have_the_same_test_command() -> None:
+def test_readme_and_ci_have_the_same_test_command():
     root = Path(__file__).parents[2]
     readme, script = (root.joinpath(name).read_text(encoding="utf-8") for name in ("README.md", ".ci/run"))
     (command,) = [line for line in readme.splitlines() if line.endswith("-m pytest -n auto")]
     assert [part for part in command.split(" && ") if part not in script] == []
 
 
-def test_coordinates(opened: xr.Dataset) -> None:
+def test_coordinates(opened):
     assert opened.frequency.values.tolist() == [160.0, 150.0]
     assert opened.scheme.values.tolist() == ["implicit", "explicit"]
     assert opened.sweep.values.tolist() == ["up"]

@@ -1,11 +1,8 @@
 """A run that is ended at any point leaves a result that opens, and the next one ends with the same numbers."""
 
-from __future__ import annotations
-
 import contextlib
 import sqlite3
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -17,10 +14,9 @@ from solver.packing import Packed
 from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.mpi import schedule
-from studyrunner.plan.results import Keep, MarchResult, StartResult
 from studyrunner.plan.tasks import BranchTask, MarchTask
-from tests.mpi.launching import count_rows
-from tests.studyrunner.faked_runs import SMALL, Solver, Task
+from tests.mpi.launching import count_rows, results
+from tests.studyrunner.faked_runs import SMALL
 from tests.studyrunner.fakes import fake_branch
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.processes]
@@ -29,19 +25,14 @@ N_POINTS, N_RESULTS = 8, 4 + 8
 TWO_WAYS = [*SMALL[:-2], "--set", "axes.sweep=['up', 'down']", *SMALL[-2:]]
 
 
-def load(name: str = "out.nc") -> xr.Dataset:
-    with xr.open_dataset(name) as result:
-        return result.load().drop_vars("run_time")
-
-
-def whole(solver: Solver) -> xr.Dataset:
+def whole(solver):
     """The result of a run that nothing disturbs."""
     assert main([*TWO_WAYS[:-1], "whole.nc"]) == 0
     solver.begin_again()
-    return load("whole.nc")
+    return results("whole.nc")
 
 
-def assert_partial(found: xr.Dataset, expected: xr.Dataset) -> int:
+def assert_partial(found, expected):
     """Points that are there are right, the others hold nothing; how many are there."""
     left = found.outcome == Outcome.NOT_COMPUTED
     for name in set(found.data_vars) - {"outcome", "message", "exact_worn_volume", "exact_response_amplitude"}:
@@ -54,38 +45,36 @@ def assert_partial(found: xr.Dataset, expected: xr.Dataset) -> int:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("at", [1, 8])
-def test_an_interrupt_in_any_task(at: int, solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupt_in_any_task(at, solver, capsys):
     expected = whole(solver)
 
-    def interrupt(_: Task, n_results: int) -> None:
+    def interrupt(_, n_results):
         if n_results == at:
             raise KeyboardInterrupt
 
     solver.disturb = interrupt
     capsys.readouterr()
     assert main(TWO_WAYS) == 130
-    n_there = assert_partial(load(), expected)
+    n_there = assert_partial(results(), expected)
     said = capsys.readouterr().err.splitlines()[-1]
     assert said == f"run-study: interrupted: out.nc holds {n_there} of {N_POINTS} points, the same command goes on"
     n_first = solver.n_results - 1
     solver.begin_again()
     assert main(TWO_WAYS) == 0
     assert n_first + solver.n_results == N_RESULTS
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)
     again = capsys.readouterr().err
     assert (f"{n_there} of {N_POINTS} points are there from an earlier run" in again) == (n_there > 0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("where", "at"), [("flush", 2), ("_begin", 3), ("put", 6)])
-def test_an_interrupt_anywhere_in_the_main_thread(
-    where: str, at: int, solver: Solver, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupt_anywhere_in_the_main_thread(where, at, solver, monkeypatch):
     """Before and after each of the calls that change what is kept."""
     expected = whole(solver)
     own, n_calls = getattr(Store, where), 0
 
-    def called(store: Store, *arguments: object, **named: object) -> object:
+    def called(store, *arguments, **named):
         nonlocal n_calls
         n_calls += 1
         if n_calls == at:
@@ -100,23 +89,23 @@ def test_an_interrupt_anywhere_in_the_main_thread(
         changed.setattr(Store, where, called)
         status = main(TWO_WAYS)
     assert status == (130 if n_calls >= at else 0)
-    assert_partial(load(), expected)
+    assert_partial(results(), expected)
     assert main(TWO_WAYS) == 0
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)
 
 
 @pytest.mark.slow
-def test_an_exception_is_one_bad_point(solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_exception_is_one_bad_point(solver, capsys):
     expected = whole(solver)
 
-    def fail(task: Task, _: int) -> None:
+    def fail(task, _):
         if isinstance(task, MarchTask) and (task.branch, task.position, task.wear_coefficient) == (1, 0, 1e-11):
             raise ZeroDivisionError("a bug in\nthe solver")
 
     solver.disturb = fail
     assert main(TWO_WAYS) == 3
     assert "1 x exception: The computation ended with an unexpected error" in capsys.readouterr().out
-    found = load()
+    found = results()
     bad = {"frequency": 100.0, "sweep": "down", "wear_coefficient": 1e-11}
     assert found.outcome.sel(bad).item() == 11
     line = str(found.message.sel(bad).item())
@@ -128,30 +117,17 @@ def test_an_exception_is_one_bad_point(solver: Solver, capsys: pytest.CaptureFix
     solver.begin_again()
     assert main(TWO_WAYS) == 3
     assert solver.tasks == []
-    xr.testing.assert_identical(load(), found)
+    xr.testing.assert_identical(results(), found)
     # unless it is asked to
     assert main([*TWO_WAYS, "--retry-failed"]) == 0
     assert len(solver.tasks) == 1
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)
 
 
-def test_an_earlier_run_is_forgotten_where_asked_for(solver: Solver, capsys: pytest.CaptureFixture[str]) -> None:
-    expected = whole(solver)
-    assert main(TWO_WAYS) == 0
-    n_tasks = len(solver.tasks)
-    solver.begin_again()
-    assert main([*TWO_WAYS, "--fresh"]) == 0
-    assert len(solver.tasks) == n_tasks
-    assert "from an earlier run" not in capsys.readouterr().err
-    xr.testing.assert_identical(load(), expected)
-
-
-def test_a_second_run_of_the_same_study_is_refused(
-    solver: Solver, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_second_run_of_the_same_study_is_refused(solver, capsys, monkeypatch):
     second: list[int] = []
 
-    def run_again(_: Task, n_results: int) -> None:
+    def run_again(_, n_results):
         # signals are for the main thread
         if n_results == 1:
             second.append(main(TWO_WAYS))
@@ -167,12 +143,12 @@ def test_a_second_run_of_the_same_study_is_refused(
 
 
 @pytest.mark.slow
-def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_progress_is_gone_on_from(solver, monkeypatch):
     expected = whole(solver)
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", 0.01)
     evaluate = solver.evaluate
 
-    def slow(model: object, task: Task, keep: Keep) -> Iterator[StartResult | MarchResult]:
+    def slow(model, task, keep):
         if isinstance(task, MarchTask) and task.resume is None:
             time.sleep(0.02)
             keep(Packed("half of it", (np.array([task.number]),)))
@@ -185,17 +161,17 @@ def test_progress_is_gone_on_from(solver: Solver, monkeypatch: pytest.MonkeyPatc
     marches = [task for task in solver.tasks if isinstance(task, MarchTask)]
     assert len(marches) == 8
     assert all(task.resume == Packed("half of it", (np.array([task.number]),)) for task in marches)
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)
     assert count_rows("under_way") == 0
 
 
-def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_progress_beyond_states_that_are_lost_is_no_harm(solver, monkeypatch):
     """Start states may be damaged while the progress of their branch is not."""
     expected = whole(solver)
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", -1.0)
     own, ended = solver.evaluate, False
 
-    def resuming(model: object, task: Task, keep: Keep) -> Iterator[StartResult | MarchResult]:
+    def resuming(model, task, keep):
         nonlocal ended
         if isinstance(task, MarchTask):
             yield from own(model, task, keep)
@@ -215,11 +191,11 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver: Solver, monkeyp
     with contextlib.closing(sqlite3.connect("out.nc.progress")) as database, database:
         database.execute("DELETE FROM start_states")
     assert main(TWO_WAYS) == 0
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)
 
 
 @pytest.mark.slow
-def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
     """With the solver itself: to the numbers of a march that had the time at once."""
     from solver.newton import solve_balance as newton
     from studyrunner import evaluate
@@ -233,11 +209,11 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.Mo
     own, begun = evaluate._solve, []
     own_clock, n_looks = newton.computing_time, 0
 
-    def solve(model: object, task: MarchTask, *rest: object) -> object:
+    def solve(model, task, *rest):
         begun.append(task.resume)
         return own(model, task, *rest)  # type: ignore[arg-type]
 
-    def clock() -> float:
+    def clock():
         # the time is over in the midst of the march, however fast the machine is
         nonlocal n_looks
         n_looks += bool(begun)
@@ -248,7 +224,7 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.Mo
     with monkeypatch.context() as slow:
         slow.setattr(newton, "computing_time", clock)
         assert main([*study, "--set", "solver.time_limit=1e6"]) == 3
-        reached = load().last_cycle.item()
+        reached = results().last_cycle.item()
         assert 0.0 < reached < 100_000.0
         # without being asked it is not tried again
         assert main([*study, "--set", "solver.time_limit=1e6"]) == 3
@@ -256,14 +232,14 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch: pytest.Mo
     assert main([*study, "--retry-failed", "--set", "solver.time_limit=2e6"]) == 0
     assert [resume is not None for resume in begun] == [False, True]
     # but for the limit, which stands in their attributes
-    xr.testing.assert_equal(load(), load("whole.nc"))
+    xr.testing.assert_equal(results(), results("whole.nc"))
     assert count_rows("under_way") == 0
 
 
-def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver: Solver) -> None:
+def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver):
     expected = whole(solver)
 
-    def fail(task: Task, _: int) -> None:
+    def fail(task, _):
         # the second state of the sweep upwards
         if isinstance(task, BranchTask) and task.number == 0 and (place := seen.setdefault(id(task), 0)) < 2:
             seen[id(task)] = place + 1
@@ -278,4 +254,4 @@ def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver: Solver) -> N
     assert main([*TWO_WAYS, "--retry-failed"]) == 0
     assert [type(task) for task in solver.tasks][:1] == [BranchTask]
     assert solver.n_results == 1 + 2 or solver.n_results == 1
-    xr.testing.assert_identical(load(), expected)
+    xr.testing.assert_identical(results(), expected)

@@ -1,14 +1,11 @@
 """Files that were made to do harm: exit status 2 within 5 s and 1 GB, one line, nothing that a terminal obeys."""
 
-from __future__ import annotations
-
 import os
 import resource
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Protocol
 
 import h5py
 import pytest
@@ -18,7 +15,6 @@ from studyrunner.study.study_of_result import check_result_file
 from studyrunner.user_error import UserError
 from tests.studyrunner.hostile_files import ALLOWED, SCENES, STUDY, TEXTS, change_scene, sparse_file
 from tests.studyrunner.own_time import Stopwatch
-from tests.studyrunner.reading_process import ReadingProcess
 
 # all files but those of the command alone
 pytestmark = [pytest.mark.usefixtures("reader"), pytest.mark.processes]
@@ -52,7 +48,7 @@ LARGEST = 2**30
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory):
     """The slider's scene file, and a result of it."""
     folder = tmp_path_factory.mktemp("made")
     with pytest.MonkeyPatch.context() as patch:
@@ -65,7 +61,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(made, tmp_path, monkeypatch):
     for name in ("scene.h5", "study", "s.nc"):
         shutil.copy(made / name, tmp_path / name)
     (tmp_path / "s.nc").rename(tmp_path / "result")
@@ -73,15 +69,9 @@ def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-class Refused(Protocol):
-    """Runs the command and returns its one line; time and memory are within the limits."""
-
-    def __call__(self, arguments: list[str], allowed: bool = False) -> str: ...
-
-
 @pytest.fixture
-def refused(reader: ReadingProcess, capsys: pytest.CaptureFixture[str]) -> Refused:
-    def run(arguments: list[str], allowed: bool = False) -> str:
+def refused(reader, capsys):
+    def run(arguments, allowed=False):
         # memory is that of this process: the one that reads has a limit of its own
         own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         watch, waited = Stopwatch(), reader.waited
@@ -107,13 +97,13 @@ def refused(reader: ReadingProcess, capsys: pytest.CaptureFixture[str]) -> Refus
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", SCENES)
-def test_scene_file(case: str, folder: Path, refused: Refused) -> None:
+def test_scene_file(case, folder, refused):
     change_scene(folder / "scene.h5", SCENES[case])
     line = refused(["study", "--plan"], allowed=case in ALLOWED)
     assert not line or line.startswith("run-study: scene.h5: ")
 
 
-def put_scene_into_result() -> None:
+def put_scene_into_result():
     """The scene file takes the place of the scene in the result; the test is skipped where it cannot be copied."""
     with h5py.File("result", "r+") as result, h5py.File("scene.h5") as scene:
         del result["scene"]
@@ -125,7 +115,7 @@ def put_scene_into_result() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", IN_A_RESULT)
-def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
+def test_scene_in_a_result_file(case, folder, refused):
     change_scene(folder / "scene.h5", SCENES[case])
     put_scene_into_result()
     line = refused(["result", "--plan"], allowed=case in ALLOWED)
@@ -134,7 +124,7 @@ def test_scene_in_a_result_file(case: str, folder: Path, refused: Refused) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", sorted(set(SCENES) - VALUES_ONLY))
-def test_result_file_for_those_who_open_it(case: str, folder: Path) -> None:
+def test_result_file_for_those_who_open_it(case, folder):
     check_result_file(folder / "result", "result")
     change_scene(folder / "scene.h5", SCENES[case])
     put_scene_into_result()
@@ -146,14 +136,14 @@ def test_result_file_for_those_who_open_it(case: str, folder: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", TEXTS)
-def test_study_file(case: str, folder: Path, refused: Refused) -> None:
+def test_study_file(case, folder, refused):
     (folder / "study").write_bytes(TEXTS[case])
     refused(["study", "--plan"])
 
 
 @pytest.mark.parametrize("place", ["study", "scene.h5", "result"])
 @pytest.mark.parametrize("share", [0.3])
-def test_truncated(place: str, share: float, folder: Path, refused: Refused) -> None:
+def test_truncated(place, share, folder, refused):
     content = (folder / place).read_bytes()
     (folder / place).write_bytes(content[: int(share * len(content))])
     # the last byte of a study is the end of its last line
@@ -162,13 +152,13 @@ def test_truncated(place: str, share: float, folder: Path, refused: Refused) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("place", ["study", "scene.h5"])
-def test_sparse_terabyte(place: str, folder: Path, refused: Refused) -> None:
+def test_sparse_terabyte(place, folder, refused):
     sparse_file(folder / place)
     refused(["study", "--plan"])
 
 
 @pytest.mark.parametrize("place", ["study", "scene.h5"])
-def test_files_that_are_none(place: str, folder: Path, refused: Refused) -> None:
+def test_files_that_are_none(place, folder, refused):
     path = folder / place
     path.unlink()
     os.mkfifo(path)
@@ -181,9 +171,7 @@ def test_files_that_are_none(place: str, folder: Path, refused: Refused) -> None
     refused(["study", "--plan"])
 
 
-def test_names_of_files_do_not_reach_the_terminal_raw(
-    folder: Path, refused: Refused, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_names_of_files_do_not_reach_the_terminal_raw(folder, refused, capsys):
     name = "\x1b[2J\udcff.toml"
     Path(name).write_text("[study", encoding="utf-8")
     assert r"\x1b[2J\udcff.toml" in refused([name])
@@ -195,7 +183,7 @@ def test_names_of_files_do_not_reach_the_terminal_raw(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["inflating chunk"])
-def test_the_command_alone(case: str, folder: Path) -> None:
+def test_the_command_alone(case, folder):
     """Time of the processors and memory of the whole command, its start included."""
     change_scene(folder / "scene.h5", SCENES[case])
     command = [sys.executable, "-m", "studyrunner.cli", "study", "--plan"]
@@ -210,7 +198,7 @@ def test_the_command_alone(case: str, folder: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["nested arrays", "escape sequence in a key"])
-def test_study_in_a_result_file(case: str, folder: Path, refused: Refused) -> None:
+def test_study_in_a_result_file(case, folder, refused):
     with h5py.File("result", "r+", libver="latest") as result:
         del result.attrs["study"]
         result.attrs.create("study", TEXTS[case], dtype=h5py.string_dtype("utf-8"))

@@ -1,10 +1,5 @@
 """`outputs.scene`: the reduced model of a bundled scene stands in the result, which is then run with it."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from typing import Any
-
 import h5py
 import netCDF4
 import numpy as np
@@ -16,6 +11,7 @@ from studyrunner.cli import main
 from studyrunner.scene import scene as scene_room
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
+from tests.mpi.launching import results
 
 pytestmark = pytest.mark.usefixtures("reader", "folder")
 
@@ -24,26 +20,21 @@ SLIDER += ["--set", "slow_time.outputs=3", "--set", "outputs.variables=['default
 KEEP = ["--set", "outputs.scene=true"]
 
 
-def contents(path: str) -> xr.Dataset:
-    with xr.open_dataset(path) as result:
-        return result.load().drop_vars("run_time")
-
-
 @pytest.fixture
-def not_built(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+def not_built(monkeypatch):
     """From when it is called on, bundled scenes cannot be built."""
 
-    def refuse(*_: Any) -> None:
+    def refuse(*_):
         raise AssertionError("built again")
 
     return lambda: monkeypatch.setattr(scene_room, "build_scene", refuse)
 
 
 @pytest.mark.slow
-def test_the_result_is_enough(not_built: Callable[[], None]) -> None:
+def test_the_result_is_enough(not_built):
     assert main([*SLIDER, "-o", "plain.nc"]) == 0
     assert main([*SLIDER, *KEEP, "-o", "kept.nc"]) == 0
-    plain, kept = contents("plain.nc"), contents("kept.nc")
+    plain, kept = results("plain.nc"), results("kept.nc")
     assert {name for name in kept.attrs if kept.attrs[name] != plain.attrs[name]} == {"study", "id"}
     xr.testing.assert_identical(kept.drop_attrs(), plain.drop_attrs())
     with netCDF4.Dataset("plain.nc") as file:
@@ -51,7 +42,7 @@ def test_the_result_is_enough(not_built: Callable[[], None]) -> None:
 
     not_built()
     assert main(["kept.nc", "-o", "again.nc"]) == 0
-    xr.testing.assert_identical(contents("again.nc"), kept)
+    xr.testing.assert_identical(results("again.nc"), kept)
     with netCDF4.Dataset("kept.nc") as one, netCDF4.Dataset("again.nc") as other:
         assert one["scene/stiffness"][:].tolist() == other["scene/stiffness"][:].tolist()
         assert set(one["scene"].groups) == {"contact", "load", "response"}
@@ -60,7 +51,7 @@ def test_the_result_is_enough(not_built: Callable[[], None]) -> None:
 
 
 @pytest.mark.slow
-def test_it_is_the_model_in_the_file_that_is_run(not_built: Callable[[], None], capsys: pytest.CaptureFixture) -> None:
+def test_it_is_the_model_in_the_file_that_is_run(not_built, capsys):
     """Twice all masses, stiffnesses and forces, and half the wear coefficient: the same motion and the same wear."""
     assert main([*SLIDER, *KEEP, "-o", "kept.nc"]) == 0
     with h5py.File("kept.nc", "r+") as file:
@@ -69,11 +60,11 @@ def test_it_is_the_model_in_the_file_that_is_run(not_built: Callable[[], None], 
             values[...] = 2.0 * values[...]
     not_built()
     capsys.readouterr()
-    one = contents("kept.nc")
+    one = results("kept.nc")
     half = ["--set", f"axes.wear_coefficient={0.5 * one.wear_coefficient.item()!r}"]
     assert main(["kept.nc", *half, "-o", "twice.nc"]) == 0
     assert "another scene" in capsys.readouterr().err
-    twice = contents("twice.nc")
+    twice = results("twice.nc")
     assert float(one.worn_volume.max()) > 0.0
     for name, factor in (("response_amplitude", 1.0), ("worn_volume", 1.0), ("mean_pressure", 2.0)):
         np.testing.assert_allclose(twice[name].values, factor * one[name].values, rtol=1e-6)
@@ -81,7 +72,7 @@ def test_it_is_the_model_in_the_file_that_is_run(not_built: Callable[[], None], 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wave", [(), ("scene.nodal_diameter=3", "scene.n_sectors=20")], ids=["standing", "travelling"])
-def test_a_sector_keeps_all_nodal_diameters_and_its_mesh(wave: tuple[str, ...], not_built: Callable[[], None]) -> None:
+def test_a_sector_keeps_all_nodal_diameters_and_its_mesh(wave, not_built):
     coarse = ("scene.mesh=1", "scene.stuck_modes=5", "axes.frequency=211.5", "slow_time.cycles=0", "outputs.scene=true")
     overrides = ("axes.scheme=implicit", "outputs.loops=[]", "outputs.variables=['worn_volume', 'mesh']")
     study = read_study("dovetail", [*coarse, *overrides, *wave, "solver.harmonics=2", "solver.samples=32"])

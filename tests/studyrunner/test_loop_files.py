@@ -1,11 +1,7 @@
 """Fretting loops in the result file: where they stand, and that other pairs take no room."""
 
-from __future__ import annotations
-
 import contextlib
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,22 +12,21 @@ from studyrunner import variables
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
 from studyrunner.plan.planning import build_tasks
-from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, changed, fake_march, fake_starts, open_completion, without_values
 
 OVERRIDES = ("axes.frequency=[160, 150]", "axes.scheme=implicit", "slow_time.outputs=3")
 
 
-def wide(n_contact: int) -> SceneFacts:
+def wide(n_contact):
     return replace(
         FACTS, position=np.zeros((n_contact, 3)), area=np.full(n_contact, 1e-4), surface=("flank",) * n_contact
     )
 
 
 @pytest.fixture
-def write(tmp_path: Path) -> Callable[[int, str], Path]:
-    def write_file(n_contact: int, asked: str) -> Path:
+def write(tmp_path):
+    def write_file(n_contact, asked):
         facts = wide(n_contact)
         study = read_study("sdof_slider", (*OVERRIDES, f"outputs.loops={asked}", "outputs.variables=['worn_volume']"))
         plan = build_tasks(study, facts.n_displacements)
@@ -55,7 +50,7 @@ def write(tmp_path: Path) -> Callable[[int, str], Path]:
     return write_file
 
 
-def test_pairs_without_loops_take_no_room(write: Callable[[int, str], Path]) -> None:
+def test_pairs_without_loops_take_no_room(write):
     files = {
         (n_contact, loops): write(n_contact, loops).stat().st_size
         for n_contact in (3, 300)
@@ -71,9 +66,7 @@ def test_pairs_without_loops_take_no_room(write: Callable[[int, str], Path]) -> 
 
 
 @pytest.mark.slow
-def test_points_that_share_a_march_have_its_loops_at_their_own_counts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_points_that_share_a_march_have_its_loops_at_their_own_counts(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     study = [
         "sdof_slider",

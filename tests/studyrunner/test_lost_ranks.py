@@ -1,16 +1,10 @@
 """What becomes of the tasks of a rank that is lost: nothing is counted twice, and none takes all ranks with it."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from solver.outcome import Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.mpi.crashes import Crash
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.tasks import BranchTask, MarchTask
@@ -22,14 +16,14 @@ OVERRIDES = ("axes.frequency={start=1, stop=2, num=5}", "axes.step=[100, 200]", 
 
 
 @pytest.fixture
-def completion(tmp_path: Path) -> Iterator[CompletionIndex]:
+def completion(tmp_path):
     study = read_study("sdof_slider", OVERRIDES)
     completion = open_completion(study, build_tasks(study, 2), tmp_path / "out.nc.progress")
     yield completion
     completion.store.close()
 
 
-def begin(completion: CompletionIndex, n_starts: int) -> tuple[TaskProgress, BranchTask, list[MarchTask]]:
+def begin(completion, n_starts):
     """The progress of a run whose branch has given its first start states, and the marches from them."""
     progress = TaskProgress(completion)
     (branch,) = progress.begin()
@@ -41,7 +35,7 @@ def begin(completion: CompletionIndex, n_starts: int) -> tuple[TaskProgress, Bra
     return progress, branch, marches
 
 
-def finish(progress: TaskProgress, tasks: list[BranchTask | MarchTask]) -> None:
+def finish(progress, tasks):
     while tasks:
         task = tasks.pop(0)
         if isinstance(task, BranchTask):
@@ -52,14 +46,14 @@ def finish(progress: TaskProgress, tasks: list[BranchTask | MarchTask]) -> None:
                 progress.take(task, fake_march(task, place=place))
 
 
-def assert_finished(progress: TaskProgress, completion: CompletionIndex) -> None:
+def assert_finished(progress, completion):
     completion.store.flush()
     assert progress.n_points == completion.n_points_finished == completion.plan.n_points
     assert progress.n_starts_left == 0
     assert all(seconds == pytest.approx(0.0, abs=1e-9) for seconds in progress._left.values())
 
 
-def test_a_branch_goes_on_behind_what_it_has_given(completion: CompletionIndex) -> None:
+def test_a_branch_goes_on_behind_what_it_has_given(completion):
     progress, branch, marches = begin(completion, 2)
     completion.keep(branch, Packed("progress", (np.ones(3),)))
     (again,) = progress.take_back([(branch, 3)], {})
@@ -73,7 +67,7 @@ def test_a_branch_goes_on_behind_what_it_has_given(completion: CompletionIndex) 
 
 
 @pytest.mark.parametrize("earlier", [0, 1])
-def test_a_march_that_crashed_twice_is_not_given_again(earlier: int, completion: CompletionIndex) -> None:
+def test_a_march_that_crashed_twice_is_not_given_again(earlier, completion):
     progress, _, (first, crashed, *others) = begin(completion, 5)
     lost = [(first, first.n_results), (crashed, crashed.n_results)]
     if earlier:
@@ -89,7 +83,7 @@ def test_a_march_that_crashed_twice_is_not_given_again(earlier: int, completion:
 
 
 @pytest.mark.parametrize("kind", [BranchTask, MarchTask])
-def test_a_task_takes_two_ranks_with_it_and_no_more(kind: type, completion: CompletionIndex) -> None:
+def test_a_task_takes_two_ranks_with_it_and_no_more(kind, completion):
     """It may need more memory than there is; a task that only waits on a rank is none the worse for its loss."""
     progress, branch, marches = begin(completion, 2 if kind is BranchTask else 5)
     task, n_left = (branch, 3) if kind is BranchTask else (marches[0], marches[0].n_results)

@@ -1,14 +1,10 @@
 """Faults of the machine cost no point: the task is done again, elsewhere where there is a choice, or by a later run."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 import xarray as xr
@@ -19,24 +15,21 @@ from studyrunner.cli import main
 from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.plan.cost_model import CostModel
 from studyrunner.plan.tasks import BranchTask, MarchTask
-from tests.studyrunner.faked_runs import SMALL, Solver, Task
+from tests.mpi.launching import results
+from tests.studyrunner.faked_runs import SMALL
+from tests.studyrunner.test_dispatch import Job
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.processes]
 
 FAULTS = [OSError(122, "Disk quota exceeded"), MemoryError()]
 
 
-def load() -> xr.Dataset:
-    with xr.open_dataset("out.nc") as result:
-        return result.load().drop_vars("run_time")
-
-
-def failing(error: Exception, n_times: int, kind: type[Task]) -> Callable[[Task, int], None]:
+def failing(error, n_times, kind):
     """The first task of a kind breaks off so often."""
     left = [n_times]
     first: list[int] = []
 
-    def disturb(task: Task, _: int) -> None:
+    def disturb(task, _):
         if isinstance(task, kind):
             first.append(task.number)
             if task.number == first[0] and left[0]:
@@ -48,15 +41,12 @@ def failing(error: Exception, n_times: int, kind: type[Task]) -> Callable[[Task,
 
 @pytest.mark.parametrize("error", FAULTS, ids=lambda error: type(error).__name__)
 @pytest.mark.parametrize("kind", [BranchTask, MarchTask])
-def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(
-    error: Exception, kind: type[Task], solver: Solver, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(error, kind, solver, capsys):
     assert main([*SMALL[:-1], "whole.nc"]) == 0
     solver.begin_again()
     solver.disturb = failing(error, 1, kind)
     assert main(SMALL) == 0
-    with xr.open_dataset("whole.nc") as whole:
-        xr.testing.assert_identical(load(), whole.load().drop_vars("run_time"))
+    xr.testing.assert_identical(results(), results("whole.nc"))
     said = capsys.readouterr().err
     assert said.count(f"rank 0: {type(error).__name__}") == 1
     assert "a fault of the machine; the task is tried once more" in said
@@ -64,29 +54,28 @@ def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [BranchTask, MarchTask])
-def test_a_fault_that_stays_is_never_a_result(kind: type[Task], solver: Solver) -> None:
+def test_a_fault_that_stays_is_never_a_result(kind, solver):
     assert main([*SMALL[:-1], "whole.nc"]) == 0
     solver.begin_again()
     solver.disturb = failing(FAULTS[0], 2, kind)
     assert main(SMALL) == 3
-    outcomes = set(load().outcome.values.flat)
+    outcomes = set(results().outcome.values.flat)
     assert Outcome.NOT_COMPUTED in outcomes
     assert outcomes <= {0, Outcome.NOT_COMPUTED}
     # the same command goes on, and nothing of it is left
     solver.begin_again()
     assert main(SMALL) == 0
-    with xr.open_dataset("whole.nc") as whole:
-        xr.testing.assert_identical(load(), whole.load().drop_vars("run_time"))
+    xr.testing.assert_identical(results(), results("whole.nc"))
 
 
 @pytest.mark.slow
-def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch):
     """With the solver itself, whose histories break off in their midst."""
     from solver.wear.wearing_joint import WearingJoint
 
     own, n_calls = WearingJoint.noted, 0
 
-    def noted(self: WearingJoint, *given: Any) -> object:
+    def noted(self, *given):
         nonlocal n_calls
         n_calls += 1
         if n_calls in (3, 30):
@@ -96,21 +85,12 @@ def test_an_error_that_the_solver_takes_for_an_end_is_none(monkeypatch: pytest.M
     monkeypatch.setattr(WearingJoint, "noted", noted)
     assert main([*SMALL, "--set", "solver.harmonics=3", "--set", "solver.samples=32"]) == 0
     assert n_calls > 30
-    assert (load().outcome == 0).all()
+    assert (results().outcome == 0).all()
 
 
-class Chore:
-    cost, n_results, opens_others = 1.0, 1, False
-    cost_keys = (("chore",),)
-
-    def cost_of(self, *, first: bool) -> float:
-        del first
-        return self.cost
-
-
-def test_a_sick_rank_gets_no_more_tasks_unless_all_are() -> None:
-    dispatcher: Dispatcher[Chore] = Dispatcher(3, CostModel(), time.monotonic)
-    dispatcher.add([Chore() for _ in range(20)])
+def test_a_sick_rank_gets_no_more_tasks_unless_all_are():
+    dispatcher: Dispatcher[Job] = Dispatcher(3, CostModel(), time.monotonic)
+    dispatcher.add([Job("chore", 1.0) for _ in range(20)])
     held = [(rank, given.number) for rank, given in dispatcher.assign()]
     ranks: list[int] = []
     while held:
@@ -124,7 +104,7 @@ def test_a_sick_rank_gets_no_more_tasks_unless_all_are() -> None:
     assert dispatcher.done
     assert set(ranks) == {1}
     dispatcher.shun(1)
-    dispatcher.add([Chore()])
+    dispatcher.add([Job("chore", 1.0)])
     assert [rank for rank, _ in dispatcher.assign()] == [1]
     # where the others are lost a sick one is better than none
     dispatcher.add_lost([task for task, _ in dispatcher.lose(1)])
@@ -141,12 +121,12 @@ print(kernel.double(3.0), len(kernel.double.stats.cache_hits))
 
 
 @pytest.fixture
-def kernel(folder: Path) -> Callable[[], str]:
+def kernel(folder):
     (folder / "kernel.py").write_text(
         "from numba import njit\n@njit(cache=True)\ndef double(x):\n    return 2.0 * x\n", encoding="utf-8"
     )
 
-    def call() -> str:
+    def call():
         environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
         environment["PYTHONPATH"] = os.pathsep.join([str(folder), str(Path(run.__file__).parents[1])])
         done = subprocess.run(
@@ -158,7 +138,7 @@ def kernel(folder: Path) -> Callable[[], str]:
 
 
 @pytest.mark.slow
-def test_a_damaged_cache_of_kernels_is_built_anew(kernel: Callable[[], str], folder: Path) -> None:
+def test_a_damaged_cache_of_kernels_is_built_anew(kernel, folder):
     assert kernel() == "6.0 0"
     assert kernel() == "6.0 1"
     for suffix in ("*.nbi", "*.nbc"):

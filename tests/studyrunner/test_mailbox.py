@@ -1,7 +1,5 @@
 """No wait of the main thread is one that a signal makes endless."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -41,14 +39,14 @@ os._exit(0)
 
 
 @pytest.mark.slow
-def test_a_wait_that_signals_interrupt_past_its_deadline_ends() -> None:
+def test_a_wait_that_signals_interrupt_past_its_deadline_ends():
     ended = subprocess.run(
         [sys.executable, "-c", BUSY], cwd=ROOT, capture_output=True, text=True, timeout=200, check=False
     )
     assert ended.stdout == "waited True\n", ended.stderr
 
 
-def test_messages_come_in_their_order_and_stay_until_they_are_taken() -> None:
+def test_messages_come_in_their_order_and_stay_until_they_are_taken():
     box: Mailbox[int] = Mailbox()
     box.wait(0.0)
     assert box.first() is None

@@ -1,16 +1,10 @@
 """Studies of missions: blocks under [[mission]], flown slow_time.missions times in place of cycles."""
 
-from __future__ import annotations
-
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 import xarray as xr
 
 from solver import Block, Outcome, Passage, integrate_mission
-from solver.settings import SolverSettings
 from studies import build_scene
 from studyrunner.api import run_study
 from studyrunner.mpi import schedule
@@ -18,7 +12,7 @@ from studyrunner.plan.planning import build_tasks
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
-from tests.studyrunner.faked_blocks import STUDY, FakedBlocks, blocks, load_of
+from tests.studyrunner.faked_blocks import STUDY, blocks, load_of
 
 __all__ = ["blocks"]
 
@@ -45,23 +39,23 @@ begin = "sweep"
 
 
 @pytest.fixture
-def study_file(tmp_path: Path) -> Path:
+def study_file(tmp_path):
     path = tmp_path / "missions.toml"
     path.write_text(STUDY, encoding="utf-8")
     return path
 
 
-def run(path: Path, name: str = "out.nc", **more: Any) -> xr.Dataset:
+def run(path, name="out.nc", **more):
     with run_study(path, path.with_name(name), progress=False, **more) as found:
         return found.load()
 
 
-def without_time(dataset: xr.Dataset) -> xr.Dataset:
+def without_time(dataset):
     return dataset.drop_vars("run_time").drop_attrs(deep=False)
 
 
 @pytest.mark.slow
-def test_the_result_has_missions_and_blocks_and_the_values_of_the_solver(study_file: Path, blocks: FakedBlocks) -> None:
+def test_the_result_has_missions_and_blocks_and_the_values_of_the_solver(study_file, blocks):
     result = run(study_file)
     axes = {"frequency": 2, "wear_coefficient": 2, "excitation_amplitude": 1, "sweep": 2}
     assert dict(result.sizes) == {**axes, "mission": 4, "block": 3, "contact": 1, "response": 1}
@@ -111,7 +105,7 @@ def test_the_result_has_missions_and_blocks_and_the_values_of_the_solver(study_f
 
 
 @pytest.mark.slow
-def test_a_study_without_missions_is_one_block_to_the_last_bit(tmp_path: Path) -> None:
+def test_a_study_without_missions_is_one_block_to_the_last_bit(tmp_path):
     path = tmp_path / "one.toml"
     path.write_text(STEADY, encoding="utf-8")
     found = run(path).squeeze()
@@ -126,7 +120,7 @@ def test_a_study_without_missions_is_one_block_to_the_last_bit(tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_blocks_of_gross_slip_wear_by_their_slip_in_any_order(tmp_path: Path) -> None:
+def test_blocks_of_gross_slip_wear_by_their_slip_in_any_order(tmp_path):
     """V = k_w P s N with a constant normal force: the sum of the blocks, whatever their order."""
     text = STEADY.replace("cycles = 1e5", "cycles = 3e3").replace("missions = 1\n", "missions = 2\n")
     other = text.partition("[[mission]]")[2].replace("all", "soft").replace("14.0", "10.0").replace("3e3", "5e3")
@@ -147,15 +141,13 @@ def test_blocks_of_gross_slip_wear_by_their_slip_in_any_order(tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_an_interrupted_study_goes_on_to_the_last_bit(
-    study_file: Path, blocks: FakedBlocks, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_study_goes_on_to_the_last_bit(study_file, blocks, monkeypatch):
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", 0.0)
     few = {"axes.frequency": 160, "axes.sweep": "up", "axes.wear_coefficient": 1e-11}
     whole = run(study_file, "whole.nc", overrides=few)
     n_whole = len(blocks.flown)
 
-    def interrupt(number: int) -> None:
+    def interrupt(number):
         if number == n_whole // 2:
             raise KeyboardInterrupt
 
@@ -170,7 +162,7 @@ def test_an_interrupted_study_goes_on_to_the_last_bit(
 
 
 @pytest.mark.slow
-def test_a_block_that_fails_spoils_its_point_only(study_file: Path, blocks: FakedBlocks) -> None:
+def test_a_block_that_fails_spoils_its_point_only(study_file, blocks):
     blocks.fails["cruise"] = Outcome.START_FAILED
     result = run(study_file, overrides={"axes.frequency": 160, "axes.sweep": "up", "slow_time.until.worn_volume": 1e-9})
     assert (result.outcome == Outcome.START_FAILED).all()
@@ -179,7 +171,7 @@ def test_a_block_that_fails_spoils_its_point_only(study_file: Path, blocks: Fake
 
 
 @pytest.mark.slow
-def test_a_target_ends_the_missions(study_file: Path, blocks: FakedBlocks) -> None:
+def test_a_target_ends_the_missions(study_file, blocks):
     one = {"axes.frequency": 160, "axes.sweep": "up"}
     whole = run(study_file, overrides=one).squeeze()
     goal = 0.4 * whole.worn_volume[0, -1].item()
@@ -194,7 +186,7 @@ def test_a_target_ends_the_missions(study_file: Path, blocks: FakedBlocks) -> No
 
 
 @pytest.mark.slow
-def test_the_effective_study_is_the_same_study(study_file: Path, blocks: FakedBlocks) -> None:
+def test_the_effective_study_is_the_same_study(study_file, blocks):
     study = read_study(study_file, ["mission.cruise.seconds=20", "mission.2.cycles=500"])
     assert [block.cycles_at(100.0) for block in study.mission] == [3200.0, 2000.0, 500.0]
     text = format_study(study)
@@ -210,7 +202,7 @@ def test_the_effective_study_is_the_same_study(study_file: Path, blocks: FakedBl
     xr.testing.assert_identical(without_time(run(study_file.with_name("out.nc"), "again.nc")), without_time(first))
 
 
-def test_scenes_of_blocks_are_built_once_and_points_are_tasks(study_file: Path) -> None:
+def test_scenes_of_blocks_are_built_once_and_points_are_tasks(study_file):
     study = read_study(study_file, {"axes.damping": [0.0, 1.0], "axes.wear_coefficient": 1e-11})
     scenes = find_scenes(study)
     assert len(scenes.studies) == 4
@@ -223,7 +215,7 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(study_file: Path) 
     assert begins == [["up", "up", "ramp"], ["up", "down", "ramp"]]
 
 
-def test_an_engine_order_is_a_frequency_by_the_speed_of_the_block(tmp_path: Path) -> None:
+def test_an_engine_order_is_a_frequency_by_the_speed_of_the_block(tmp_path):
     path = tmp_path / "engine.toml"
     path.write_text(
         """
@@ -286,7 +278,7 @@ seconds = 10
         ({"scatter": {"samples": 4, "frequency": {"normal": {"std": 1.0}}}}, "scatter.frequency", "run-up"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_in_one_sentence(study_file: Path, changes: dict[str, Any], key: str, said: str) -> None:
+def test_what_is_wrong_is_said_in_one_sentence(study_file, changes, key, said):
     with pytest.raises(UserError) as caught:
         run(study_file, overrides=changes)
     assert caught.value.key == key
@@ -295,7 +287,7 @@ def test_what_is_wrong_is_said_in_one_sentence(study_file: Path, changes: dict[s
 
 
 @pytest.mark.slow
-def test_samples_draw_what_all_blocks_have(study_file: Path, blocks: FakedBlocks) -> None:
+def test_samples_draw_what_all_blocks_have(study_file, blocks):
     scatter = {"samples": 3, "friction_coefficient": {"normal": {"std": 0.03}}, "normal_load": {"normal": {"std": 0.5}}}
     one = {"axes.frequency": 160, "axes.sweep": "up", "axes.wear_coefficient": 1e-11}
     result = run(study_file, overrides={**one, "scatter": scatter})
@@ -309,10 +301,3 @@ def test_samples_draw_what_all_blocks_have(study_file: Path, blocks: FakedBlocks
         assert loads["cruise"] == load
         assert loads["heavy"] == pytest.approx(12.0 + load - 10.0)
     assert len(set(result.worn_volume.isel(mission=-1).values.ravel())) == 3
-
-
-@pytest.mark.slow
-def test_settings_of_a_mission_are_those_of_the_study(study_file: Path, blocks: FakedBlocks) -> None:
-    run(study_file, overrides={"axes.frequency": 160, "axes.sweep": "up", "axes.rtol": [1e-2, 1e-3]})
-    assert {case.mission.settings.rtol for case in blocks.flown} == {1e-2, 1e-3}
-    assert isinstance(blocks.flown[0].settings, SolverSettings)

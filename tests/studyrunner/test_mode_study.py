@@ -1,9 +1,5 @@
 """Studies of nonlinear modes: axes.modal_amplitude in place of frequency, excitation and wear."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -40,22 +36,22 @@ SHAPE = {"mode": 2, "sweep": 1, "sample": 2, "modal_amplitude": 3, "cycle": 2}
 
 
 @pytest.fixture(scope="module")
-def study_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def study_file(tmp_path_factory):
     path = tmp_path_factory.mktemp("modes") / "slider_modes.toml"
     path.write_text(SLIDER, encoding="utf-8")
     return path
 
 
 @pytest.fixture(scope="module")
-def result(study_file: Path) -> xr.Dataset:
+def result(study_file):
     return run_study(study_file, study_file.with_name("out.nc"), progress=False).load()
 
 
-def without_time(dataset: xr.Dataset) -> xr.Dataset:
+def without_time(dataset):
     return dataset.drop_vars("run_time").drop_attrs(deep=False)
 
 
-def test_the_result_has_its_axes_and_the_values_of_the_solver(result: xr.Dataset) -> None:
+def test_the_result_has_its_axes_and_the_values_of_the_solver(result):
     """Amplitudes and worn joints in the order of the study file, each the same as in Python."""
     sizes = dict(zip(result.natural_frequency.dims, result.natural_frequency.shape, strict=True))
     assert list(sizes.items()) == list(SHAPE.items())
@@ -82,7 +78,7 @@ def test_the_result_has_its_axes_and_the_values_of_the_solver(result: xr.Dataset
     assert (result.harmonics_used.sel(mode=1, modal_amplitude=[1e-4, 1e-3]) > 0).all()
 
 
-def test_a_mode_that_is_not_there_says_so(result: xr.Dataset) -> None:
+def test_a_mode_that_is_not_there_says_so(result):
     assert "followed down to the amplitude" in str(
         result.message.sel(mode=1, modal_amplitude=1e-6, cycle=0)[0, 0].item()
     )
@@ -94,7 +90,7 @@ def test_a_mode_that_is_not_there_says_so(result: xr.Dataset) -> None:
     assert "The mode may turn back before it (a fold)" in result.outcome.attrs["sentences"]
 
 
-def test_points_are_the_same_in_another_list(study_file: Path, result: xr.Dataset, tmp_path: Path) -> None:
+def test_points_are_the_same_in_another_list(study_file, result, tmp_path):
     """And a study with more amplitudes goes on from the points that are there."""
     changes = {"scatter.samples": 1, "axes.mode": 1, "scene.worn": {"depth": 0.0, "cycle": 0}}
     few = {**changes, "axes.modal_amplitude": [1e-4], "outputs.variables": ["slip_fraction"]}
@@ -109,7 +105,7 @@ def test_points_are_the_same_in_another_list(study_file: Path, result: xr.Datase
         xr.testing.assert_identical(without_time(found.sel(where)), without_time(result.sel(where)))
 
 
-def test_the_effective_study_is_the_same_study(study_file: Path, tmp_path: Path) -> None:
+def test_the_effective_study_is_the_same_study(study_file, tmp_path):
     study = read_study(study_file)
     text = format_study(study)
     for name in ("slow_time", "[wear]", "frequency =", "scheme", "step"):
@@ -119,7 +115,7 @@ def test_the_effective_study_is_the_same_study(study_file: Path, tmp_path: Path)
     assert format_study(read_study(tmp_path / "again.toml")) == text
 
 
-def test_points_of_a_line_share_a_task(study_file: Path) -> None:
+def test_points_of_a_line_share_a_task(study_file):
     """Lines that are equal are followed once."""
     study: Study = read_study(study_file, {"scene.worn.depth": [[0.0], [0.0]], "axes.sweep": ["up", "down"]})
     plan = build_tasks(study, 2)
@@ -145,20 +141,20 @@ def test_points_of_a_line_share_a_task(study_file: Path) -> None:
         ("scatter.wear_coefficient", {"normal": {"std": 1e-12}}, "scatter.wear_coefficient: unknown input"),
     ],
 )
-def test_what_modes_have_no_use_for_is_named(study_file: Path, key: str, value: object, said: str) -> None:
+def test_what_modes_have_no_use_for_is_named(study_file, key, value, said):
     with pytest.raises(UserError) as error:
         read_study(study_file, {key: value})
     assert said in str(error.value)
 
 
-def test_keys_of_modes_need_an_amplitude() -> None:
+def test_keys_of_modes_need_an_amplitude():
     with pytest.raises(UserError, match=r"axes.mode = 1: give axes.modal_amplitude as well"):
         read_study("sdof_slider", {"axes.mode": 1})
     with pytest.raises(UserError, match="only nonlinear modes have it"):
         read_study("sdof_slider", {"outputs.variables": ["damping_ratio"]})
 
 
-def test_equal_ratios_end_where_they_are_told_to() -> None:
+def test_equal_ratios_end_where_they_are_told_to():
     table = {"start": 1e-6, "stop": 1e-2, "num": 5, "spacing": "log"}
     study = read_study("sdof_slider", {"axes.wear_coefficient": table})
     assert study.axes.wear_coefficient == (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
@@ -167,7 +163,7 @@ def test_equal_ratios_end_where_they_are_told_to() -> None:
             read_study("sdof_slider", {"axes.wear_coefficient": wrong})
 
 
-def test_the_report_draws_frequency_and_damping(result: xr.Dataset, study_file: Path, tmp_path: Path) -> None:
+def test_the_report_draws_frequency_and_damping(result, study_file, tmp_path):
     with open_for_report(study_file.with_name("out.nc")).dataset as dataset:
         assert dataset.sizes == result.sizes
     shown = open_for_report(study_file.with_name("out.nc"))

@@ -1,7 +1,5 @@
 """Studies of models in the formats of other programs, through the front door; files are written after the manuals."""
 
-from __future__ import annotations
-
 import importlib.util
 
 import numpy as np
@@ -22,7 +20,6 @@ needs_ansys = pytest.mark.skipif(
 STUDY = """
 [study]
 name = "lap"
-
 [scene]
 model = "lap.inp"
 units = "SI"
@@ -34,16 +31,13 @@ friction_coefficient = 0.3
 material = {young_modulus = 210e9, poisson_ratio = 0.3, density = 7800.0}
 retention_stiffness = 1e6
 retention_direction = [1, 0, 0]
-
 [axes]
 frequency = 300.0
 wear_coefficient = 1e-11
 excitation_amplitude = 20.0
-
 [slow_time]
 cycles = 1000
 outputs = 2
-
 [solver]
 harmonics = 1
 samples = 32

@@ -1,7 +1,5 @@
 """The page on a model of one's own: its commands work when pasted, and print what it says."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

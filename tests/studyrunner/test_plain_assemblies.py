@@ -1,7 +1,5 @@
 """Assemblies without cyclic symmetry, from a deck to a worn volume; static forces by equilibrium and closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -16,7 +14,6 @@ MM_STEEL = Material(210e3, 0.3, 7.8e-9)  # MPa, t/mm3
 CYLINDER = """
 [study]
 name = "cylinder"
-
 [scene]
 model = "cylinder.inp"
 units = "mm-t-s"
@@ -26,16 +23,13 @@ tolerance = 1e-4
 friction_coefficient = 0.1
 load = {set = "TOP", direction = [1, 0, 0]}
 preload = [{set = "TOP", direction = [0, 0, -1], force = 363.0}]
-
 [axes]
 frequency = 50.0
 wear_coefficient = 1e-11
 excitation_amplitude = 20.0
-
 [slow_time]
 cycles = 1e4
 outputs = 2
-
 [solver]
 harmonics = "auto"
 samples = "auto"

@@ -1,21 +1,15 @@
 """What a user sees while a study runs: a bar on a terminal, a line every half minute elsewhere."""
 
-from __future__ import annotations
-
 import io
 import itertools
 import re
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from studyrunner import task_runs
 from studyrunner.cli import main
-from studyrunner.plan.results import Keep, MarchResult, StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.scene import describe_scene
 from studyrunner.system import progress
 from studyrunner.system.progress import ProgressDisplay, Standing
@@ -30,24 +24,24 @@ LINE = re.compile(
 class Clock:
     """Stands for `time.monotonic`."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.now = 1000.0
 
-    def __call__(self) -> float:
+    def __call__(self):
         return self.now
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+def clock(monkeypatch):
     found = Clock()
     monkeypatch.setattr("studyrunner.system.progress.time.monotonic", found)
     return found
 
 
-def test_a_line_every_half_minute_at_least(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_line_every_half_minute_at_least(clock, capsys):
     looks = []
 
-    def look() -> Standing:
+    def look():
         looks.append(clock.now)
         return Standing(5, 20, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
 
@@ -67,11 +61,11 @@ def test_a_line_every_half_minute_at_least(clock: Clock, capsys: pytest.CaptureF
     assert len(lines) < 3600 / 30 + 12
 
 
-def test_a_bar_on_a_terminal(clock: Clock, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bar_on_a_terminal(clock, monkeypatch, capsys):
     screen = io.StringIO()
     looks = []
 
-    def look() -> Standing:
+    def look():
         looks.append(clock.now)
         return Standing(5, 20, 30.0, ("210 Hz implicit",))
 
@@ -93,11 +87,11 @@ def test_a_bar_on_a_terminal(clock: Clock, monkeypatch: pytest.MonkeyPatch, caps
     assert 90 <= len(looks) <= 101
 
 
-def build_slow(model: object, *_: object) -> Callable[..., Iterator[StartResult | MarchResult]]:
+def build_slow(model, *_):
     """The stand-in for the solver; each start state and each march takes a while."""
     facts = describe_scene(model)
 
-    def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
+    def evaluate(task, keep):
         for result in fake_evaluate(task, keep, facts):
             time.sleep(0.15)
             yield result
@@ -106,9 +100,7 @@ def build_slow(model: object, *_: object) -> Callable[..., Iterator[StartResult 
 
 
 @pytest.mark.parametrize("compiles", [True, False])
-def test_a_run_that_has_to_compile_says_so_once(
-    compiles: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_that_has_to_compile_says_so_once(compiles, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(task_runs, "build_evaluator", build_slow)
     numbers = itertools.count(3) if compiles else itertools.repeat(3)
     monkeypatch.setattr(task_runs, "n_compiled", lambda: next(numbers))

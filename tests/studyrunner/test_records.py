@@ -1,18 +1,14 @@
 """The record of a history: all that its result says, and what stands there without one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from studyrunner.checkpoint.records import empty_record, pack_record, record_of, record_type, unpack_records, values_in
+from studyrunner.checkpoint.records import empty_record, pack_record, record_of, record_type, values_in
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import failed_result
 from studyrunner.study.study_file import read_study
-from studyrunner.variables import KEPT
-from tests.studyrunner.fakes import FACTS, fake_histories
+from tests.studyrunner.fakes import FACTS
 
 OVERRIDES = (
     "axes.frequency=[160, 150]",
@@ -23,26 +19,7 @@ OVERRIDES = (
 )
 
 
-@pytest.mark.parametrize("more", [(), ("outputs.loops=[1]",), ("outputs.variables=['worn_volume']",)])
-def test_a_record_says_all_that_its_result_does(more: tuple[str, ...]) -> None:
-    study = read_study("sdof_slider", (*OVERRIDES, *more))
-    pairs = list(fake_histories(build_tasks(study, FACTS.n_displacements)))
-    assert [(task.number, result.place) for task, result in pairs] == [
-        (march, place) for march in (0, 1, 3, 2) for place in range(2)
-    ]
-    kind = record_type(study, FACTS)
-    for task, result in pairs:
-        (record,) = records = record_of(kind, result)
-        values = values_in(pack_record(records), kind)
-        assert values is not None
-        found = unpack_records(np.stack([values, values]), kind)
-        assert found.tobytes() == 2 * records.tobytes()
-        assert result.values.keys() == {*KEPT, *task.variables}
-        for name in result.values:
-            np.testing.assert_equal(record[name], result.values[name])
-
-
-def test_of_a_point_that_failed_the_record_has_no_numbers_but_says_why() -> None:
+def test_of_a_point_that_failed_the_record_has_no_numbers_but_says_why():
     study = read_study("sdof_slider", OVERRIDES)
     kind = record_type(study, FACTS)
     task = build_tasks(study, FACTS.n_displacements).marches[0][0]
@@ -57,7 +34,7 @@ def test_of_a_point_that_failed_the_record_has_no_numbers_but_says_why() -> None
             assert np.all(np.isnan(there) if there.dtype.kind == "f" else there == 0), name
 
 
-def test_a_record_of_another_study_is_none_of_this() -> None:
+def test_a_record_of_another_study_is_none_of_this():
     study, other = (read_study("sdof_slider", (*OVERRIDES, f"slow_time.outputs={n}")) for n in (3, 4))
     kind = record_type(study, FACTS)
     packed = pack_record(empty_record(kind))

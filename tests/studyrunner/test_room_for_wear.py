@@ -1,10 +1,6 @@
 """A study in gross slip lays its pairs as far as it wears them, and says where they were not laid far enough."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +14,6 @@ from studyrunner.scene.scene import build_study_scene, describe_scene, write_stu
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.realisation import realise
 from studyrunner.study.room_for_wear import describe_room, expected_wear
-from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study
 
 STUDY = """
@@ -44,19 +39,19 @@ samples = 32
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     found = tmp_path / "sliding.toml"
     found.write_text(STUDY)
     return found
 
 
-def half_width(study: Study) -> float:
+def half_width(study):
     value = dict(study.scene.parameters)["half_width"]
     assert isinstance(value, float)
     return value
 
 
-def test_the_study_shows_the_width_and_all_that_is_made_of_it_is_the_same(path: Path) -> None:
+def test_the_study_shows_the_width_and_all_that_is_made_of_it_is_the_same(path):
     study = read_study(path)
     width = half_width(study)
     assert f"half_width = {width}" in format_study(study)
@@ -98,7 +93,7 @@ def test_the_study_shows_the_width_and_all_that_is_made_of_it_is_the_same(path: 
         ),
     ],
 )
-def test_it_is_the_most_that_any_point_wears(path: Path, overrides: dict[str, Any], factor: float) -> None:
+def test_it_is_the_most_that_any_point_wears(path, overrides, factor):
     study = read_study(path, overrides)
     expected = expected_wear(study)
     assert expected.per_slip_work == pytest.approx(factor * 1e-13 * 2000, rel=1e-12)
@@ -107,7 +102,7 @@ def test_it_is_the_most_that_any_point_wears(path: Path, overrides: dict[str, An
     assert half_width(study) == pytest.approx(half_width(read_study(path)) * factor ** (1.0 / 3.0), rel=0.08)
 
 
-def test_a_scene_has_room_for_nearly_all_samples_whatever_their_number(path: Path) -> None:
+def test_a_scene_has_room_for_nearly_all_samples_whatever_their_number(path):
     scatter = {"samples": 8, "wear_coefficient": {"lognormal": {"factor": 1.5}}}
     study = read_study(path, {"scatter": scatter})
     assert expected_wear(study).per_slip_work == pytest.approx(1.5**3.1 * 1e-13 * 2000)
@@ -119,7 +114,7 @@ def test_a_scene_has_room_for_nearly_all_samples_whatever_their_number(path: Pat
     assert len(find_scenes(study).studies) == 1
 
 
-def test_each_sample_with_a_scene_of_its_own_has_room_for_its_wear(path: Path) -> None:
+def test_each_sample_with_a_scene_of_its_own_has_room_for_its_wear(path):
     inputs = {name: {"lognormal": {"factor": 1.5}} for name in ("P", "wear_coefficient")}
     study = read_study(path, {"scatter": {"samples": 8, **inputs}})
     for part in realise(study):
@@ -130,7 +125,7 @@ def test_each_sample_with_a_scene_of_its_own_has_room_for_its_wear(path: Path) -
     assert format_study(read_study(path.with_name("again.toml"))) == format_study(study)
 
 
-def test_the_remedy_names_width_and_number_of_pairs(path: Path) -> None:
+def test_the_remedy_names_width_and_number_of_pairs(path):
     study = read_study(path, {"scene.half_width": 5e-5})
     needed = half_width(read_study(path))
     strips = 2 * math.ceil(12 * needed / 5e-5 / 2)
@@ -142,7 +137,7 @@ def test_the_remedy_names_width_and_number_of_pairs(path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_scar_that_is_cut_off_is_a_failed_point_with_a_remedy(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_scar_that_is_cut_off_is_a_failed_point_with_a_remedy(path, capsys):
     output = path.with_name("out.nc")
     narrow = ["--set", "scene.half_width=5e-5"]
     assert main([str(path), "-o", str(output), *narrow]) == 3

@@ -1,9 +1,5 @@
 """Quantiles, probabilities, Sobol' indices and groups of samples against closed forms."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -12,8 +8,8 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from studyrunner.scatter.design import SaltelliLayout, unit_design
-from studyrunner.statistics.bands import Band, SampleValues
-from studyrunner.statistics.indices import Indices, plain_indices, saltelli_indices
+from studyrunner.statistics.bands import SampleValues
+from studyrunner.statistics.indices import plain_indices, saltelli_indices
 from studyrunner.statistics.quantiles import exceedance, mean, quantile
 from studyrunner.statistics.two_groups import deciding_pair, density, two_groups
 
@@ -30,39 +26,39 @@ TOTAL = FIRST * FACTORS.prod() / FACTORS
 SOBOL = np.ones(3, dtype=np.bool_)
 
 
-def archard(unit: Array) -> Array:
+def archard(unit):
     return np.asarray(MEDIAN * np.exp(ndtri(unit) @ LOGARITHMS))
 
 
-def ishigami(unit: Array) -> Array:
+def ishigami(unit):
     x = np.pi * (2.0 * unit.T - 1.0)
     return np.asarray(np.sin(x[0]) + 7.0 * np.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * np.sin(x[0]))
 
 
-def ishigami_indices() -> tuple[Array, Array]:
+def ishigami_indices():
     alone = np.array([0.5 * (1 + 0.1 * np.pi**4 / 5) ** 2, 49 / 8, 0.0])
     together = 0.01 * np.pi**8 * (1 / 18 - 1 / 50)
     return alone / (alone.sum() + together), (alone + [together, 0.0, together]) / (alone.sum() + together)
 
 
-def known(values: Array, error: float = 0.0) -> SampleValues:
+def known(values, error=0.0):
     return SampleValues(values, values, np.abs(values) * error)
 
 
-def without(values: Array, missing: Array, low: Array) -> SampleValues:
+def without(values, missing, low):
     """Samples of which some have a lower bound alone."""
     lost = np.isin(np.arange(values.shape[-1]), missing)
     return SampleValues(np.where(lost, low, values), np.where(lost, np.inf, values), np.zeros(values.shape))
 
 
-def contains(outer: Band, inner: Band) -> bool:
+def contains(outer, inner):
     return bool(np.all(outer.lowest <= inner.lowest + 1e-12) and np.all(outer.highest >= inner.highest - 1e-12))
 
 
 # --- quantiles and probabilities ---
 
 
-def test_quantiles_of_a_lognormal_product() -> None:
+def test_quantiles_of_a_lognormal_product():
     values = known(archard(unit_design("sobol", 1, 4096, 3)))
     spread = np.sqrt((LOGARITHMS**2).sum())
     for probability in (0.05, 0.5, 0.95):
@@ -76,7 +72,7 @@ def test_quantiles_of_a_lognormal_product() -> None:
 
 
 @pytest.mark.parametrize("probability", [0.05, 0.5, 0.9])
-def test_intervals_of_quantiles_hold_the_truth_as_often_as_they_say(probability: float) -> None:
+def test_intervals_of_quantiles_hold_the_truth_as_often_as_they_say(probability):
     """2000 draws of 128 from a distribution with heavy tails: the share is within the scatter of 2000 above 95 %."""
     found = quantile(known(np.random.default_rng(1).standard_t(2, (2000, 128))), probability, 0.95)
     truth = student.ppf(probability, 2)
@@ -84,7 +80,7 @@ def test_intervals_of_quantiles_hold_the_truth_as_often_as_they_say(probability:
     assert 0.94 <= covered <= 0.985
 
 
-def test_intervals_of_mean_and_exceedance_hold_the_truth_as_often_as_they_say() -> None:
+def test_intervals_of_mean_and_exceedance_hold_the_truth_as_often_as_they_say():
     values = known(np.random.default_rng(1).normal(size=(2000, 20)))
     average, above = mean(values, 0.9), exceedance(values, np.array([1.0]), 0.9)
     assert np.mean((average.interval_low <= 0) & (average.interval_high >= 0)) == pytest.approx(0.9, abs=0.02)
@@ -95,18 +91,18 @@ def test_intervals_of_mean_and_exceedance_hold_the_truth_as_often_as_they_say() 
     np.testing.assert_allclose([extremes.interval_low[0, 0], extremes.interval_high[0, 1]], [tail, 1.0 - tail])
 
 
-def test_too_few_samples_leave_an_interval_open() -> None:
+def test_too_few_samples_leave_an_interval_open():
     found = quantile(known(np.arange(10.0)), 0.99, 0.95)
     assert (found.lowest, found.interval_high) == (9.0, np.inf)
 
 
-def test_numerical_error_moves_all_values_together() -> None:
+def test_numerical_error_moves_all_values_together():
     values = known(np.arange(1.0, 102.0), error=0.1)
     for found, exact in ((quantile(values, 0.5, 0.95), 51.0), (mean(values, 0.95), 51.0)):
         np.testing.assert_allclose([found.error_low, found.lowest, found.error_high], [0.9 * exact, exact, 1.1 * exact])
 
 
-def test_bands_hold_what_the_missing_samples_would_have_said() -> None:
+def test_bands_hold_what_the_missing_samples_would_have_said():
     full = archard(unit_design("sobol", 1, 128, 3))
     rng = np.random.default_rng(1)
     for _ in range(20):
@@ -125,7 +121,7 @@ def test_bands_hold_what_the_missing_samples_would_have_said() -> None:
 @pytest.mark.parametrize(
     ("model", "first", "total"), [(archard, FIRST, TOTAL), (ishigami, *ishigami_indices())], ids=["archard", "ishigami"]
 )
-def test_indices_of_plain_samples(model: Callable[[Array], Array], first: Array, total: Array) -> None:
+def test_indices_of_plain_samples(model, first, total):
     design = unit_design("sobol", 2, 256, 3)
     found = plain_indices(design, known(model(design)), 0.95, SOBOL[: design.shape[1]])
     check_indices(found, first, total, 0.06)
@@ -136,13 +132,13 @@ def test_indices_of_plain_samples(model: Callable[[Array], Array], first: Array,
 @pytest.mark.parametrize(
     ("model", "first", "total"), [(archard, FIRST, TOTAL), (ishigami, *ishigami_indices())], ids=["archard", "ishigami"]
 )
-def test_indices_of_a_saltelli_design(model: Callable[[Array], Array], first: Array, total: Array) -> None:
+def test_indices_of_a_saltelli_design(model, first, total):
     design = unit_design("saltelli", 2, 1024, 3)
     found = saltelli_indices(SaltelliLayout(3), design, known(model(design)), 0.95)
     check_indices(found, first, total, 0.06)
 
 
-def check_indices(found: Indices, first: Array, total: Array, tolerance: float) -> None:
+def check_indices(found, first, total, tolerance):
     for band, exact in ((found.first, first), (found.total, total)):
         np.testing.assert_allclose(band.lowest, exact, atol=tolerance)
         np.testing.assert_array_equal(band.lowest, band.highest)
@@ -150,7 +146,7 @@ def check_indices(found: Indices, first: Array, total: Array, tolerance: float) 
         assert (band.interval_high >= exact - 0.01).all()
 
 
-def test_indices_of_one_input_and_of_several_points() -> None:
+def test_indices_of_one_input_and_of_several_points():
     """One input decides all of it; a point at which nothing varies has no index."""
     design = unit_design("sobol", 1, 64, 1)
     points = known(np.stack([np.ones(64), design[:, 0]]))
@@ -166,7 +162,7 @@ def test_indices_of_one_input_and_of_several_points() -> None:
         assert found.total.lowest[1, 0] == pytest.approx(1.0, abs=0.08)
 
 
-def test_an_input_without_width_decides_nothing() -> None:
+def test_an_input_without_width_decides_nothing():
     design = unit_design("random", 1, 128, 3)
     design[:, 1] = 0.5
     found = plain_indices(design, known(archard(design)), 0.95, ~SOBOL[: design.shape[1]])
@@ -174,7 +170,7 @@ def test_an_input_without_width_decides_nothing() -> None:
     assert found.first.lowest[0] > 0.8
 
 
-def test_bands_of_indices_hold_the_full_estimate_and_the_error_widens_them() -> None:
+def test_bands_of_indices_hold_the_full_estimate_and_the_error_widens_them():
     design = unit_design("sobol", 1, 128, 3)
     full = archard(design)
     whole = plain_indices(design, known(full, error=0.05), 0.95, SOBOL[: design.shape[1]])
@@ -185,7 +181,7 @@ def test_bands_of_indices_hold_the_full_estimate_and_the_error_widens_them() -> 
     assert (whole.first.error_high > whole.first.highest).all()
 
 
-def test_few_samples_say_no_index() -> None:
+def test_few_samples_say_no_index():
     design = unit_design("random", 1, 5, 2)
     assert np.isnan(plain_indices(design, known(design[:, 0]), 0.95, ~SOBOL[: design.shape[1]]).total.highest).all()
 
@@ -194,13 +190,13 @@ def test_few_samples_say_no_index() -> None:
 
 
 @pytest.mark.parametrize("name", ["normal", "lognormal", "uniform"])
-def test_one_hill_is_not_told_as_two(name: str) -> None:
+def test_one_hill_is_not_told_as_two(name):
     rng = np.random.default_rng(1)
     drawn = {"normal": rng.normal, "lognormal": rng.lognormal, "uniform": rng.uniform}[name](size=(1000, 128))
     assert sum(two_groups(known(each)) is not None for each in drawn) < 10
 
 
-def test_the_jump_of_the_dovetail_is_found() -> None:
+def test_the_jump_of_the_dovetail_is_found():
     """211.5 Hz, excitation 0.5 N +- 1 %: volumes of the study, mm3, with a jump between 0.495 and 0.4975 N."""
     force = 0.5 + 0.005 * ndtri(unit_design("sobol", 1, 128, 1)[:, 0])
     below = np.interp(force, [0.49, 0.495], [1.542, 1.621])
@@ -213,14 +209,14 @@ def test_the_jump_of_the_dovetail_is_found() -> None:
     assert two_groups(known(volume, error=0.2)) is None  # the gap is not longer than the errors beside it
 
 
-def test_samples_without_a_value_are_placed_where_their_bounds_say() -> None:
+def test_samples_without_a_value_are_placed_where_their_bounds_say():
     values = np.r_[np.linspace(1.5, 1.6, 60), np.linspace(2.2, 2.3, 60)]
     groups = two_groups(without(values, np.array([3, 100]), np.where(np.arange(120) == 100, 2.0, 1.0)))
     assert groups is not None
     assert (groups.n_lower, groups.n_upper) == (59, 60)
 
 
-def test_the_density_has_both_peaks_and_the_weight_of_one() -> None:
+def test_the_density_has_both_peaks_and_the_weight_of_one():
     rng = np.random.default_rng(1)
     values = known(np.r_[rng.normal(1.55, 0.03, 40), rng.normal(2.25, 0.01, 88)])
     grid = np.linspace(1.3, 2.5, 1201)
@@ -230,7 +226,7 @@ def test_the_density_has_both_peaks_and_the_weight_of_one() -> None:
     assert grid[np.argmax(found)] == pytest.approx(2.25, abs=0.01)
 
 
-def test_a_sample_that_may_lie_on_either_side_is_in_no_group() -> None:
+def test_a_sample_that_may_lie_on_either_side_is_in_no_group():
     values = known(np.r_[np.linspace(1.5, 1.6, 20), 1.9, np.linspace(2.2, 2.3, 20)])
     assert two_groups(values) is not None
     error = np.where(np.arange(41) == 20, 0.41, 0.01)  # of a range of 0.8
@@ -243,7 +239,7 @@ def test_a_sample_that_may_lie_on_either_side_is_in_no_group() -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_pair_whose_depth_separates_both_groups_decides(sign: float) -> None:
+def test_the_pair_whose_depth_separates_both_groups_decides(sign):
     rng = np.random.default_rng(1)
     values = known(np.r_[rng.normal(1.55, 0.03, 40), rng.normal(2.25, 0.01, 40)])
     groups = two_groups(values)

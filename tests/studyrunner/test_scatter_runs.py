@@ -1,7 +1,5 @@
 """Studies with [scatter] from the file to the result."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,22 +12,17 @@ from studyrunner.netcdf.sample_coordinates import sample_coordinates
 from studyrunner.plan.planning import build_tasks
 from studyrunner.scene import drawn_contacts
 from studyrunner.scene.drawn_contacts import contact_changes, pair_values
-from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene
+from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.statistics.study_statistics import worn_volume_statistics
 from studyrunner.study.realisation import draw_inputs, realise
-from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.test_scene_axes import CHEAP, compute, refused, same_values
 
+pytestmark = pytest.mark.usefixtures("folder")
 FRICTION = "scatter.friction_coefficient={normal={std=0.03}}"
 WEAR = "scatter.wear_coefficient={lognormal={factor=1.5}}"
-
-
-@pytest.fixture(autouse=True)
-def _in_folder(folder: Path) -> None:
-    """Results go to a folder of their own."""
 
 
 @pytest.mark.slow
@@ -42,7 +35,7 @@ def _in_folder(folder: Path) -> None:
         ("friction_coefficient={normal={std=0}, of='each pair'}", "wear_coefficient={lognormal={factor=1}}"),
     ],
 )
-def test_a_scatter_without_width_is_the_point(widths: tuple[str, str]) -> None:
+def test_a_scatter_without_width_is_the_point(widths):
     asked = "outputs.variables=['default']"
     samples = compute("sdof_slider", "w.nc", *CHEAP, asked, "scatter.samples=2", *(f"scatter.{one}" for one in widths))
     names = ", ".join(f"'{name}'" for name in samples.data_vars)
@@ -52,20 +45,20 @@ def test_a_scatter_without_width_is_the_point(widths: tuple[str, str]) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", ["frequency={normal={std=0.05}}", "stiffness={normal={std=100}}"])
-def test_more_samples_go_on_from_those_there_are(more: str, capsys: pytest.CaptureFixture[str]) -> None:
-    scatter = (FRICTION, f"scatter.{more}")
-    few = compute("sdof_slider", "o.nc", *CHEAP, "scatter.samples=4", *scatter)
+def test_more_samples_go_on_from_those_there_are(capsys):
+    """Also where each sample has a scene of its own."""
+    scatter = (FRICTION, "scatter.stiffness={normal={std=100}}")
+    few = compute("sdof_slider", "o.nc", *CHEAP, "scatter.samples=2", *scatter)
     capsys.readouterr()
-    many = compute("sdof_slider", "o.nc", *CHEAP, "scatter.samples=8", *scatter)
-    assert "4 of 8 points are there from an earlier run" in capsys.readouterr().err
-    same_values(many.isel(sample=slice(4)), few)
-    xr.testing.assert_identical(compute("sdof_slider", "n.nc", *CHEAP, "scatter.samples=8", *scatter), many)
-    assert len(np.unique(many.worn_volume[..., -1])) == 8
+    many = compute("sdof_slider", "o.nc", *CHEAP, "scatter.samples=4", *scatter)
+    assert "2 of 4 points are there from an earlier run" in capsys.readouterr().err
+    same_values(many.isel(sample=slice(2)), few)
+    xr.testing.assert_identical(compute("sdof_slider", "n.nc", *CHEAP, "scatter.samples=4", *scatter), many)
+    assert len(np.unique(many.worn_volume[..., -1])) == 4
 
 
 @pytest.mark.slow
-def test_scatter_of_the_wear_coefficient_alone_is_one_history() -> None:
+def test_scatter_of_the_wear_coefficient_alone_is_one_history():
     given = (*CHEAP, "axes.scheme=adaptive", "scatter.samples=64", WEAR)
     study = read_study("sdof_slider", given)
     plan = build_tasks(study, 2)
@@ -84,7 +77,7 @@ def test_scatter_of_the_wear_coefficient_alone_is_one_history() -> None:
 
 
 @pytest.mark.slow
-def test_a_sample_is_the_study_of_its_drawn_values() -> None:
+def test_a_sample_is_the_study_of_its_drawn_values():
     scatter = (
         "scatter.samples=3",
         FRICTION,
@@ -106,7 +99,7 @@ def test_a_sample_is_the_study_of_its_drawn_values() -> None:
 
 
 @pytest.mark.slow
-def test_pairs_that_differ_between_samples_have_the_dimension() -> None:
+def test_pairs_that_differ_between_samples_have_the_dimension():
     """A scattered radius moves the strips; gaps are drawn around those of the scene of each sample."""
     given = ("scene.strips=10", "slow_time.cycles=0", "slow_time.outputs=1", "solver.harmonics=1")
     gap = "scatter.gap={normal={std=0}, of='each pair'}"
@@ -120,7 +113,7 @@ def test_pairs_that_differ_between_samples_have_the_dimension() -> None:
 
 
 @pytest.mark.slow
-def test_axes_and_samples_stand_side_by_side_and_the_result_is_the_study_again() -> None:
+def test_axes_and_samples_stand_side_by_side_and_the_result_is_the_study_again():
     given = (*CHEAP, "scatter.samples=2", FRICTION, WEAR, "axes.friction_coefficient=[0.4, 0.6]")
     study = read_study("sdof_slider", given)
     Path("again.toml").write_text(format_study(study), encoding="utf-8")
@@ -134,19 +127,19 @@ def test_axes_and_samples_stand_side_by_side_and_the_result_is_the_study_again()
     xr.testing.assert_identical(again.drop_attrs(), first.drop_attrs())
 
 
-def test_friction_of_samples_builds_no_scene() -> None:
+def test_friction_of_samples_builds_no_scene():
     study = read_study("dovetail", ["scatter.samples=64", FRICTION, "scatter.gap={normal={std=1e-7}, of='each pair'}"])
     assert len(find_scenes(study).studies) == 1
     study = read_study("dovetail", ["scatter.samples=4", "scatter.rotation_speed={normal={std=10}}"])
     assert len(find_scenes(study).studies) == 4
 
 
-def test_gaps_of_samples_with_scenes_of_their_own_are_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gaps_of_samples_with_scenes_of_their_own_are_drawn_once(monkeypatch):
     """Not once for each scene, which would be quadratic in the number of samples."""
     gaps = ["scatter.samples=16", "scatter.gap={normal={std=1e-7}, of='each pair'}"]
     calls: list[object] = []
 
-    def count(study: Study, facts: SceneFacts) -> dict[str, np.ndarray]:
+    def count(study, facts):
         calls.append(study)
         return pair_values(study, facts)
 
@@ -171,10 +164,7 @@ def test_gaps_of_samples_with_scenes_of_their_own_are_drawn_once(monkeypatch: py
         (["scatter.friction_coefficient=0.3"], "give a table with one distribution"),
         (["scatter.step={normal={std=0.1}}"], "scatter.step: unknown input"),
         (["scatter.threshold={normal={mean=1, std=0.1}}"], "scatter.threshold: unknown input"),
-        (
-            ["wear.law=threshold", "wear.threshold=1", "scatter.threshold={normal={std=1}}"],
-            "which threshold cannot be",
-        ),
+        (["wear.law=threshold", "wear.threshold=1", "scatter.threshold={normal={std=1}}"], "which threshold cannot be"),
         (["scatter.mass={normal={std=1}}"], "scatter.mass = -1.76"),
         (["scatter.wear_coefficient={normal={relative_std=3}}"], "which wear_coefficient cannot be"),
         (
@@ -194,9 +184,7 @@ def test_gaps_of_samples_with_scenes_of_their_own_are_drawn_once(monkeypatch: py
         (["scatter.samples=1e7", FRICTION], "scatter.samples = 10000000.0: give a whole number"),
     ],
 )
-def test_what_is_wrong_is_said_in_a_sentence(
-    overrides: list[str], expected: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_wrong_is_said_in_a_sentence(overrides, expected, capsys):
     first = ["scatter.samples=8"] if "scatter=3" not in overrides else []
     assert expected in refused("sdof_slider", ["axes.frequency=160", *first, *overrides], capsys)
 
@@ -204,7 +192,7 @@ def test_what_is_wrong_is_said_in_a_sentence(
 # --- numbers of [wear] ---
 
 
-def test_factors_of_surfaces_scatter() -> None:
+def test_factors_of_surfaces_scatter():
     factor = "scatter.surfaces.support={lognormal={factor=1.5}}"
     study = read_study("sdof_slider", [*CHEAP, "wear.surfaces={support=0.5}", "scatter.samples=8", factor])
     (drawn,) = draw_inputs(study).values()
@@ -216,7 +204,7 @@ def test_factors_of_surfaces_scatter() -> None:
 
 
 @pytest.mark.slow
-def test_a_factor_of_a_surface_is_a_factor_of_the_volume() -> None:
+def test_a_factor_of_a_surface_is_a_factor_of_the_volume():
     asked = "outputs.variables=['default']"
     asked = "outputs.variables=['worn_volume', 'wear_depth']"
     scatter = "scatter={samples = 2, surfaces = {support = {uniform = {half_width = 0.4}}}}"
@@ -236,7 +224,7 @@ SLIDING = (
 
 
 @pytest.mark.slow
-def test_quantiles_of_a_lognormal_wear_coefficient_are_lognormal() -> None:
+def test_quantiles_of_a_lognormal_wear_coefficient_are_lognormal():
     study = ("axes.scheme=adaptive", "scatter.samples=1024", WEAR)
     samples = compute("sdof_slider", "w.nc", *SLIDING, *study)
     alone = compute("sdof_slider", "a.nc", *SLIDING, "axes.scheme=adaptive")
@@ -247,7 +235,7 @@ def test_quantiles_of_a_lognormal_wear_coefficient_are_lognormal() -> None:
 
 
 @pytest.mark.slow
-def test_indices_of_saltelli_are_those_of_a_product() -> None:
+def test_indices_of_saltelli_are_those_of_a_product():
     """ln k_w and ln c normal: S_1 = (exp(s_1^2) - 1) / (exp(s_1^2 + s_2^2) - 1), S_T1 = S_1 exp(s_2^2)."""
     surface = "scatter.surfaces={support={lognormal={factor=1.3}}}"
     study = ("axes.scheme=implicit", "axes.step=2000", "scatter.method=saltelli", "scatter.samples=16", WEAR, surface)
@@ -271,7 +259,7 @@ def test_indices_of_saltelli_are_those_of_a_product() -> None:
 # --- the drawn values of pairs in the result file ---
 
 
-def test_drawn_gaps_stand_along_the_axes_along_which_pairs_differ() -> None:
+def test_drawn_gaps_stand_along_the_axes_along_which_pairs_differ():
     gap = "scatter={samples = 2, gap = {normal = {std = 1e-9}, of = 'each pair'}}"
     axes = ("axes.strips=[20, 10]", "axes.E=[1e11, 2e11]", "scene.half_width=1e-3")
     study = read_study("cylinder_on_flat", [*axes, gap])

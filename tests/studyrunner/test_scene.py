@@ -1,7 +1,5 @@
 """For how many harmonics a scene is built, and how many one can be solved with, where their number is automatic."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.model import ReducedModel, needed_nodal_diameters
+from solver.model import needed_nodal_diameters
 from studies.scene_file import write_scene
 from studyrunner.cli import main
 from studyrunner.scene.scene import (
@@ -35,7 +33,7 @@ frequency = 200.0
 """
 
 
-def holding(model: ReducedModel, n_harmonics: int) -> ReducedModel:
+def holding(model, n_harmonics):
     """The model with the nodal diameters that this number of harmonics needs, and no others."""
     needed = needed_nodal_diameters(model.nodal_diameter, model.n_sectors, n_harmonics)
     filled = next(iter(model.linear.values()))
@@ -43,25 +41,25 @@ def holding(model: ReducedModel, n_harmonics: int) -> ReducedModel:
 
 
 @pytest.mark.parametrize("n_harmonics", [1, 2, 5])
-def test_nodal_diameters_that_are_held_bound_the_harmonics(n_harmonics: int) -> None:
+def test_nodal_diameters_that_are_held_bound_the_harmonics(n_harmonics):
     wave = replace(sector(), n_sectors=47, nodal_diameter=4)
     assert largest_harmonics(holding(wave, n_harmonics)) == n_harmonics
 
 
-def test_a_wave_is_built_for_automatic_harmonics() -> None:
+def test_a_wave_is_built_for_automatic_harmonics():
     study = read_study("dovetail", WAVE)
     assert describe_scene(build_study_scene(study)).largest_harmonics == AUTOMATIC_HARMONICS_OF_A_WAVE
 
 
 @pytest.fixture(scope="module")
-def wave_scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wave_scene(tmp_path_factory):
     path = tmp_path_factory.mktemp("scene") / "wave.h5"
     write_scene(holding(build_study_scene(read_study("dovetail", WAVE)), 3), path)
     return path
 
 
 @pytest.fixture
-def wave_file(wave_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def wave_file(wave_scene, tmp_path, monkeypatch):
     """Study of a scene file with the nodal diameters of 3 harmonics."""
     monkeypatch.chdir(tmp_path)
     shutil.copy(wave_scene, tmp_path)
@@ -70,20 +68,20 @@ def wave_file(wave_scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.slow
-def test_automatic_harmonics_go_as_far_as_the_scene_file(wave_file: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_automatic_harmonics_go_as_far_as_the_scene_file(wave_file, capsys):
     assert describe_scene(build_study_scene(read_study(wave_file))).largest_harmonics == 3
     assert main([wave_file, "--plan"]) == 0
     assert "harmonics automatic (at most 3, for which the scene holds the nodal diameters)" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("override", ["solver.harmonics=4", "axes.harmonics=['auto', 4]"])
-def test_a_number_of_harmonics_needs_its_nodal_diameters(override: str, wave_file: str) -> None:
+def test_a_number_of_harmonics_needs_its_nodal_diameters(override, wave_file):
     with pytest.raises(UserError, match=r"wave\.h5: nd/12: missing: give this group, .* fewer than 4 harmonics"):
         build_study_scene(read_study(wave_file, [override]))
 
 
 @pytest.fixture
-def rough_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def rough_file(tmp_path, monkeypatch):
     """Study of a scene file with a friction coefficient for each pair."""
     monkeypatch.chdir(tmp_path)
     model = plain()
@@ -94,7 +92,7 @@ def rough_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 @pytest.mark.slow
-def test_a_scene_file_gives_each_pair_its_friction_coefficient(rough_file: str) -> None:
+def test_a_scene_file_gives_each_pair_its_friction_coefficient(rough_file):
     study = read_study(rough_file)
     assert study.friction_coefficient is None
     assert build_study_scene(study).contact.friction_coefficient.tolist() == [0.2, 0.3, 0.4]
@@ -104,7 +102,7 @@ def test_a_scene_file_gives_each_pair_its_friction_coefficient(rough_file: str) 
     assert describe_scene(again).digest == describe_scene(build_study_scene(study)).digest
 
 
-def test_other_friction_coefficients_are_another_scene(rough_file: str) -> None:
+def test_other_friction_coefficients_are_another_scene(rough_file):
     model = build_study_scene(read_study(rough_file))
     digests = {
         describe_scene(replace(model, contact=replace(model.contact, friction_coefficient=own))).digest
@@ -113,7 +111,7 @@ def test_other_friction_coefficients_are_another_scene(rough_file: str) -> None:
     assert len(digests) == 3
 
 
-def test_the_friction_coefficient_is_given_once(rough_file: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_friction_coefficient_is_given_once(rough_file, capsys):
     assert main([rough_file, "--plan", "--set", "scene.friction_coefficient=0.3"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "s.toml: scene.friction_coefficient = 0.3: remove it" in line

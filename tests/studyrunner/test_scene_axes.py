@@ -1,9 +1,6 @@
 """Axes that are keys of [scene] or [wear]: each point is the one of a study of its own, to the last bit."""
 
-from __future__ import annotations
-
 import shutil
-from collections.abc import Sequence
 from pathlib import Path
 
 import h5py
@@ -17,9 +14,11 @@ from studyrunner.plan.planning import build_tasks
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
+from tests.mpi.launching import results
 from tests.studies.fe_models.decks import SECTOR
 from tests.studyrunner.test_model_studies import STUDY as SECTOR_STUDY
 
+pytestmark = pytest.mark.usefixtures("folder")
 CHEAP = (
     *("axes.frequency=160", "axes.scheme=implicit", "axes.step=1000", "solver.harmonics=3", "solver.samples=32"),
     *("slow_time.cycles=2000", "slow_time.outputs=3"),
@@ -28,31 +27,25 @@ UNWORN = ("slow_time.cycles=0", "slow_time.outputs=1")
 FRICTIONS = (0.3, 0.4, 0.5, 0.6, 0.7)
 
 
-def arguments(study: str, output: str, *overrides: str) -> list[str]:
+def arguments(study, output, *overrides):
     return [study, "-o", output, *(part for text in overrides for part in ("--set", text))]
 
 
-def compute(study: str, output: str, *overrides: str) -> xr.Dataset:
+def compute(study, output, *overrides):
     """A result without what depends on the machine."""
     assert main(arguments(study, output, *overrides)) == 0
-    with xr.open_dataset(output) as opened:
-        return opened.load().drop_vars("run_time")
+    return results(output)
 
 
-def same_values(one: xr.Dataset, other: xr.Dataset) -> None:
+def same_values(one, other):
     """All variables, to the last bit."""
     assert set(one.data_vars) == set(other.data_vars)
     for name in one.data_vars:
         np.testing.assert_array_equal(one[name].values, other[name].values, err_msg=str(name), strict=True)
 
 
-@pytest.fixture(autouse=True)
-def _in_folder(folder: Path) -> None:
-    """Results go to a folder of their own."""
-
-
 @pytest.mark.slow
-def test_an_axis_of_five_frictions_is_five_studies() -> None:
+def test_an_axis_of_five_frictions_is_five_studies():
     exact = "outputs.variables=['default', 'wear_depth', 'exact']"
     whole = compute("sdof_slider", "whole.nc", *CHEAP, exact, f"axes.friction_coefficient={list(FRICTIONS)}")
     assert whole.worn_volume.dims[5:] == ("sweep", "friction_coefficient", "cycle")
@@ -69,7 +62,7 @@ def test_an_axis_of_five_frictions_is_five_studies() -> None:
 
 
 @pytest.mark.slow
-def test_a_key_that_changes_the_scene_is_studies_with_these_scenes() -> None:
+def test_a_key_that_changes_the_scene_is_studies_with_these_scenes():
     axes = ("axes.stiffness=[1.7e5, 1.6e5]", "axes.friction_coefficient=[0.3, 0.4]")
     study = read_study("sdof_slider", [*CHEAP, *axes])
     # friction alone builds no scene
@@ -84,7 +77,7 @@ def test_a_key_that_changes_the_scene_is_studies_with_these_scenes() -> None:
 
 
 @pytest.mark.slow
-def test_thresholds_share_start_states() -> None:
+def test_thresholds_share_start_states():
     law = ("wear.law=threshold", "axes.threshold=[0, 5, 1e9]")
     plan = build_tasks(read_study("sdof_slider", [*CHEAP, *law]), 2)
     assert len(plan.branches) == 1
@@ -98,7 +91,7 @@ def test_thresholds_share_start_states() -> None:
 
 
 @pytest.mark.slow
-def test_pairs_of_scenes_of_different_size_are_padded() -> None:
+def test_pairs_of_scenes_of_different_size_are_padded():
     whole = compute("cylinder_on_flat", "whole.nc", *UNWORN, "axes.strips=[20, 10]", "scene.half_width=1e-3")
     counts = [int(number) for number in whole.contact_exists.sum("contact")]
     assert whole.contact_exists.dims == ("strips", "contact")
@@ -114,7 +107,7 @@ def test_pairs_of_scenes_of_different_size_are_padded() -> None:
     assert rest.contact_area.isnull().all()
 
 
-def test_factors_of_a_surface_are_an_axis() -> None:
+def test_factors_of_a_surface_are_an_axis():
     factors = ("axes.surfaces={flat=[0.5, 1.0]}", "wear.surfaces={cylinder=0.5}")
     with pytest.raises(UserError, match=r"wear.surfaces.flat = 0.5: give it once, here or as axes.surfaces.flat"):
         read_study("cylinder_on_flat", ["axes.surfaces={flat=[0.5, 1.0]}"])
@@ -128,7 +121,7 @@ def test_factors_of_a_surface_are_an_axis() -> None:
 
 
 @pytest.mark.slow
-def test_natural_frequencies_stand_along_the_axes_of_their_scenes() -> None:
+def test_natural_frequencies_stand_along_the_axes_of_their_scenes():
     asked = ("outputs.variables=['natural_frequency']", "axes.frequency=0.05", "solver.harmonics=1")
     axes = ("axes.friction_coefficient=[0.1, 0.2]", "axes.stiffness_2=[0.5, 1.0]")
     whole = compute("two_masses", "whole.nc", *asked, *axes)
@@ -138,7 +131,7 @@ def test_natural_frequencies_stand_along_the_axes_of_their_scenes() -> None:
         np.testing.assert_array_equal(whole.natural_frequency.sel(stiffness_2=stiffness), alone.natural_frequency)
 
 
-def test_flags_are_an_axis() -> None:
+def test_flags_are_an_axis():
     study = read_study("dovetail", ["axes.stress_stiffening=[true, false]", "axes.mesh={start=1, stop=3, num=3}"])
     assert dict(study.dimensions)["stress_stiffening"] == (True, False)
     assert dict(study.dimensions)["mesh"] == (1, 2, 3)
@@ -146,7 +139,7 @@ def test_flags_are_an_axis() -> None:
 
 
 @pytest.mark.slow
-def test_friction_of_a_surface_of_a_deck_is_an_axis(capsys: pytest.CaptureFixture[str]) -> None:
+def test_friction_of_a_surface_of_a_deck_is_an_axis(capsys):
     shutil.copy(SECTOR, "sector.inp")
     Path("wear.toml").write_text(SECTOR_STUDY.replace("friction_coefficient = 0.1\n", ""), encoding="utf-8")
     said = refused("wear.toml", ["axes.friction_coefficient={A=[0.1, 0.2]}"], capsys)
@@ -160,7 +153,7 @@ def test_friction_of_a_surface_of_a_deck_is_an_axis(capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.slow
-def test_effective_study_and_result_are_the_study_again() -> None:
+def test_effective_study_and_result_are_the_study_again():
     axes = ("axes.stiffness=[1.7e5, 1.6e5]", "axes.friction_coefficient=[0.3, 0.4]", "wear.law=threshold")
     given = (*CHEAP, *axes, "axes.threshold=[0, 5]")
     study = read_study("sdof_slider", given)
@@ -173,7 +166,7 @@ def test_effective_study_and_result_are_the_study_again() -> None:
     xr.testing.assert_identical(compute("first.nc", "second.nc").drop_attrs(), first.drop_attrs())
 
 
-def test_width_that_each_scene_chooses_is_chosen_again() -> None:
+def test_width_that_each_scene_chooses_is_chosen_again():
     text = '[study]\nname = "s"\n[scene]\nmodel = "cylinder_on_flat"\nstroke = 1e-5\n[axes]\nfrequency = 20.0\n'
     Path("s.toml").write_text(f"{text}wear_coefficient = 1e-12\nP = [1e5, 2e5]\n", encoding="utf-8")
     study = read_study("s.toml")
@@ -187,7 +180,7 @@ def test_width_that_each_scene_chooses_is_chosen_again() -> None:
 
 
 @pytest.mark.slow
-def test_results_with_an_axis_of_the_scene_are_joined() -> None:
+def test_results_with_an_axis_of_the_scene_are_joined():
     low = compute("sdof_slider", "low.nc", *CHEAP, "axes.friction_coefficient=[0.3]")
     high = compute("sdof_slider", "high.nc", *CHEAP, "axes.friction_coefficient=[0.4, 0.5]")
     whole = compute("sdof_slider", "whole.nc", *CHEAP, "axes.friction_coefficient=[0.3, 0.4, 0.5]")
@@ -196,7 +189,7 @@ def test_results_with_an_axis_of_the_scene_are_joined() -> None:
         np.testing.assert_array_equal(joined[name], whole[name])
 
 
-def test_one_scene_of_several_is_neither_written_nor_kept(capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_scene_of_several_is_neither_written_nor_kept(capsys):
     axis = ("--set", "axes.stiffness=[1.6e5, 1.7e5]")
     assert main(["sdof_slider", *axis, "--write-scene", "s.h5"]) == 2
     assert "axes.stiffness: give one value: a scene file holds one scene" in capsys.readouterr().err
@@ -209,7 +202,7 @@ def test_one_scene_of_several_is_neither_written_nor_kept(capsys: pytest.Capture
 # --- what is wrong ---
 
 
-def refused(study: str, overrides: Sequence[str], capsys: pytest.CaptureFixture[str]) -> str:
+def refused(study, overrides, capsys):
     command = [study, "--plan", *(part for text in overrides for part in ("--set", text))]
     assert main(command) == 2
     said = capsys.readouterr().err.splitlines()
@@ -252,19 +245,17 @@ def refused(study: str, overrides: Sequence[str], capsys: pytest.CaptureFixture[
         (["axes.sample=[1, 2]"], "unknown key, give samples"),
     ],
 )
-def test_what_is_wrong_with_an_axis_is_said_in_a_sentence(
-    overrides: list[str], expected: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_wrong_with_an_axis_is_said_in_a_sentence(overrides, expected, capsys):
     assert expected in refused("sdof_slider", ["axes.scheme=adaptive", *overrides], capsys)
 
 
-def test_two_dimensions_of_one_name_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_dimensions_of_one_name_are_refused(capsys):
     asked = ["axes.nodal_diameter=[0, 3]", "outputs.variables=['natural_frequency']"]
     assert "outputs.variables" in (said := refused("dovetail", asked, capsys))
     assert "it has a dimension nodal_diameter of its own" in said
 
 
-def test_friction_of_a_scene_file_with_its_own_is_refused_by_its_key(capsys: pytest.CaptureFixture[str]) -> None:
+def test_friction_of_a_scene_file_with_its_own_is_refused_by_its_key(capsys):
     assert main(["sdof_slider", "--write-scene", "s.h5"]) == 0
     capsys.readouterr()
     with h5py.File("s.h5", "r+") as file:

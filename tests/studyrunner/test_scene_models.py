@@ -1,7 +1,5 @@
 """Models of several scenes: which rank is sent one, in shared memory or by itself, and how long they are kept."""
 
-from __future__ import annotations
-
 import pytest
 
 from solver.model import ReducedModel
@@ -19,24 +17,24 @@ STIFFNESSES = (1.6e5, 1.7e5, 1.8e5)
 class Sent:
     """What ranks 0 and 1, which share memory, and rank 2 get with tasks of three scenes."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         study = read_study("sdof_slider", [f"axes.stiffness={list(STIFFNESSES)}"])
         self.branches = {branch.joint.scene: branch for branch in build_tasks(study, 2).branches}
         self.models = [build_scene("sdof_slider", stiffness=stiffness) for stiffness in STIFFNESSES]
         self.read: list[int] = []
         self._handed = SceneModels(self._read, {0, 1})
 
-    def _read(self, scene: int) -> ReducedModel:
+    def _read(self, scene):
         self.read.append(scene)
         return self.models[scene]
 
-    def __call__(self, rank: int, scene: int) -> object:
+    def __call__(self, rank, scene):
         task = self._handed.with_model(rank, self.branches[scene])
         assert isinstance(task, BranchTask)
         return task.models[0] if task.models else None
 
 
-def test_ranks_that_share_memory_get_one_copy_and_others_their_own() -> None:
+def test_ranks_that_share_memory_get_one_copy_and_others_their_own():
     sent = Sent()
     first, second = sent(0, 1), sent(1, 1)
     assert isinstance(first, Address)
@@ -50,7 +48,7 @@ def test_ranks_that_share_memory_get_one_copy_and_others_their_own() -> None:
     assert sent(2, 1) is None
 
 
-def test_a_copy_is_closed_once_no_rank_of_the_machine_holds_it() -> None:
+def test_a_copy_is_closed_once_no_rank_of_the_machine_holds_it():
     sent = Sent()
     address = sent(0, 0)
     assert isinstance(address, Address)

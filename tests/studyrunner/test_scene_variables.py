@@ -1,10 +1,7 @@
 """What the result file holds of the scene itself."""
 
-from __future__ import annotations
-
 import contextlib
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,9 +31,7 @@ COARSE = ("scene.mesh=1", "axes.frequency=212", "slow_time.cycles=0", "axes.sche
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bytes_a_slab", [3000.0])
-def test_the_file_is_the_one_of_the_plain_twin(
-    bytes_a_slab: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_file_is_the_one_of_the_plain_twin(bytes_a_slab, tmp_path, monkeypatch):
     monkeypatch.setattr(gather, "_BYTES_A_SLAB", bytes_a_slab)
     study = read_study("sdof_slider", GRID)
     of_scene = exact_answers(study)
@@ -57,7 +52,7 @@ def test_the_file_is_the_one_of_the_plain_twin(
         xr.testing.assert_identical(opened, twin)
 
 
-def test_exact_answers_stand_at_their_points() -> None:
+def test_exact_answers_stand_at_their_points():
     study = read_study("sdof_slider", GRID)
     found = {scene.name: scene for scene in exact_answers(study)}
     assert set(found) == {"exact_worn_volume", "exact_response_amplitude"}
@@ -83,7 +78,7 @@ def test_exact_answers_stand_at_their_points() -> None:
 
 
 @pytest.mark.slow
-def test_mesh_and_natural_frequencies_of_the_sector(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mesh_and_natural_frequencies_of_the_sector(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     values = np.arange(24 * 6.0).reshape(24, 6)
     monkeypatch.setattr(scene_variables, "scene_frequencies", lambda *_: NaturalFrequencies(tuple(range(24)), values))
@@ -101,13 +96,11 @@ def test_mesh_and_natural_frequencies_of_the_sector(tmp_path: Path, monkeypatch:
         assert result.mesh_part.values.tolist() == list(mesh.parts)
 
 
-def test_a_sector_that_spins_too_fast_is_bad_input(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sector_that_spins_too_fast_is_bad_input(tmp_path, monkeypatch, capsys):
     """The nodal diameters of the study are fine, another one is not: known before anything is computed."""
     monkeypatch.chdir(tmp_path)
 
-    def unstable(*_: object) -> None:
+    def unstable(*_):
         raise GluedStructureError(unstable=True)
 
     monkeypatch.setattr(Reduction, "frequencies", unstable)

@@ -1,12 +1,9 @@
 """Files that lie beside a study and bear the names of modules: no process of the commands ever runs one."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -35,7 +32,7 @@ PLUGIN = "[xarray.backends]\nforeign = foreign_plugin:Backend\n[pydantic]\nforei
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory):
     """A folder with a scene and a result."""
     folder = tmp_path_factory.mktemp("made")
     scene, result = folder / "scene.h5", folder / "result.nc"
@@ -47,7 +44,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def hostile(made: Path, tmp_path: Path) -> Path:
+def hostile(made, tmp_path):
     """A folder with a study, its scene, its result, and everything that could be mistaken for a module."""
     folder = tmp_path / "hostile"
     shutil.copytree(made, folder)
@@ -66,21 +63,21 @@ def hostile(made: Path, tmp_path: Path) -> Path:
     return folder
 
 
-def run(command: Sequence[str], folder: Path, python_path: str) -> subprocess.CompletedProcess[str]:
+def run(command, folder, python_path):
     environment = {**os.environ, "PYTHONPATH": python_path, "OPENBLAS_NUM_THREADS": "1"}
     return subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False
     )
 
 
-def assert_nothing_taken(folder: Path, done: subprocess.CompletedProcess[str]) -> None:
+def assert_nothing_taken(folder, done):
     taken = folder.parent / "taken"
     assert not taken.exists(), taken.read_text(encoding="utf-8")
     assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.slow
-def test_the_process_that_reads(hostile: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_process_that_reads(hostile, monkeypatch):
     # as in a notebook, or a script, that stands in the folder
     monkeypatch.chdir(hostile)
     monkeypatch.syspath_prepend("")
@@ -97,12 +94,12 @@ REPORT = [sys.executable, "-m", "studyrunner.report.cli"]
 
 
 @pytest.mark.slow
-def test_run_study(hostile: Path) -> None:
+def test_run_study(hostile):
     assert_nothing_taken(hostile, run([*MODULE, "result.nc", "-o", "again.nc"], hostile, str(ROOT)))
 
 
 @pytest.mark.slow
-def test_study_report(hostile: Path) -> None:
+def test_study_report(hostile):
     assert_nothing_taken(hostile, run([*REPORT, "result.nc"], hostile, str(ROOT)))
 
 
@@ -110,7 +107,7 @@ def test_study_report(hostile: Path) -> None:
 @pytest.mark.parametrize(
     ("module", "python_path"), [("studyrunner.cli", f".:{ROOT}"), ("studyrunner.report.cli", f":{ROOT}")]
 )
-def test_commands_as_they_are_installed(module: str, python_path: str, hostile: Path, tmp_path: Path) -> None:
+def test_commands_as_they_are_installed(module, python_path, hostile, tmp_path):
     """A PYTHONPATH with an empty entry, as scripts that extend it leave it, means the current folder."""
     script = tmp_path / "command"
     script.write_text(f"import sys\nfrom {module} import main\nsys.exit(main())\n", encoding="utf-8")
@@ -119,20 +116,20 @@ def test_commands_as_they_are_installed(module: str, python_path: str, hostile: 
 
 
 @pytest.mark.slow
-def test_under_mpiexec(hostile: Path) -> None:
+def test_under_mpiexec(hostile):
     done = run([*launcher(2), *MODULE, "study.toml", "-o", "out.nc"], hostile, str(ROOT))
     assert_nothing_taken(hostile, done)
     assert (hostile / "out.nc").exists()
 
 
 @pytest.mark.slow
-def test_a_cache_of_compiled_code_is_no_data_either(hostile: Path) -> None:
+def test_a_cache_of_compiled_code_is_no_data_either(hostile):
     (hostile / ".numba_config.yaml").write_text(f"cache_dir: {hostile / 'cache'}\n", encoding="utf-8")
     assert_nothing_taken(hostile, run([*MODULE, "study.toml"], hostile, str(ROOT)))
     assert not (hostile / "cache").exists()
 
 
-def test_folders_of_python_path_are_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_folders_of_python_path_are_searched(tmp_path, monkeypatch):
     """Only the current folder is left out, and not where the project lies in it."""
     from studies.guards.search_path import search_path
 

@@ -1,7 +1,5 @@
 """Arrays that several processes share, and how an object gets to all ranks of several machines."""
 
-from __future__ import annotations
-
 import pickle
 import queue
 import signal
@@ -16,7 +14,7 @@ import pytest
 from studies import build_scene
 from studyrunner.mpi import broadcast
 from studyrunner.mpi.broadcast import Broadcast, LostError, take_over
-from studyrunner.mpi.shared_memory import Address, SharedObject, open_shared
+from studyrunner.mpi.shared_memory import SharedObject, open_shared
 from studyrunner.mpi.version_check import Machine
 from studyrunner.scene.scene import describe_scene
 from tests.mpi.launching import processes_may_share
@@ -47,7 +45,7 @@ time.sleep(600)
 """
 
 
-def test_a_scene_is_the_same_with_its_arrays_in_shared_memory() -> None:
+def test_a_scene_is_the_same_with_its_arrays_in_shared_memory():
     model = build_scene("dovetail_sector", mesh=1, nodal_diameter=3, n_harmonics=3)
     shared = SharedObject(model)
     other = open_shared(shared.address)
@@ -59,7 +57,7 @@ def test_a_scene_is_the_same_with_its_arrays_in_shared_memory() -> None:
     shared.close()
 
 
-def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept() -> None:
+def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept():
     things = {"c": np.arange(6.0).reshape(2, 3), "f": np.asfortranarray(np.eye(3)), "none": np.zeros((0, 2)), "n": None}
     things["part"] = np.arange(10.0)[::2]
     shared = SharedObject(things)
@@ -73,7 +71,7 @@ def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept() -> Non
     shared.close()
 
 
-def test_the_memory_stays_with_those_who_have_it_when_its_owner_is_killed() -> None:
+def test_the_memory_stays_with_those_who_have_it_when_its_owner_is_killed():
     if not processes_may_share():
         pytest.skip("this system keeps the memory of processes apart")
     with subprocess.Popen([sys.executable, "-c", OWNER.format(root=str(ROOT))], stdout=subprocess.PIPE) as owner:
@@ -98,37 +96,35 @@ def test_the_memory_stays_with_those_who_have_it_when_its_owner_is_killed() -> N
 class Threads:
     """Ranks that are threads of one process. lost: known to all at once."""
 
-    def __init__(self, rank: int, boxes: dict[tuple[int, int], queue.SimpleQueue[bytes]], lost: set[int]) -> None:
+    def __init__(self, rank, boxes, lost):
         self.rank, self._boxes, self._lost = rank, boxes, lost
         self.size = 1 + max(rank for rank, _ in boxes)
 
     @property
-    def lost(self) -> frozenset[int]:
+    def lost(self):
         return frozenset(self._lost)
 
-    def send(self, message: object, rank: int) -> None:
+    def send(self, message, rank):
         self._boxes[self.rank, rank].put(pickle.dumps(message))
 
-    def flush(self) -> None:
+    def flush(self):
         pass
 
-    def receive(self, rank: int | None = None) -> tuple[int, object] | None:
+    def receive(self, rank=None):
         for source in range(self.size) if rank is None else [rank]:
             box = self._boxes[source, self.rank]
             if not box.empty():
                 return source, pickle.loads(box.get())
         return None
 
-    def close(self) -> None:
+    def close(self):
         pass
 
-    def abort(self, status: int) -> None:
+    def abort(self, status):
         raise AssertionError(status)
 
 
-def hand_to_all(
-    monkeypatch: pytest.MonkeyPatch, hosts: str, refused: str = "", lost: frozenset[int] = frozenset()
-) -> tuple[dict[int, object], int]:
+def hand_to_all(monkeypatch, hosts, refused="", lost=frozenset()):
     """What each rank gets, one letter a rank for the machine it is on; how often the memory of others was mapped."""
     size = len(hosts)
     gone = set(lost)
@@ -139,7 +135,7 @@ def hand_to_all(
     got: dict[int, object] = {}
     mapped: list[str] = []
 
-    def open_here(address: Address) -> object:
+    def open_here(address):
         if threading.current_thread().name in refused:
             raise PermissionError
         mapped.append(threading.current_thread().name)
@@ -147,7 +143,7 @@ def hand_to_all(
 
     monkeypatch.setattr(broadcast, "open_shared", open_here)
 
-    def follow(rank: int) -> None:
+    def follow(rank):
         ranks = Threads(rank, boxes, gone)
         try:
             got[rank] = take_over(ranks)
@@ -179,9 +175,7 @@ def hand_to_all(
     ("hosts", "refused", "n_mapped"),
     [("a", "", 0), ("aaa", "", 2), ("abc", "", 0), ("abbabb", "", 4), ("abbabb", "25", 2)],
 )
-def test_every_rank_gets_it_and_those_of_a_machine_share(
-    monkeypatch: pytest.MonkeyPatch, hosts: str, refused: str, n_mapped: int
-) -> None:
+def test_every_rank_gets_it_and_those_of_a_machine_share(monkeypatch, hosts, refused, n_mapped):
     got, mapped = hand_to_all(monkeypatch, hosts, refused)
     assert mapped == n_mapped
     assert sorted(got) == list(range(len(hosts)))
@@ -190,13 +184,13 @@ def test_every_rank_gets_it_and_those_of_a_machine_share(
         np.testing.assert_array_equal(value["a"], np.arange(5.0))
 
 
-def test_a_lost_rank_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lost_rank_is_not_waited_for(monkeypatch):
     got, mapped = hand_to_all(monkeypatch, "aaabbb", lost=frozenset({1, 3}))
     assert mapped == 2
     assert sorted(got) == [0, 2, 4, 5]
 
 
-def test_a_rank_whose_leader_is_lost_on_the_way_says_so() -> None:
+def test_a_rank_whose_leader_is_lost_on_the_way_says_so():
     boxes: dict[tuple[int, int], queue.SimpleQueue[bytes]] = {
         (a, b): queue.SimpleQueue() for a in range(3) for b in range(3)
     }

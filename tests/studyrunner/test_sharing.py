@@ -1,7 +1,5 @@
 """Which points share a march, and what each of them is given of it."""
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from dataclasses import replace
@@ -20,7 +18,6 @@ from solver.settings import Resolution
 from studyrunner.history_result import build_result
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.sharing import ScaledHistory, describe_left_out, march_counts, share_histories
-from studyrunner.plan.tasks import MarchTask
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import totals_of
@@ -31,21 +28,21 @@ STEPS = ["100", "150", "200", "300", "700", "1000", "2e4", "3e4"]
 SCHEMES = ["implicit", "explicit", "adaptive"]
 
 
-def study_of(*overrides: str) -> Study:
+def study_of(*overrides):
     return read_study("sdof_slider", ["axes.frequency=150", "slow_time.cycles=20000", *overrides])
 
 
-def study_with(wears: list[str], steps: list[str], schemes: list[str], *overrides: str) -> Study:
+def study_with(wears, steps, schemes, *overrides):
     axes = {"wear_coefficient": wears, "step": steps}
     texts = [f"axes.{name}=[{', '.join(values)}]" for name, values in axes.items()]
     return study_of(*texts, f"axes.scheme={schemes}", *overrides)
 
 
-def some(values: list[str]) -> st.SearchStrategy[list[str]]:
+def some(values):
     return st.lists(st.sampled_from(values), min_size=1, unique=True)
 
 
-def alike(study: Study, wears: list[Fraction], steps: list[Fraction], one: tuple, other: tuple) -> bool:
+def alike(study, wears, steps, one, other):
     """Whether two choices have the same history by one march, in exact arithmetic."""
     (wear, step, scheme), (wear2, step2, scheme2) = one, other
     if wears[wear] == 0 or wears[wear2] == 0:
@@ -65,9 +62,7 @@ def alike(study: Study, wears: list[Fraction], steps: list[Fraction], one: tuple
 
 
 @given(some(WEARS), some(STEPS), some(SCHEMES), st.booleans())
-def test_histories_are_shared_where_they_are_the_same(
-    wears: list[str], steps: list[str], schemes: list[str], by_depth: bool
-) -> None:
+def test_histories_are_shared_where_they_are_the_same(wears, steps, schemes, by_depth):
     overrides = ["slow_time.largest_depth=1e-6"] if by_depth else []
     study = study_with(wears, steps, schemes, *overrides)
     sharing = share_histories(study)
@@ -101,7 +96,7 @@ def test_histories_are_shared_where_they_are_the_same(
         (("axes.wear_coefficient=[1e-12, 2e-12]", "axes.step=[100, 201]"), {}),
     ],
 )
-def test_what_is_left_out_has_a_reason(overrides: tuple[str, ...], expected: dict[str, int]) -> None:
+def test_what_is_left_out_has_a_reason(overrides, expected):
     study = study_of("axes.frequency=[150, 160]", "axes.scheme=['implicit', 'explicit']", *overrides)
     found = {item.reason: item.n_points for item in build_tasks(study, 2).left_out}
     assert len(found) == len(expected)
@@ -111,9 +106,7 @@ def test_what_is_left_out_has_a_reason(overrides: tuple[str, ...], expected: dic
 
 
 @given(st.integers(1, 1000), st.integers(1, 1000), st.floats(1e-3, 1e6), st.lists(st.integers(1, 10**6), min_size=1))
-def test_counts_at_the_ends_of_steps_belong_to_the_step_that_ends_there(
-    faster: int, slower: int, step: float, whole: list[int]
-) -> None:
+def test_counts_at_the_ends_of_steps_belong_to_the_step_that_ends_there(faster, slower, step, whole):
     """For the march, whose counts are sums of its steps, and for its histories, whose cycle counts have round-off."""
     own = ScaledHistory(1e-12 * faster, step, ((0,),))
     other = ScaledHistory(1e-12 * slower, step * faster / slower, ((1,),))
@@ -136,7 +129,7 @@ def test_counts_at_the_ends_of_steps_belong_to_the_step_that_ends_there(
         (("axes.harmonics=[1, 'auto', 5]",), 5),
     ],
 )
-def test_rtol_shares_branches_where_nothing_uses_it(overrides: tuple[str, ...], n_branches: int) -> None:
+def test_rtol_shares_branches_where_nothing_uses_it(overrides, n_branches):
     fixed = ("axes.rtol=[1e-3, 1e-2, 1e-1]", "axes.frequency=[150, 160]", "solver.harmonics=3", "solver.samples=64")
     plan = build_tasks(study_of(*fixed, "axes.wear_coefficient=[0, 1e-12, 1e-11]", *overrides), 2)
     assert len(plan.branches) == n_branches
@@ -147,7 +140,7 @@ def test_rtol_shares_branches_where_nothing_uses_it(overrides: tuple[str, ...], 
     assert any(item.reason.startswith("rtol") for item in plan.left_out) == (n_branches in (1, 5))
 
 
-def test_a_law_whose_rate_is_not_proportional_shares_no_other_wear_coefficient(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_law_whose_rate_is_not_proportional_shares_no_other_wear_coefficient(monkeypatch):
     study = study_with(["0", "1e-12", "2e-12"], ["100", "200"], SCHEMES)
     assert len(share_histories(study).marches) < 15
     monkeypatch.setattr(Study, "wear_law", WearLaw("other", proportional=False))
@@ -168,7 +161,7 @@ ADAPTIVE = ("axes.wear_coefficient=[2e-12, 1e-11, 4e-12]", "axes.scheme=adaptive
 COUNTS = [0.0, 2.0, 4.0, 5.0, 10.0]
 
 
-def shared_task(*overrides: str) -> MarchTask:
+def shared_task(*overrides):
     """A march of three histories at cycles 0 and 10, which are read at 0, 10; 0, 4; 0, 2 cycles of the first."""
     study = study_of(*ADAPTIVE, "slow_time.cycles=10", "slow_time.outputs=2", *overrides)
     ((task,),) = build_tasks(study, 2).marches
@@ -176,7 +169,7 @@ def shared_task(*overrides: str) -> MarchTask:
     return replace(task, start=pack(start))
 
 
-def test_each_history_has_its_own_counts_and_rates_back() -> None:
+def test_each_history_has_its_own_counts_and_rates_back():
     task = shared_task()
     found = [build_result(task, history(COUNTS), place) for place in range(3)]
     assert [result.place for result in found] == [0, 1, 2]
@@ -200,9 +193,7 @@ def test_each_history_has_its_own_counts_and_rates_back() -> None:
         (1.5, [4, 4, 4], [1.5, 3.75, 7.5]),
     ],
 )
-def test_histories_of_a_march_that_ended_early_are_results_all_the_same(
-    last: float, outcomes: list[int], lasts: list[float]
-) -> None:
+def test_histories_of_a_march_that_ended_early_are_results_all_the_same(last, outcomes, lasts):
     """Cycles 0 and 10 of the histories are 0, 10; 0, 4; 0, 2 cycles of the march."""
     ended = replace(history(COUNTS, Outcome.MARCH_FAILED), last_cycle=last, message="at cycle 9")
     found = [build_result(shared_task(), ended, place) for place in range(3)]
@@ -229,7 +220,7 @@ def test_histories_of_a_march_that_ended_early_are_results_all_the_same(
         (np.inf, Outcome.MARCH_FAILED, [4, 0, 0]),
     ],
 )
-def test_a_scaled_history_is_inaccurate_by_its_own_counts(first: float, ended: Outcome, expected: list[int]) -> None:
+def test_a_scaled_history_is_inaccurate_by_its_own_counts(first, ended, expected):
     found = replace(history(COUNTS, ended), inaccurate_from=first, inaccurate_in="wear rate", inaccurate_error=0.04)
     results = [build_result(shared_task(), replace(found, message="of it"), place) for place in range(3)]
     assert [result.outcome for result in results] == expected

@@ -1,9 +1,5 @@
 """What is left out because it is the same is the same: a study with shortcuts against one without."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -27,7 +23,7 @@ EFFORT = ("newton_iterations", "run_time")
 pytestmark = pytest.mark.slow
 
 
-def run(folder: Path, *overrides: str) -> xr.Dataset:
+def run(folder, *overrides):
     path = folder / "out.nc"
     changes = [word for change in (*STUDY, *overrides) for word in ("--set", change)]
     assert main(["sdof_slider", *changes, "-o", str(path)]) == 0
@@ -35,12 +31,12 @@ def run(folder: Path, *overrides: str) -> xr.Dataset:
         return result.load()
 
 
-def both_ways(folder: Path, *overrides: str) -> tuple[xr.Dataset, xr.Dataset]:
+def both_ways(folder, *overrides):
     """The results with and without shortcuts."""
     return run(folder, *overrides), run(folder, *overrides, "solver.shortcuts=false")
 
 
-def assert_same(name: str, short: xr.Dataset, long: xr.Dataset) -> None:
+def assert_same(name, short, long):
     """To round-off; violations are relative themselves, and what is left of them where they vanish is round-off."""
     if short[name].dtype.kind in "OU":
         assert (short[name] == long[name]).all(), name
@@ -53,7 +49,7 @@ def assert_same(name: str, short: xr.Dataset, long: xr.Dataset) -> None:
 COMPARED = [name for name in (*USUAL, *KEPT) if name not in EFFORT]
 
 
-def test_what_is_shared_is_the_same_and_no_row_of_zeros(tmp_path: Path) -> None:
+def test_what_is_shared_is_the_same_and_no_row_of_zeros(tmp_path):
     results = both_ways(tmp_path)
     for name in COMPARED:
         assert_same(name, *results)
@@ -66,7 +62,7 @@ def test_what_is_shared_is_the_same_and_no_row_of_zeros(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("overrides", [BY_DEPTH, NO_CYCLES], ids=["largest depth", "no cycles"])
-def test_other_reasons(overrides: list[str], tmp_path: Path) -> None:
+def test_other_reasons(overrides, tmp_path):
     short, long = both_ways(tmp_path, *overrides, "axes.frequency=160", "axes.scheme=['explicit', 'adaptive']")
     for name in COMPARED:
         assert_same(name, short, long)

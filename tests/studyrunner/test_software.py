@@ -1,11 +1,8 @@
 """Commit and URL of the software in a result: only where they are known, and no trouble where they are not."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from importlib import metadata
-from pathlib import Path
 
 import netCDF4
 import pytest
@@ -13,18 +10,18 @@ import pytest
 from studyrunner.cli import main
 from studyrunner.netcdf import software
 from studyrunner.netcdf.software import CHANGED, commit_of, describe_software
-from tests.studyrunner.faked_runs import SMALL, Solver
+from tests.studyrunner.faked_runs import SMALL
 
 WHO = ("-c", "user.name=a", "-c", "user.email=b")
 
 
-def git(folder: Path, *arguments: str) -> str:
+def git(folder, *arguments):
     done = subprocess.run(["git", "-C", str(folder), *WHO, *arguments], capture_output=True, text=True, check=True)
     return done.stdout.strip()
 
 
 @pytest.fixture
-def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def checkout(tmp_path, monkeypatch):
     monkeypatch.setenv("GIT_CONFIG_GLOBAL", "/dev/null")
     folder = tmp_path / "checkout"
     folder.mkdir()
@@ -35,7 +32,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def test_the_commit_is_that_of_git(checkout: Path) -> None:
+def test_the_commit_is_that_of_git(checkout):
     head = git(checkout, "rev-parse", "HEAD")
     assert len(head) == 40
     assert commit_of(checkout) == head
@@ -68,9 +65,7 @@ def test_the_commit_is_that_of_git(checkout: Path) -> None:
         (json.dumps({"url": 3, "vcs_info": {"commit_id": 4}}), {}),
     ],
 )
-def test_a_package_from_a_repository_says_its_commit(
-    direct_url: str | None, expected: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_package_from_a_repository_says_its_commit(direct_url, expected, tmp_path, monkeypatch):
     about = tmp_path / "tool-1.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: tool\nVersion: 1\n", encoding="utf-8")
@@ -83,7 +78,7 @@ def test_a_package_from_a_repository_says_its_commit(
 
 
 @pytest.mark.usefixtures("reader", "folder")
-def test_it_stands_in_the_result_and_is_no_part_of_it(solver: Solver, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_stands_in_the_result_and_is_no_part_of_it(solver, monkeypatch):
     found = []
     for known in ({}, {"software_url": "https://b.example/r", "software_commit": "b" * 40}):
         monkeypatch.setattr("studyrunner.run.describe_software", lambda _, known=known: known)

@@ -2,8 +2,6 @@
 for.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import random
@@ -13,7 +11,6 @@ import subprocess
 import sys
 import threading
 import zlib
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -27,19 +24,19 @@ from studyrunner.checkpoint.store import SECONDS_A_TRANSACTION, Store
 from studyrunner.user_error import StorageError
 
 
-def key(number: int) -> str:
+def key(number):
     return f"{number:032x}"
 
 
-def kept(number: int) -> Packed:
+def kept(number):
     return Packed(f"é state {number}", (np.arange(3.0) + number, np.full((2, 2), number * 1j)))
 
 
-def put(store: Store, table: str, number: int, finished: str = "") -> None:
+def put(store, table, number, finished=""):
     store.put(table, key(number), kept(number), {}, finished)
 
 
-def fill(path: Path, numbers: range = range(4), tables: tuple[str, ...] = TABLES) -> None:
+def fill(path, numbers=range(4), tables=TABLES):
     """A run that computes some entries and ends."""
     with contextlib.closing(Store(path)) as store:
         for number in numbers:
@@ -48,11 +45,11 @@ def fill(path: Path, numbers: range = range(4), tables: tuple[str, ...] = TABLES
             store.flush()
 
 
-def entries_of(store: Store) -> dict[tuple[str, str], Packed | None]:
+def entries_of(store):
     return {(table, key): store.read(table, key) for table in TABLES for key in sorted(store.on_disk(table))}
 
 
-def assert_same(found: Packed | None, expected: Packed) -> None:
+def assert_same(found, expected):
     assert found is not None
     assert found.text == expected.text
     for one, other in zip(found.arrays, expected.arrays, strict=True):
@@ -60,22 +57,22 @@ def assert_same(found: Packed | None, expected: Packed) -> None:
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     return tmp_path / "out.nc.progress"
 
 
 @pytest.fixture
-def opened(path: Path) -> Iterator[Store]:
+def opened(path):
     with contextlib.closing(Store(path)) as store:
         yield store
 
 
 @pytest.fixture(autouse=True)
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+def impatient(monkeypatch):
     monkeypatch.setattr(database, "_SECONDS_TO_DIE", 0.2)
 
 
-def test_what_is_read_is_what_was_added_now_and_in_a_later_run(path: Path) -> None:
+def test_what_is_read_is_what_was_added_now_and_in_a_later_run(path):
     store = Store(path)
     for number in range(7):
         for table in TABLES:
@@ -114,7 +111,7 @@ ARRAYS = [
 
 
 @pytest.mark.parametrize("array", ARRAYS, ids=lambda array: f"{array.dtype}{array.shape}")
-def test_arrays_are_kept_to_the_last_bit(array: np.ndarray) -> None:
+def test_arrays_are_kept_to_the_last_bit(array):
     found = contents.decompress(*contents.compress(Packed('{"text": "\udce9"}', (array, array)), 6))
     assert found.text == '{"text": "\udce9"}'
     for one in found.arrays:
@@ -122,7 +119,7 @@ def test_arrays_are_kept_to_the_last_bit(array: np.ndarray) -> None:
         assert one.flags.writeable
 
 
-def raw(head: bytes, body: bytes = b"", length: int | None = None) -> tuple[int, bytes]:
+def raw(head, body=b"", length=None):
     content = (len(head) if length is None else length).to_bytes(8, "little") + head + body
     return len(content), zlib.compress(content)
 
@@ -141,14 +138,12 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("case", HOSTILE)
-def test_contents_that_no_run_has_written_are_refused(case: str) -> None:
+def test_contents_that_no_run_has_written_are_refused(case):
     with pytest.raises(ValueError):  # noqa: PT011 - numpy and json have sentences of their own
         contents.decompress(*HOSTILE[case])
 
 
-def test_a_first_result_is_written_at_once_and_later_ones_wait_a_moment_for_others(
-    opened: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_first_result_is_written_at_once_and_later_ones_wait_a_moment_for_others(opened, monkeypatch):
     now = 1000.0
     monkeypatch.setattr(store_module.time, "monotonic", lambda: now)
     for number, (seconds, n_written) in enumerate([(0.0, 1), (0.5, 1), (0.6, 3)]):
@@ -159,10 +154,10 @@ def test_a_first_result_is_written_at_once_and_later_ones_wait_a_moment_for_othe
         assert len(opened.on_disk(RESULTS)) == n_written
 
 
-def test_nobody_waits_for_a_slow_disk_unless_it_is_far_behind(opened: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nobody_waits_for_a_slow_disk_unless_it_is_far_behind(opened, monkeypatch):
     synced, own = threading.Event(), contents.compress
 
-    def slow(packed: Packed, level: int) -> tuple[int, bytes]:
+    def slow(packed, level):
         synced.wait(60.0)
         return own(packed, level)
 
@@ -187,7 +182,7 @@ def test_nobody_waits_for_a_slow_disk_unless_it_is_far_behind(opened: Store, mon
     assert len(opened.on_disk(RESULTS)) == 24
 
 
-def test_a_transaction_is_there_as_a_whole_or_not_at_all(path: Path) -> None:
+def test_a_transaction_is_there_as_a_whole_or_not_at_all(path):
     """On a disk without room for all of it."""
     fill(path, range(2))
     with contextlib.closing(Store(path)) as store:
@@ -208,7 +203,7 @@ def test_a_transaction_is_there_as_a_whole_or_not_at_all(path: Path) -> None:
         assert entries_of(store).keys() == before.keys() | {(RESULTS, key(7)), (STARTS, key(7))}
 
 
-def test_progress_is_replaced_and_goes_with_the_end_of_its_task(path: Path) -> None:
+def test_progress_is_replaced_and_goes_with_the_end_of_its_task(path):
     with contextlib.closing(Store(path)) as store:
         assert store.read_progress(key(9)) is None
         store.keep_progress(key(9), kept(1))
@@ -225,7 +220,7 @@ def test_progress_is_replaced_and_goes_with_the_end_of_its_task(path: Path) -> N
         assert_same(store.read(RESULTS, key(0)), kept(0))
 
 
-def test_what_is_computed_once_is_there_for_a_later_run_and_goes_when_none_asks_for_it(path: Path) -> None:
+def test_what_is_computed_once_is_there_for_a_later_run_and_goes_when_none_asks_for_it(path):
     with contextlib.closing(Store(path)) as store:
         assert store.read_computed("natural frequencies") is None
         store.keep_computed("natural frequencies", kept(1))
@@ -238,7 +233,7 @@ def test_what_is_computed_once_is_there_for_a_later_run_and_goes_when_none_asks_
         assert store.on_disk(COMPUTED) == {"natural frequencies"}
 
 
-def test_what_is_forgotten_is_replaced_by_what_comes(path: Path) -> None:
+def test_what_is_forgotten_is_replaced_by_what_comes(path):
     fill(path)
     with contextlib.closing(Store(path)) as store:
         store.forget(RESULTS, key(1))
@@ -257,7 +252,7 @@ def test_what_is_forgotten_is_replaced_by_what_comes(path: Path) -> None:
         assert not store.has(STARTS, key(2))
 
 
-def test_room_is_given_back_at_the_end(path: Path) -> None:
+def test_room_is_given_back_at_the_end(path):
     with contextlib.closing(Store(path)) as store:
         put(store, RESULTS, 1)
         random_numbers = np.random.default_rng(0).random(10**5)
@@ -272,7 +267,7 @@ def test_room_is_given_back_at_the_end(path: Path) -> None:
         assert entries_of(store).keys() == {(RESULTS, key(1))}
 
 
-def test_a_transaction_survives_a_loss_of_power(opened: Store) -> None:
+def test_a_transaction_survives_a_loss_of_power(opened):
     """By the settings for which SQLite promises this, on a file system that does what it is told."""
     query = opened._database.execute
     settings = {name: query(f"PRAGMA {name}").fetchone()[0] for name in ("synchronous", "journal_mode", "locking_mode")}
@@ -282,13 +277,13 @@ def test_a_transaction_survives_a_loss_of_power(opened: Store) -> None:
 # what is damaged
 
 
-def change_bytes(path: Path, place: int, content: bytes) -> None:
+def change_bytes(path, place, content):
     with path.open("rb+") as file:
         file.seek(place)
         file.write(content)
 
 
-def change_tables(path: Path, *commands: str) -> None:
+def change_tables(path, *commands):
     with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as changed:
         for command in commands:
             changed.execute(command).fetchall()
@@ -310,7 +305,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_file_is_kept_aside_and_the_study_begins_anew(damage: str, path: Path) -> None:
+def test_a_damaged_file_is_kept_aside_and_the_study_begins_anew(damage, path):
     for aside in ("out.nc.progress.damaged", "out.nc.progress.damaged-2"):
         fill(path)
         DAMAGES[damage](path)
@@ -328,7 +323,7 @@ def test_a_damaged_file_is_kept_aside_and_the_study_begins_anew(damage: str, pat
         path.unlink()
 
 
-def test_a_damaged_entry_is_forgotten_with_a_line_and_nothing_else(path: Path) -> None:
+def test_a_damaged_entry_is_forgotten_with_a_line_and_nothing_else(path):
     fill(path)
     change_tables(
         path,
@@ -349,7 +344,7 @@ def test_a_damaged_entry_is_forgotten_with_a_line_and_nothing_else(path: Path) -
 
 
 @pytest.mark.slow
-def test_any_bit_of_a_file_matters(path: Path) -> None:
+def test_any_bit_of_a_file_matters(path):
     """None makes anything but what was there before, or nothing; none ends in a traceback."""
     fill(path, range(2))
     content, expected = path.read_bytes(), {}
@@ -376,7 +371,7 @@ def test_any_bit_of_a_file_matters(path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", ["", "-journal"])
 @pytest.mark.parametrize("what", ["fifo", "endless", "link", "link to nowhere"])
-def test_only_plain_files_are_opened(what: str, suffix: str, path: Path, tmp_path: Path) -> None:
+def test_only_plain_files_are_opened(what, suffix, path, tmp_path):
     precious = tmp_path / "precious"
     fill(precious)
     before = precious.read_bytes()
@@ -393,7 +388,7 @@ def test_only_plain_files_are_opened(what: str, suffix: str, path: Path, tmp_pat
     assert precious.read_bytes() == before
 
 
-def test_a_journal_that_names_another_file_does_not_remove_it(path: Path, tmp_path: Path) -> None:
+def test_a_journal_that_names_another_file_does_not_remove_it(path, tmp_path):
     """SQLite removes the journal of several files when the last one of these was restored."""
     fill(path)
     precious = tmp_path / "precious.txt"
@@ -421,12 +416,10 @@ def test_a_journal_that_names_another_file_does_not_remove_it(path: Path, tmp_pa
         (sqlite3.SQLITE_READONLY, "Permission denied: see that it may be written"),
     ],
 )
-def test_a_disk_that_fails_for_now_is_no_reason_to_throw_anything_away(
-    code: int, said: str, path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_that_fails_for_now_is_no_reason_to_throw_anything_away(code, said, path, monkeypatch):
     fill(path)
 
-    def fail(*_: object, **__: object) -> None:
+    def fail(*_, **__):
         error = sqlite3.OperationalError("disk I/O error")
         error.sqlite_errorcode = code
         raise error
@@ -440,7 +433,7 @@ def test_a_disk_that_fails_for_now_is_no_reason_to_throw_anything_away(
 
 
 @pytest.mark.parametrize("replaced", [False, True])
-def test_a_file_that_was_removed_meanwhile_is_told(replaced: bool, opened: Store, path: Path) -> None:
+def test_a_file_that_was_removed_meanwhile_is_told(replaced, opened, path):
     put(opened, RESULTS, 1)
     opened.flush()
     path.unlink()
@@ -465,7 +458,7 @@ time.sleep(float(sys.argv[2]))
 
 
 @contextlib.contextmanager
-def another_run(path: Path, seconds: float) -> Iterator[subprocess.Popen[str]]:
+def another_run(path, seconds):
     command = [sys.executable, "-c", HOLDER, str(path), str(seconds)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
         assert holder.stdout is not None
@@ -474,7 +467,7 @@ def another_run(path: Path, seconds: float) -> Iterator[subprocess.Popen[str]]:
         holder.kill()
 
 
-def test_two_runs_are_kept_apart(path: Path) -> None:
+def test_two_runs_are_kept_apart(path):
     fill(path)
     with another_run(path, 60.0) as holder:
         for _ in range(2):
@@ -484,7 +477,7 @@ def test_two_runs_are_kept_apart(path: Path) -> None:
     Store(path).close()
 
 
-def test_the_study_of_a_file_is_read_without_its_lock(path: Path, opened: Store) -> None:
+def test_the_study_of_a_file_is_read_without_its_lock(path, opened):
     assert database.read_study(path) is None
     opened.note_study(
         "joint", "sdof_slider", ("hash", "layout"), [{"key": key(1), "kind": "sweep", "frequency": 100.0}]
@@ -499,7 +492,7 @@ def test_the_study_of_a_file_is_read_without_its_lock(path: Path, opened: Store)
     )
 
 
-def test_a_right_check_sum_does_not_make_a_size_right(path: Path) -> None:
+def test_a_right_check_sum_does_not_make_a_size_right(path):
     fill(path)
     change_tables(path, "UPDATE results SET size=900000000", "UPDATE start_states SET size=NULL")
     with contextlib.closing(Store(path)) as store:
@@ -507,9 +500,7 @@ def test_a_right_check_sum_does_not_make_a_size_right(path: Path) -> None:
         assert not store.has(RESULTS, key(1))
 
 
-def test_values_beyond_all_measure_are_left_out_where_they_save_time_only(
-    opened: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_values_beyond_all_measure_are_left_out_where_they_save_time_only(opened, monkeypatch):
     monkeypatch.setattr(store_module, "LARGEST", 10)
     opened.keep_computed("scene", kept(1))
     opened.keep_progress(key(1), kept(1))
@@ -518,6 +509,6 @@ def test_values_beyond_all_measure_are_left_out_where_they_save_time_only(
         put(opened, RESULTS, 1)
 
 
-def test_objects_are_not_kept() -> None:
+def test_objects_are_not_kept():
     with pytest.raises(TypeError, match="arrays of object are not kept"):
         contents.compress(Packed("", (np.array([{}], dtype=object),)), 1)

@@ -1,7 +1,5 @@
 """Terminals that are gone, pipes that nobody reads, full logs: a run goes on, with its result and its own status."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import subprocess
@@ -19,7 +17,7 @@ STUDY = "two_masses --set axes.wear_coefficient=1e-11 --set slow_time.cycles=200
 DEAF = {"full log of everything": ">/dev/full 2>&1", "closed": "<&- >&- 2>&-", "a reader of one line": "2>&1 | head -1"}
 
 
-def shell(command: str, folder: Path) -> tuple[int, str, str]:
+def shell(command, folder):
     """Exit status of the command before the pipe; what was said behind it."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
@@ -29,14 +27,14 @@ def shell(command: str, folder: Path) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-def faked(arguments: str, where: str) -> str:
+def faked(arguments, where):
     """A run with the stand-in for the solver."""
     return f"{sys.executable} {ROOT / 'tests' / 'mpi' / 'run_faked.py'} {arguments} {where}"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", DEAF)
-def test_a_run_that_nobody_hears(case: str, tmp_path: Path) -> None:
+def test_a_run_that_nobody_hears(case, tmp_path):
     status, _, _ = shell(faked(STUDY, DEAF[case]), tmp_path)
     assert status == 0
     assert (results(tmp_path / "out.nc")["outcome"] == 0).all()
@@ -44,7 +42,7 @@ def test_a_run_that_nobody_hears(case: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["closed"])
-def test_ranks_that_nobody_hears(case: str, tmp_path: Path) -> None:
+def test_ranks_that_nobody_hears(case, tmp_path):
     command = shlex.join([*launcher(2), "bash", "-c", faked(STUDY, DEAF[case])])
     status, _, _ = shell(command, tmp_path)
     assert status == 0
@@ -52,7 +50,7 @@ def test_ranks_that_nobody_hears(case: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_plan_that_does_not_arrive(tmp_path: Path) -> None:
+def test_a_plan_that_does_not_arrive(tmp_path):
     command = f"{sys.executable} -m studyrunner.cli two_masses --plan"
     status, _, said = shell(f"{command} >/dev/full", tmp_path)
     assert (status, said) == (
@@ -66,7 +64,7 @@ def test_a_plan_that_does_not_arrive(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["closed"])
-def test_a_report_that_nobody_hears_of(case: str, tmp_path: Path) -> None:
+def test_a_report_that_nobody_hears_of(case, tmp_path):
     assert shell(faked(STUDY, ""), tmp_path)[0] == 0
     status, _, _ = shell(f"{sys.executable} -m studyrunner.report.cli out.nc {DEAF[case]}", tmp_path)
     assert status == 0
@@ -81,7 +79,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_end_well_is_refused_at_the_beginning(case: str, tmp_path: Path) -> None:
+def test_what_cannot_end_well_is_refused_at_the_beginning(case, tmp_path):
     before, options, said = REFUSED[case]
     status, _, line = shell(f"{before} {sys.executable} -m studyrunner.cli two_masses {options}", tmp_path)
     assert status == 2
@@ -91,7 +89,7 @@ def test_what_cannot_end_well_is_refused_at_the_beginning(case: str, tmp_path: P
     assert not list(tmp_path.rglob("*.parts"))
 
 
-def test_nothing_else_gets_the_number_of_a_stream(tmp_path: Path) -> None:
+def test_nothing_else_gets_the_number_of_a_stream(tmp_path):
     """A library that complains on stderr must not write into a file of the run."""
     code = (
         "import os\nfrom studyrunner.system.streams import keep_talking\nkeep_talking()\n"

@@ -1,9 +1,5 @@
 """Study files: defaults, axes, overrides and the effective study that goes into the result."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from studyrunner.study.study_file import bundled_studies, format_study, read_study
@@ -12,13 +8,13 @@ from studyrunner.variables import USUAL
 SMALLEST = '[study]\nname = "s"\n[scene]\nmodel = "sdof_slider"\n[axes]\nfrequency = 100\n'
 
 
-def write(folder: Path, text: str) -> str:
+def write(folder, text):
     path = folder / "study.toml"
     path.write_text(text, encoding="utf-8")
     return str(path)
 
 
-def test_every_default_is_filled_in(tmp_path: Path) -> None:
+def test_every_default_is_filled_in(tmp_path):
     study = read_study(write(tmp_path, SMALLEST))
     assert study.dimensions == {
         "frequency": (100.0,),
@@ -51,12 +47,12 @@ def test_every_default_is_filled_in(tmp_path: Path) -> None:
         ("sdof_slider", "['default', 'exact', 'worn_volume']", (*USUAL, "exact")),
     ],
 )
-def test_one_word_stands_for_the_default_variables(name: str, asked: str, found: tuple[str, ...]) -> None:
+def test_one_word_stands_for_the_default_variables(name, asked, found):
     assert read_study(name, [f"outputs.variables={asked}"]).outputs.variables == found
 
 
 @pytest.mark.parametrize("name", bundled_studies())
-def test_bundled_studies_are_called_like_their_files(name: str) -> None:
+def test_bundled_studies_are_called_like_their_files(name):
     assert read_study(name).study.name == name
 
 
@@ -71,12 +67,12 @@ def test_bundled_studies_are_called_like_their_files(name: str) -> None:
         ("{start = 7.7, stop = 9, num = 1}", "7.7"),
     ],
 )
-def test_values_of_a_range_are_those_that_a_person_writes(tmp_path: Path, given: str, written: str) -> None:
+def test_values_of_a_range_are_those_that_a_person_writes(tmp_path, given, written):
     study = read_study(write(tmp_path, SMALLEST.replace("frequency = 100", f"frequency = {given}")))
     assert " ".join(map(repr, study.axes.frequency)) == written
 
 
-def test_every_solver_key_can_be_an_axis_in_the_order_of_the_file() -> None:
+def test_every_solver_key_can_be_an_axis_in_the_order_of_the_file():
     overrides = ["axes.rtol=[1e-3, 1e-2]", "axes.tolerance=1e-9", "axes.samples=['auto', 64]", "axes.harmonics=auto"]
     study = read_study("dovetail", overrides)
     assert dict(list(study.dimensions.items())[6:]) == {
@@ -98,7 +94,7 @@ def test_every_solver_key_can_be_an_axis_in_the_order_of_the_file() -> None:
         ("rtol", "[1e-1, 1e-2, 1e-3]"),
     ],
 )
-def test_several_values_of_a_solver_key_are_an_axis(key: str, values: str, tmp_path: Path) -> None:
+def test_several_values_of_a_solver_key_are_an_axis(key, values, tmp_path):
     there = read_study("dovetail", [f"axes.{key}={values}"])
     here = read_study("dovetail", [f"solver.{key}={values}"])
     assert len(here.dimensions[key]) > 1
@@ -109,7 +105,7 @@ def test_several_values_of_a_solver_key_are_an_axis(key: str, values: str, tmp_p
 
 
 @pytest.mark.parametrize("harmonics", ["solver.harmonics=3", "axes.harmonics=[1, 3]", "axes.harmonics=['auto', 3]"])
-def test_effective_study_reads_back_the_same(harmonics: str, tmp_path: Path) -> None:
+def test_effective_study_reads_back_the_same(harmonics, tmp_path):
     overrides = [harmonics, "axes.rtol=[0.1, 0.2]", "study.title='a \\ \"title\" with é'", "slow_time.outputs=[0, 10]"]
     study = read_study("dovetail", overrides)
     again = read_study(write(tmp_path, format_study(study)))

@@ -1,9 +1,6 @@
 """A scene file and a result file are each enough to have the same result again."""
 
-from __future__ import annotations
-
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -17,6 +14,7 @@ from studyrunner.cli import main
 from studyrunner.netcdf import provenance
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
+from tests.mpi.launching import results
 
 pytestmark = pytest.mark.usefixtures("reader")
 
@@ -60,18 +58,18 @@ variables = ["default", "outcome"]
 """
 
 
-def options(*overrides: str) -> list[str]:
+def options(*overrides):
     return [part for text in overrides for part in ("--set", text)]
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory):
     """A folder with a scene file and its result."""
     path = tmp_path_factory.mktemp("made")
     with pytest.MonkeyPatch.context() as patch:
@@ -83,23 +81,17 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def slider(made: Path, folder: Path) -> Path:
+def slider(made, folder):
     """A result of a scene file, which is not here."""
     return Path(shutil.copy(made / "slider.nc", folder))
 
 
-def contents(path: Path | str) -> xr.Dataset:
-    """All that the file holds but what differs from run to run."""
-    with xr.open_dataset(path) as result:
-        return result.load().drop_vars("run_time")
-
-
-def groups(path: Path | str) -> dict[str, object]:
+def groups(path):
     """What the group of the scene holds."""
     found: dict[str, object] = {}
     with h5py.File(path) as file:
 
-        def note(name: str, item: h5py.HLObject) -> None:
+        def note(name, item):
             if isinstance(item, h5py.Dataset) and not item.is_scale:
                 found[name] = item[()].tolist()
 
@@ -111,13 +103,13 @@ def groups(path: Path | str) -> dict[str, object]:
 
 
 @pytest.mark.slow
-def test_a_written_scene_gives_the_same_result(folder: Path) -> None:
+def test_a_written_scene_gives_the_same_result(folder):
     assert main(["dovetail", "-o", "own.nc", *options(*COARSE, *OUTPUTS)]) == 0
     Path("files").mkdir()
     assert main(["dovetail", "--write-scene", "files/scene.h5", *options(*COARSE, *OUTPUTS)]) == 0
     Path("s.toml").write_text(STUDY, encoding="utf-8")
     assert main(["s.toml", "-o", "file.nc"]) == 0
-    own, file = contents("own.nc"), contents("file.nc")
+    own, file = results("own.nc"), results("file.nc")
     assert "mesh_quad" in own
     assert list(own.variables) == list(file.variables)
     differing = {name for name in own.attrs if own.attrs[name] != file.attrs[name]}
@@ -130,12 +122,12 @@ def test_a_written_scene_gives_the_same_result(folder: Path) -> None:
     shutil.move("file.nc", "elsewhere/moved.nc")
     shutil.rmtree("files")
     assert main(["elsewhere/moved.nc", "-o", "again.nc"]) == 0
-    xr.testing.assert_identical(contents("again.nc"), contents("elsewhere/moved.nc"))
+    xr.testing.assert_identical(results("again.nc"), results("elsewhere/moved.nc"))
     assert groups("again.nc") == groups("elsewhere/moved.nc")
 
 
 @pytest.mark.slow
-def test_mesh_and_model_come_back_bit_by_bit(folder: Path) -> None:
+def test_mesh_and_model_come_back_bit_by_bit(folder):
     study = read_study("dovetail", (*COARSE, *WAVE))
     assert main(["dovetail", "--write-scene", "wave.h5", *options(*COARSE, *WAVE)]) == 0
     mesh = read_mesh("wave.h5")
@@ -159,7 +151,7 @@ def test_mesh_and_model_come_back_bit_by_bit(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_result_of_a_bundled_scene_runs_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_result_of_a_bundled_scene_runs_again(folder, capsys):
     """Also one that holds what is asked for by name, sweeps and axes of words."""
     overrides = ("axes.frequency=[160, 150]", "axes.harmonics=['auto', 3]", "outputs.variables=['default', 'exact']")
     assert main(["sdof_slider", *options(*overrides, "slow_time.outputs=3", "slow_time.cycles=2000")]) == 0
@@ -168,11 +160,11 @@ def test_a_result_of_a_bundled_scene_runs_again(folder: Path, capsys: pytest.Cap
     capsys.readouterr()
     assert main(["renamed.nc"]) == 0
     assert "scene_sha256" not in capsys.readouterr().err
-    xr.testing.assert_identical(contents("sdof_slider.nc"), contents("renamed.nc"))
+    xr.testing.assert_identical(results("sdof_slider.nc"), results("renamed.nc"))
 
 
 @pytest.mark.slow
-def test_the_file_that_is_read_is_not_replaced(slider: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_file_that_is_read_is_not_replaced(slider, capsys):
     before = slider.read_bytes()
     capsys.readouterr()
     for arguments in (["slider.nc"], ["slider.nc", "-o", "./slider.nc"], ["slider.nc", "--write-scene", "slider.nc"]):
@@ -186,15 +178,13 @@ def test_the_file_that_is_read_is_not_replaced(slider: Path, capsys: pytest.Capt
     assert slider.read_bytes() == before
 
 
-def change(path: Path, work: Callable[[h5py.File], None]) -> None:
+def change(path, work):
     with h5py.File(path, "r+") as file:
         work(file)
 
 
 @pytest.mark.slow
-def test_another_scene_or_solver_is_said_and_computed_all_the_same(
-    slider: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_scene_or_solver_is_said_and_computed_all_the_same(slider, capsys, monkeypatch):
     capsys.readouterr()
     monkeypatch.setattr(provenance, "solver_digest", lambda: "another")
     change(slider, lambda file: file["scene/contact/area"].write_direct(np.array([1.1e-4])))
@@ -220,9 +210,7 @@ def test_another_scene_or_solver_is_said_and_computed_all_the_same(
         (lambda file: file["scene"].__setitem__("mass2", h5py.ExternalLink("o.h5", "/")), ("mass2", "a link")),
     ],
 )
-def test_a_result_file_that_was_tampered_with(
-    work: Callable[[h5py.File], None], words: tuple[str, ...], slider: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_result_file_that_was_tampered_with(work, words, slider, capsys):
     change(slider, work)
     capsys.readouterr()
     assert main(["slider.nc", "-o", "x.nc"]) == 2

@@ -1,7 +1,5 @@
 """The statistics of a result with samples: labelled, as bands where samples have no value, and in sentences."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from functools import cache
@@ -29,7 +27,7 @@ PAIRS = ScatteredPairs(("left",) * 3, np.full((3, 3), np.nan))
 CYCLES = np.array([0.0, 5e4, 1e5])
 
 
-def result(scatter: str = SCATTER, jump: float = 0.0) -> xr.Dataset:
+def result(scatter=SCATTER, jump=0.0):
     """A made-up result: volume (2 frequencies, sample, 3 counts) = k_w mu (1 + gap) N, with a jump where mu > 0.51.
 
     The volume is worn off pair 1 alone, which the other two follow by a tenth.
@@ -68,11 +66,11 @@ def result(scatter: str = SCATTER, jump: float = 0.0) -> xr.Dataset:
 
 
 @cache
-def plain_statistics() -> xr.Dataset:
+def plain_statistics():
     return worn_volume_statistics(result())
 
 
-def test_every_statistic_is_labelled_and_stands_over_the_other_dimensions() -> None:
+def test_every_statistic_is_labelled_and_stands_over_the_other_dimensions():
     dataset = result()
     found = worn_volume_statistics(dataset, exceed=[1e-10, 2e-10], depth=1e-6)
     assert found["worn_volume_quantile"].dims == ("frequency", "cycle", "quantile", "bound")
@@ -93,7 +91,7 @@ def test_every_statistic_is_labelled_and_stands_over_the_other_dimensions() -> N
     np.testing.assert_allclose(error / median, [[0.99, 1.01]] * 2)
 
 
-def test_indices_are_those_of_the_product() -> None:
+def test_indices_are_those_of_the_product():
     """ln V = ln k_w + ln mu + gap: shares of the variance of the logarithm, which is nearly the one of the volume."""
     found = plain_statistics()["first_index"].isel(cycle=-1, bound=0)
     variances = np.array([0.06**2, np.log(1.5) ** 2, 0.01**2 / 3])
@@ -104,14 +102,14 @@ def test_indices_are_those_of_the_product() -> None:
     assert plain_statistics()["first_index"].isel(cycle=0).isnull().all()
 
 
-def test_a_saltelli_design_is_read_as_one() -> None:
+def test_a_saltelli_design_is_read_as_one():
     found = worn_volume_statistics(result(SCATTER.replace('"sobol"', '"saltelli"').replace("128", "256")))
     assert found.attrs["title"] == "Statistics of 512 samples"
     assert "scipy" in found["total_index"].attrs["method"]
     np.testing.assert_allclose(found["total_index"].isel(cycle=-1, bound=0), [[0.02, 0.98, 0.0]] * 2, atol=0.06)
 
 
-def test_samples_without_a_value_and_sensitive_ones_are_bands() -> None:
+def test_samples_without_a_value_and_sensitive_ones_are_bands():
     whole, part = result(), result()
     part["worn_volume"][0, 5, 2] = np.nan  # ended after the second count
     part["worn_volume"][0, 6, :] = np.nan  # has no state at all
@@ -139,14 +137,14 @@ def test_samples_without_a_value_and_sensitive_ones_are_bands() -> None:
     assert said in sentences(worn_volume_statistics(part))[0]
 
 
-def test_the_sentence_says_range_median_error_and_what_decides() -> None:
+def test_the_sentence_says_range_median_error_and_what_decides():
     first, second = sentences(plain_statistics())
     assert first.startswith("211.5 Hz: 5 to 95 % of 128 samples 0.256 to 0.969 mm3, median 0.506 ")
     assert re.search(r"\(numerical error 1 %\); wear coefficient decides 9\d % \(gap not told\)$", first)
     assert second.startswith("212 Hz: ")
 
 
-def test_two_hills_are_reported_with_the_pair_that_decides() -> None:
+def test_two_hills_are_reported_with_the_pair_that_decides():
     dataset = result(jump=5e-11)
     found = worn_volume_statistics(dataset)
     n_above = int((dataset["sample_friction_coefficient"] > 0.51).sum())
@@ -158,7 +156,7 @@ def test_two_hills_are_reported_with_the_pair_that_decides() -> None:
     assert weight == pytest.approx(1.0, abs=0.05)
 
 
-def test_samples_of_zero_width_say_one_value() -> None:
+def test_samples_of_zero_width_say_one_value():
     zero = SCATTER.replace("0.03", "0").replace("1.5", "1").replace("1e-7", "0")
     found = worn_volume_statistics(result(zero))
     last = found["worn_volume_quantile"].isel(cycle=-1)
@@ -168,14 +166,14 @@ def test_samples_of_zero_width_say_one_value() -> None:
     assert "decides" not in sentences(found)[0]
 
 
-def test_a_result_without_depths_frequencies_or_errors_is_read_too() -> None:
+def test_a_result_without_depths_frequencies_or_errors_is_read_too():
     dataset = result().isel(frequency=0, drop=True).drop_vars(["wear_depth", "wear_depth_error", "worn_volume_error"])
     found = worn_volume_statistics(dataset)
     assert "wear_depth_exceedance" not in found
     assert "numerical error not known" in sentences(found)[0]
 
 
-def test_the_largest_depth_of_a_point_that_ended_early_is_a_lower_bound() -> None:
+def test_the_largest_depth_of_a_point_that_ended_early_is_a_lower_bound():
     dataset = result()
     dataset["largest_wear_depth"] = dataset["wear_depth"].isel(cycle=-1).max("contact")
     dataset = dataset.drop_vars(["wear_depth", "wear_depth_error"])
@@ -188,7 +186,7 @@ def test_the_largest_depth_of_a_point_that_ended_early_is_a_lower_bound() -> Non
     assert found[0, -1, 1] == pytest.approx(1 / 128)
 
 
-def test_what_has_no_samples_is_refused() -> None:
+def test_what_has_no_samples_is_refused():
     with pytest.raises(ValueError, match=r"no worn_volume of samples: run a study with \[scatter\]"):
         worn_volume_statistics(result().isel(sample=0))
     with pytest.raises(ValueError, match="between 0 and 1"):

@@ -1,24 +1,21 @@
 """How far a study is, and a replay of many ranks: every march is done once, and the ranks are busy."""
 
-from __future__ import annotations
-
 import pytest
 
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import StartResult
-from studyrunner.plan.tasks import BranchTask, TaskPlan
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import TaskProgress
 from tests.benchmarks.simulation import MemoryIndex, Overheads, replay
 from tests.studyrunner.fakes import fake_branch, fake_march
 
 
-def plan_of() -> TaskPlan:
+def plan_of():
     overrides = ("axes.frequency={start=1, stop=2, num=8}", "axes.step=[100, 1000]", "axes.sweep=['up', 'down']")
     return build_tasks(read_study("sdof_slider", overrides), 2)
 
 
-def test_the_seconds_left_fall_to_none_and_follow_what_was_measured() -> None:
+def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
     plan = plan_of()
     progress = TaskProgress(MemoryIndex(plan))
     assert progress.look(()).seconds_left == pytest.approx(plan.cost)
@@ -38,7 +35,7 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured() -> None:
     assert progress.look(()).n_done == progress.look(()).n_points == plan.n_points
 
 
-def test_tasks_that_run_count_for_the_time_left_and_are_named() -> None:
+def test_tasks_that_run_count_for_the_time_left_and_are_named():
     plan = plan_of()
     progress = TaskProgress(MemoryIndex(plan))
     up, down = plan.branches
@@ -57,27 +54,12 @@ def test_tasks_that_run_count_for_the_time_left_and_are_named() -> None:
     assert 0.2e6 <= alone.look([(march, 1, 1e6)]).seconds_left <= 0.5e6
 
 
-def test_finished_marches_are_kept_with_their_results() -> None:
-    plan = plan_of()
-    completion = MemoryIndex(plan)
-    progress = TaskProgress(completion)
-    for branch in plan.branches:
-        for started in fake_branch(branch):
-            for task in progress.take(branch, started):
-                progress.take(task, fake_march(task))
-    kept = [(task.number, result.points) for task, result in completion.histories]
-    assert sorted(kept) == [(task.number, task.points) for line in plan.marches for task in line]
-    assert [(branch.number, start.position) for branch, start in completion.starts] == [
-        (branch.number, position) for branch in plan.branches for position in branch.order
-    ]
-
-
 @pytest.mark.parametrize("n_ranks", [1, 3, 1000])
-def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks: int) -> None:
+def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks):
     """Equal costs and no overheads: the time is that of the work, or of a branch and a march."""
     plan = plan_of()
 
-    def started(branch: BranchTask, position: int) -> tuple[StartResult, float]:
+    def started(branch, position):
         return StartResult(position, None, moves=True, n_unknowns=6), 1.0
 
     found = replay(plan, started, lambda _: 10.0, n_ranks, Overheads(0.0, 0.0, 0.0))

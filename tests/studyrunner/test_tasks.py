@@ -1,18 +1,13 @@
 """Which tasks a study has, which points share one, and what the plan says of it."""
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
-from collections.abc import Sequence
 
 import pytest
 
 from studyrunner.cli import main
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import StartResult
-from studyrunner.plan.tasks import TaskPlan
-from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.task_progress import start_marches
 
@@ -28,19 +23,19 @@ GRID = (
 )
 
 
-def plan_of(*overrides: str) -> tuple[Study, TaskPlan]:
+def plan_of(*overrides):
     study = read_study("sdof_slider", overrides)
     return study, build_tasks(study, 2)
 
 
-def assert_every_point_once(study: Study, plan: TaskPlan) -> None:
+def assert_every_point_once(study, plan):
     points = Counter(point for line in plan.marches for task in line for point in task.points)
     sizes = [len(values) for values in study.dimensions.values()]
     assert points == Counter(itertools.product(*(range(size) for size in sizes)))
     assert plan.n_points == len(points)
 
 
-def test_one_branch_a_line_of_frequencies() -> None:
+def test_one_branch_a_line_of_frequencies():
     study, plan = plan_of(*GRID)
     assert len(plan.branches) == 2 * 2 * 2
     assert {branch.frequencies for branch in plan.branches} == {(150.0, 155.0, 160.0)}
@@ -49,7 +44,7 @@ def test_one_branch_a_line_of_frequencies() -> None:
     assert_every_point_once(study, plan)
 
 
-def test_a_ramp_is_a_task_at_each_frequency() -> None:
+def test_a_ramp_is_a_task_at_each_frequency():
     """Nothing is serial in it: as many branches as points, and the marches of each from its only state."""
     study, plan = plan_of("axes.frequency=[160, 150, 155]", "axes.sweep=['ramp', 'up']", *SHARED)
     ramps = [branch for branch in plan.branches if branch.sweep == "ramp"]
@@ -64,7 +59,7 @@ def test_a_ramp_is_a_task_at_each_frequency() -> None:
     assert_every_point_once(study, plan)
 
 
-def test_points_know_their_task() -> None:
+def test_points_know_their_task():
     """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
     study, plan = plan_of(*GRID, *SHARED, "axes.sweep=['up', 'ramp']")
     assert any(len(task.histories) > 1 for task in plan.marches[0])
@@ -86,7 +81,7 @@ def test_points_know_their_task() -> None:
                     assert values["step"] == scaled.step or task.scheme == "adaptive"
 
 
-def test_unworn_states_are_computed_once_for_each_wear_coefficient() -> None:
+def test_unworn_states_are_computed_once_for_each_wear_coefficient():
     """Their motion is the same, but not their wear rate."""
     study, plan = plan_of(*GRID, "slow_time.cycles=0")
     assert all(task.held and task.cycles == (0.0,) for line in plan.marches for task in line)
@@ -98,7 +93,7 @@ def test_unworn_states_are_computed_once_for_each_wear_coefficient() -> None:
             assert {study.axes.wear_coefficient[point[1]] for point in task.points} == {task.wear_coefficient}
 
 
-def test_marches_cost_little_and_go_last_where_nothing_moves() -> None:
+def test_marches_cost_little_and_go_last_where_nothing_moves():
     _, plan = plan_of("axes.frequency=[1, 2]", "axes.step=[100, 1000]", "axes.scheme=implicit")
     planned = plan.marches_from(0, 0)
     moving = start_marches(planned, StartResult(0, "state", moves=True, n_unknowns=planned[0].n_unknowns))
@@ -110,7 +105,7 @@ def test_marches_cost_little_and_go_last_where_nothing_moves() -> None:
     assert {task.cost_keys[0] for task in moving} != {task.cost_keys[0] for task in resting}
 
 
-def printed_plan(overrides: Sequence[str], capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
+def printed_plan(overrides, capsys):
     arguments = ["sdof_slider", "--plan"]
     for override in overrides:
         arguments += ["--set", override]
@@ -120,7 +115,7 @@ def printed_plan(overrides: Sequence[str], capsys: pytest.CaptureFixture[str]) -
     return {line[:10].strip(): line[11:] for line in captured.out.splitlines()}
 
 
-def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_plan_is_printed(capsys):
     lines = printed_plan(GRID, capsys)
     assert lines["points"].startswith("192 = 3 frequency x 2 wear_coefficient")
     assert lines["tasks"].startswith("128: 8 branches")
@@ -145,6 +140,6 @@ def test_plan_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
         ("work_precision_slider", 2, 578.0),
     ],
 )
-def test_estimates_hold_to_a_factor_of_two(study: str, n_displacements: int, used: float) -> None:
+def test_estimates_hold_to_a_factor_of_two(study, n_displacements, used):
     planned = build_tasks(read_study(study), n_displacements).cost
     assert 0.5 * used < planned < 2.0 * used

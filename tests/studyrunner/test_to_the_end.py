@@ -1,9 +1,6 @@
 """slow_time.cycles = inf, from the study file to the report."""
 
-from __future__ import annotations
-
 import base64
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +11,6 @@ from studyrunner.accessor import join_results
 from studyrunner.plan.planning import build_tasks
 from studyrunner.report.reading.result import open_for_report
 from studyrunner.report.reading.schema_check import check_numbers
-from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 
 END = (
@@ -27,7 +23,7 @@ END = (
 )
 
 
-def study_with(*overrides: str) -> Study:
+def study_with(*overrides):
     return read_study("sdof_slider", (*END, "axes.scheme=adaptive", *overrides))
 
 
@@ -45,7 +41,7 @@ def study_with(*overrides: str) -> Study:
         ('outputs.variables=["default", "exact"]', "outputs.variables", "given cycle counts"),
     ],
 )
-def test_what_does_not_go_with_it_is_one_sentence(override: str, key: str, remedy: str) -> None:
+def test_what_does_not_go_with_it_is_one_sentence(override, key, remedy):
     override = override.replace("[adaptive, explicit]", '["adaptive", "explicit"]')
     others = {
         "slow_time.until={wear_depth = 1e-5}": ("axes.scheme=final",),
@@ -58,7 +54,7 @@ def test_what_does_not_go_with_it_is_one_sentence(override: str, key: str, remed
 
 
 @pytest.mark.slow
-def test_points_have_counts_of_their_own_in_file_report_and_archive(tmp_path: Path) -> None:
+def test_points_have_counts_of_their_own_in_file_report_and_archive(tmp_path):
     wears = "axes.wear_coefficient=[1.1e-11, 2.2e-12, 0.0]"
     study = study_with(wears, 'axes.scheme=["adaptive", "implicit"]', "axes.step=2000", "outputs.loops=[0]")
     with run_study(study, tmp_path / "end.nc") as opened:
@@ -95,7 +91,7 @@ def test_points_have_counts_of_their_own_in_file_report_and_archive(tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_the_report_shows_a_final_state_as_one(tmp_path: Path) -> None:
+def test_the_report_shows_a_final_state_as_one(tmp_path):
     """It has no cycle count: a level beside a history, and alone no history at all; on the page infinite."""
     from studyrunner.report.drawing import Missing
     from studyrunner.report.figures.frequency_course import find_course
@@ -139,7 +135,7 @@ def test_the_report_shows_a_final_state_as_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_scheme_final_is_computed_once_and_says_how(tmp_path: Path) -> None:
+def test_the_scheme_final_is_computed_once_and_says_how(tmp_path):
     overrides = ("axes.wear_coefficient=[1.1e-11, 1e-12]", 'axes.scheme=["adaptive", "final"]', "axes.step=[10, 100]")
     study = study_with(*overrides)
     plan = build_tasks(study, 2)

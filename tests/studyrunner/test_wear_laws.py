@@ -1,9 +1,5 @@
 """[wear] of a study: from the file to the result."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,7 +7,6 @@ from solver.settings import WearTarget
 from studyrunner import run_study
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.planning import build_tasks
-from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.fakes import FACTS
 
@@ -19,11 +14,11 @@ SHORT = ("axes.frequency=160", "axes.scheme=adaptive", "slow_time.cycles=20000",
 TABLE = ("wear.law=table", "wear.pressure=[1e4, 1e5]", "wear.depth=[0, 1e-5]", "wear.factor=[[1, 2], [0.5, 1]]")
 
 
-def study_with(*overrides: str) -> Study:
+def study_with(*overrides):
     return read_study("sdof_slider", (*SHORT, *overrides))
 
 
-def test_a_history_is_known_by_its_law_and_a_start_state_is_not() -> None:
+def test_a_history_is_known_by_its_law_and_a_start_state_is_not():
     found = []
     for overrides in (
         (),
@@ -39,8 +34,8 @@ def test_a_history_is_known_by_its_law_and_a_start_state_is_not() -> None:
 
 
 @pytest.mark.slow
-def test_the_law_of_a_study_is_the_one_that_wears(tmp_path: Path) -> None:
-    def final(*overrides: str) -> np.ndarray:
+def test_the_law_of_a_study_is_the_one_that_wears(tmp_path):
+    def final(*overrides):
         result = run_study(study_with(*overrides), tmp_path / "out.nc")
         return np.asarray(result.worn_volume.isel(cycle=-1).values.ravel())
 
@@ -57,7 +52,7 @@ def test_the_law_of_a_study_is_the_one_that_wears(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_points_end_at_their_target_each_at_its_own_count(tmp_path: Path) -> None:
+def test_points_end_at_their_target_each_at_its_own_count(tmp_path):
     shared = ("axes.wear_coefficient=[1e-11, 5e-12, 1e-12]", "slow_time.cycles=100000", "slow_time.outputs=101")
     study = study_with(*shared, "slow_time.until={wear_depth = 1e-5}")
     assert read_study(_written(study, tmp_path)).until == study.until == WearTarget("wear_depth", 1e-5)
@@ -83,7 +78,7 @@ def test_points_end_at_their_target_each_at_its_own_count(tmp_path: Path) -> Non
     assert still.message.item() == "worn_volume stays below 1e-12 m3: it is 0 m3 at the last count"
 
 
-def _written(study: Study, folder: Path) -> Path:
+def _written(study, folder):
     path = folder / "effective.toml"
     path.write_text(format_study(study))
     return path

@@ -1,23 +1,18 @@
 """Two runs with one result file where nothing keeps them apart: neither takes anything for its own that is not."""
 
-from __future__ import annotations
-
 import contextlib
-from pathlib import Path
 
 import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
 from studyrunner.checkpoint import store as store_module
-from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.database import RESULTS
 from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
-from studyrunner.scene.scene import SceneFacts
-from studyrunner.study.study import Study
-from tests.studyrunner.faked_runs import Solver, Task
+from tests.mpi.launching import results
+from tests.studyrunner.faked_runs import Solver
 from tests.studyrunner.test_store import assert_same, entries_of, fill, kept, key, put
 
 SMALL = [
@@ -31,18 +26,18 @@ SMALL = [
 VARIANT = [*SMALL, "--set", "axes.excitation_amplitude=11"]
 
 
-def no_locks(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_locks(monkeypatch):
     """As on file systems that know none."""
     monkeypatch.setattr(store_module, "has_locks", lambda _: False)
 
 
 @pytest.fixture(autouse=True)
-def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path / "out.nc.progress"
 
 
-def test_each_run_has_a_file_of_its_own_and_takes_what_is_finished(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_run_has_a_file_of_its_own_and_takes_what_is_finished(path, monkeypatch):
     fill(path, range(2))
     no_locks(monkeypatch)
     first, second = Store(path), Store(path)
@@ -64,7 +59,7 @@ def test_each_run_has_a_file_of_its_own_and_takes_what_is_finished(path: Path, m
         store.close()
 
 
-def test_what_another_run_may_be_at_is_left_alone(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_another_run_may_be_at_is_left_alone(path, monkeypatch):
     no_locks(monkeypatch)
     with contextlib.closing(Store(path)) as first:
         put(first, RESULTS, 0)
@@ -84,42 +79,39 @@ def test_what_another_run_may_be_at_is_left_alone(path: Path, monkeypatch: pytes
 
 @pytest.mark.slow
 @pytest.mark.parametrize("at", [2, 6])
-def test_two_studies_with_one_result_file_do_not_mix(at: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_studies_with_one_result_file_do_not_mix(at, monkeypatch):
     """The second one runs from its start to its end while the first one is at work."""
     no_locks(monkeypatch)
     solver = Solver(monkeypatch)
     expected = {}
     for name, command in (("first.nc", SMALL), ("second.nc", VARIANT)):
         assert main([*command[:-1], name] if command is SMALL else [*command, "-o", name]) == 0
-        with xr.open_dataset(name) as result:
-            expected[name] = result.load().drop_vars("run_time")
+        expected[name] = results(name)
     status: list[int] = []
 
-    def run_the_other(_: Task, n_results: int) -> None:
+    def run_the_other(_, n_results):
         if n_results == at and not status:
             status.append(-1)
             status[0] = main(VARIANT)
-            with xr.open_dataset("out.nc") as result:
-                xr.testing.assert_identical(result.load().drop_vars("run_time"), expected["second.nc"])
+            xr.testing.assert_identical(results(), expected["second.nc"])
 
     solver.begin_again()
     solver.disturb = run_the_other
     monkeypatch.setattr("studyrunner.cli.take_endings", lambda: None)
     assert main(SMALL) == 0
     assert status == [0]
-    with xr.open_dataset("out.nc") as result:
-        xr.testing.assert_identical(result.load().drop_vars("run_time"), expected["first.nc"])
+    xr.testing.assert_identical(results(), expected["first.nc"])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("change", ["UPDATE results SET content=x'00'", "DELETE FROM results"])
-def test_a_result_that_goes_during_the_run_is_no_result(change: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_result_that_goes_during_the_run_is_no_result(change, monkeypatch):
     """As by a fault of the disk."""
     Solver(monkeypatch)
     assert main([*SMALL[:-1], "whole.nc"]) == 0
     own = gather._read_through
 
-    def read_through(study: Study, facts: SceneFacts, completion: CompletionIndex) -> object:
+    def read_through(study, facts, completion):
         with completion.store._transaction():
             completion.store._database.execute(f"{change} WHERE frequency = 110")
         return own(study, facts, completion)
@@ -132,5 +124,4 @@ def test_a_result_that_goes_during_the_run_is_no_result(change: str, monkeypatch
         assert int(there.sum()) == there.size // 2
         xr.testing.assert_equal(result.worn_volume.where(there), whole.worn_volume.where(there))
     assert main(SMALL) == 0
-    with xr.open_dataset("out.nc") as result, xr.open_dataset("whole.nc") as whole:
-        xr.testing.assert_identical(result.load().drop_vars("run_time"), whole.load().drop_vars("run_time"))
+    xr.testing.assert_identical(results(), results("whole.nc"))

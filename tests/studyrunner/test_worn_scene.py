@@ -1,9 +1,5 @@
 """Joints that are worn before their history begins."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -23,19 +19,19 @@ SLIDER = {
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory):
     """A history over twice the cycles, with the state in between."""
     path = tmp_path_factory.mktemp("worn") / "whole.nc"
     run_study("sdof_slider", path, overrides={**SLIDER, "slow_time.cycles": 2000}, progress=False).close()
     return path
 
 
-def worn(path: Path, **changes: object) -> dict[str, object]:
+def worn(path, **changes):
     return {**SLIDER, "scene.worn": {"result": str(path), "cycle": [0, 1000], **changes}}
 
 
 @pytest.mark.slow
-def test_a_history_that_begins_with_a_worn_joint_goes_on_where_the_other_ended(whole: Path, tmp_path: Path) -> None:
+def test_a_history_that_begins_with_a_worn_joint_goes_on_where_the_other_ended(whole, tmp_path):
     with xr.open_dataset(whole) as first, run_study("sdof_slider", tmp_path / "w.nc", overrides=worn(whole)) as later:
         before, states = first.squeeze(), later.squeeze()
         np.testing.assert_array_equal(states.worn_cycle, [0.0, 1000.0])
@@ -51,7 +47,7 @@ def test_a_history_that_begins_with_a_worn_joint_goes_on_where_the_other_ended(w
         np.testing.assert_allclose(states.worn_volume.isel(worn_cycle=1, cycle=-1), more, rtol=1e-2)
 
 
-def test_the_effective_study_holds_the_depths(whole: Path, tmp_path: Path) -> None:
+def test_the_effective_study_holds_the_depths(whole, tmp_path):
     text = format_study(read_study("sdof_slider", worn(whole)))
     path = tmp_path / "again.toml"
     path.write_text(text, encoding="utf-8")
@@ -65,7 +61,7 @@ def test_the_effective_study_holds_the_depths(whole: Path, tmp_path: Path) -> No
     assert again.dimensions["worn_cycle"] == (0.0, 1000.0)
 
 
-def test_depths_may_be_given(tmp_path: Path) -> None:
+def test_depths_may_be_given(tmp_path):
     study = read_study("sdof_slider", {**SLIDER, "scene.worn": {"depth": 5e-6}})
     assert study.scene.worn is not None
     assert study.scene.worn.depths(3) == (5e-6,) * 3
@@ -85,34 +81,31 @@ def test_depths_may_be_given(tmp_path: Path) -> None:
         ({"scheme": "explicit"}, "give one of ['adaptive']"),
         ({"result": "none.nc"}, 'scene.worn.result = "none.nc": there is no such file'),
         ({"depth": -1.0}, "scene.worn.depth = -1.0: give a finite number that is 0 or more"),
-        (
-            {"depth": [[1e-6], [2e-6], [3e-6]]},
-            "3 states with 2 cycle counts: give one cycle count",
-        ),
+        ({"depth": [[1e-6], [2e-6], [3e-6]]}, "3 states with 2 cycle counts: give one cycle count"),
         ({"depth": [[1e-6], [2e-6]], "cycle": ["a", 1]}, 'scene.worn.cycle = "a": give a finite number'),
         ({"result": 3}, "give the path of a result file, in quotes"),
     ],
 )
-def test_what_is_wrong_is_said(changes: dict[str, object], said: str, whole: Path) -> None:
+def test_what_is_wrong_is_said(changes, said, whole):
     with pytest.raises(UserError) as error:
         read_study("sdof_slider", worn(whole, **changes))
     assert said in str(error.value)
 
 
-def test_a_table_law_counts_depths_from_the_unworn_joint() -> None:
+def test_a_table_law_counts_depths_from_the_unworn_joint():
     law = {"law": "table", "pressure": [0.0], "depth": [0.0], "factor": [[1.0]]}
     with pytest.raises(UserError, match=r'wear.law = "table": give another law'):
         read_study("sdof_slider", {**SLIDER, "scene.worn": {"depth": 1e-6}, "wear": law})
 
 
-def test_the_result_that_the_depths_are_from_is_not_replaced(whole: Path) -> None:
+def test_the_result_that_the_depths_are_from_is_not_replaced(whole):
     before = whole.read_bytes()
     with pytest.raises(UserError, match=r"this one is read by the run"):
         run_study("sdof_slider", whole, overrides=worn(whole), progress=False, overwrite=True)
     assert whole.read_bytes() == before
 
 
-def test_a_file_that_is_no_whole_result_is_said(whole: Path, tmp_path: Path) -> None:
+def test_a_file_that_is_no_whole_result_is_said(whole, tmp_path):
     with xr.open_dataset(whole) as result:
         result[["wear_depth"]].isel(cycle=0, contact=0).to_netcdf(tmp_path / "part.nc")
     with pytest.raises(UserError, match=r"part\.nc: the file = damaged: give a result file"):

@@ -3,8 +3,6 @@
 `python -m tests.studies.fe_models.blade_root` writes it anew. A helper of the tests, which also refine it.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

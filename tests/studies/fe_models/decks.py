@@ -1,7 +1,5 @@
 """Decks that the tests write, after the manuals of CalculiX and Abaqus."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 SECTOR = Path(__file__).parent / "calculix_sector.inp"

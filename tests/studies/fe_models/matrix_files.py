@@ -1,7 +1,5 @@
 """Files with matrices that the tests write, after the manuals of the codes, and matrices to write."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Meshes in Gmsh's formats, written after its manual. A helper of the tests."""
 
-from __future__ import annotations
-
 GMSH_22 = """\
 $MeshFormat
 2.2 0 8

@@ -1,7 +1,5 @@
 """Mutations of good files: what a damaged or hostile copy of them may look like."""
 
-from __future__ import annotations
-
 import random
 
 _NUMBERS = (

@@ -1,7 +1,5 @@
 """A lap joint of two plates as the files of several programs have it, written after their manuals. For the tests."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness

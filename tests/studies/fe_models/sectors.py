@@ -1,7 +1,5 @@
 """A small bladed sector and a lap joint in any kind of element, meshes matching or not. A helper of the tests."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from studies.finite_element.elements.kinds import ELEMENT_KINDS

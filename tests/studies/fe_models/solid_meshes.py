@@ -1,7 +1,5 @@
 """Meshes of blocks in every kind of element, and CalculiX decks of them. A helper of the tests."""
 
-from __future__ import annotations
-
 import subprocess
 from itertools import pairwise
 

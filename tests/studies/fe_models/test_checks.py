@@ -1,9 +1,6 @@
 """What users get wrong when they export a model is found in the files, and said in one sentence."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +16,6 @@ from studies.fe_models.checks import (
     omega_squared_of,
     rotation_of_deck,
 )
-from studies.fe_models.deck.mesh import Deck
 from studies.fe_models.deck.read import read_deck
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import read_matrices
@@ -32,13 +28,13 @@ SI, MM = find_units("SI"), find_units("mm-t-s")
 AXIS = np.array([0.0, 0.0, 1.0])
 
 
-def changed(old: str, new: str, text: str | None = None) -> str:
+def changed(old, new, text=None):
     text = SECTOR.read_text() if text is None else text
     assert old in text
     return text.replace(old, new)
 
 
-def exported(folder: Path, text: str) -> tuple[Deck, Matrices]:
+def exported(folder, text):
     job = run_ccx(folder, text)
     return read_deck(folder / "sector.inp"), read_matrices(job)
 
@@ -118,7 +114,7 @@ def test_contact_still_in_the_stiffness(tmp_path):
     check_contact_removed(deck, matrices, nodes, ("BLADES", "DISKS"), SI)
 
 
-def springs(deck: Deck, pairs: list[tuple[int, int, float]]) -> Matrices:
+def springs(deck, pairs):
     """Springs along x, y and z between nodes of a mesh whose nodes weigh 1."""
     n = deck.node_numbers.size
     stiffness = sp.lil_array((n, n))

@@ -1,18 +1,14 @@
 """Decks come out as they are written."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from studies.fe_models.deck.mesh import Boundary, ContactPair, Material, SolidSection, Tie
+from studies.fe_models.deck.mesh import ContactPair, Material, SolidSection, Tie
 from studies.fe_models.deck.read import read_deck
 from tests.studies.fe_models.decks import CUBES, PART, write
 
 
-def line_of(text: str) -> int:
+def line_of(text):
     """Line of CUBES, counted from 1."""
     return CUBES.split("\n").index(text) + 1
 
@@ -57,7 +53,7 @@ def test_surfaces_and_contact(cubes):
     assert cubes.sections == (SolidSection("ALL", "STEEL"),)
 
 
-def held(boundary: Boundary) -> tuple[object, ...]:
+def held(boundary):
     return boundary.name, boundary.nodes.tolist(), boundary.first_dof, boundary.last_dof, boundary.value
 
 
@@ -139,7 +135,7 @@ def test_included_files(tmp_path):
     ],
     ids=["small", "Windows", "blanks", "tabs", "byte order mark"],
 )
-def test_case_line_ends_and_blanks_do_not_matter(tmp_path: Path, cubes, text: str):
+def test_case_line_ends_and_blanks_do_not_matter(tmp_path, cubes, text):
     deck = read_deck(write(tmp_path, text))
     np.testing.assert_array_equal(deck.coordinates, cubes.coordinates)
     assert deck.node_sets.keys() == cubes.node_sets.keys()

@@ -1,7 +1,5 @@
 """Element matrices against scikit-fem, CalculiX and closed forms."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reduced models against dense linear algebra, the bundled dovetail and closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +7,7 @@ import pytest
 from scipy import linalg, sparse
 
 from studies.fe_models.nodal_matrices import order_by_nodes
-from studies.finite_element.elements.assembly import (
-    assemble_mass,
-    assemble_stiffness,
-    spin_softening,
-)
+from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness, spin_softening
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.finite_element.joint import ordering, reduction
 from studies.finite_element.joint.cut_faces import find_cut_faces

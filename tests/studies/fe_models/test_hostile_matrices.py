@@ -1,9 +1,6 @@
 """Whatever files with matrices hold: they are read, or refused in one sentence, soon."""
 
-from __future__ import annotations
-
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,7 +22,7 @@ WRITERS = {
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_damaged_matrices(tmp_path, monkeypatch, name: str):
+def test_damaged_matrices(tmp_path, monkeypatch, name):
     """What is read is symmetric and finite; what is not ends in a sentence that names the file."""
     monkeypatch.setattr(nastran, "_AT_ONCE", 5)
     job = WRITERS[name](tmp_path)
@@ -65,7 +62,7 @@ def test_damaged_matrices(tmp_path, monkeypatch, name: str):
         ("job.pch", b"$\n", "job.pch: no matrix KAAX but none"),
     ],
 )
-def test_hostile_matrices(tmp_path: Path, name: str, content: bytes, sentence: str):
+def test_hostile_matrices(tmp_path, name, content, sentence):
     job = WRITERS[name](tmp_path)
     (tmp_path / name).write_bytes(content)
     began = time.process_time()

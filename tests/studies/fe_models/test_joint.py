@@ -1,7 +1,5 @@
 """Surfaces, pairing, cut faces: each against closed forms, and what is said of wrong ones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import minimize

@@ -1,9 +1,6 @@
 """Files that other libraries read; skipped where the library is not installed."""
 
-from __future__ import annotations
-
 import importlib.util
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +17,7 @@ from tests.studies.fe_models.mutations import mutate
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
 
 
-def write(folder: Path, text: str) -> Path:
+def write(folder, text):
     path = folder / "mesh.msh"
     path.write_text(text)
     return path
@@ -32,10 +29,7 @@ def test_gmsh_22(tmp_path):
     assert deck.node_numbers.tolist() == list(range(1, 10))  # those behind belong to no solid element
     assert deck.coordinates[6].tolist() == [1, 1, 1]
     blocks = {block.kind: (block.numbers.tolist(), block.nodes.tolist()) for block in deck.blocks}
-    assert blocks == {
-        "C3D8I": ([1], [[1, 2, 3, 4, 5, 6, 7, 8]]),
-        "C3D4": ([2, 3], [[5, 6, 7, 9], [5, 7, 8, 9]]),
-    }
+    assert blocks == {"C3D8I": ([1], [[1, 2, 3, 4, 5, 6, 7, 8]]), "C3D4": ([2, 3], [[5, 6, 7, 9], [5, 7, 8, 9]])}
     assert {name: nodes.tolist() for name, nodes in deck.node_sets.items()} == {
         "UNDER": [1, 2, 3, 4],
         "TOP": [5, 6, 7, 8],
@@ -63,7 +57,7 @@ def test_gmsh_41(tmp_path):
         ("6 1 0 1\n", "6 nan 0 1\n", "coordinate is not a finite number|is damaged"),
     ],
 )
-def test_damaged_gmsh(tmp_path, old: str, new: str, sentence: str):
+def test_damaged_gmsh(tmp_path, old, new, sentence):
     assert old in GMSH_22
     with pytest.raises(SceneError, match=sentence):
         read_library_mesh(write(tmp_path, GMSH_22.replace(old, new)))
@@ -72,7 +66,7 @@ def test_damaged_gmsh(tmp_path, old: str, new: str, sentence: str):
 @needs_meshio
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
-def test_mutated_gmsh(tmp_path, seed: int):
+def test_mutated_gmsh(tmp_path, seed):
     path = tmp_path / "mesh.msh"
     path.write_bytes(mutate((GMSH_22, GMSH_41)[seed % 2].encode(), seed))
     try:
@@ -148,7 +142,7 @@ ORDERS = {
 
 @needs_meshio
 @pytest.mark.parametrize("kind", ORDERS)
-def test_order_of_mid_side_nodes(tmp_path, kind: str):
+def test_order_of_mid_side_nodes(tmp_path, kind):
     number, corners, edges, expected = ORDERS[kind]
     points = np.array([*corners, *(np.mean([corners[a], corners[b]], axis=0) for a, b in edges)])
     nodes = "\n".join(f"{n} {x} {y} {z}" for n, (x, y, z) in enumerate(points, 1))

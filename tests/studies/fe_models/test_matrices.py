@@ -1,30 +1,19 @@
 """Matrices come out of the files of the codes as they went in."""
 
-from __future__ import annotations
-
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from studies.fe_models.deck.read import read_deck
 from studies.fe_models.matrices import nastran
-from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import SECTOR
-from tests.studies.fe_models.matrix_files import (
-    chain,
-    needs_ccx,
-    run_ccx,
-    write_abaqus,
-    write_calculix,
-    write_nastran,
-)
+from tests.studies.fe_models.matrix_files import chain, needs_ccx, run_ccx, write_abaqus, write_calculix, write_nastran
 
 
-def check(read: Matrices, nodes: tuple[int, ...], rtol: float) -> None:
+def check(read, nodes, rtol):
     """The matrices of `chain`, whose rows the reader sorts by node."""
     stiffness, mass, node, direction = chain(nodes)
     order = np.lexsort((direction, node))
@@ -42,14 +31,14 @@ def test_calculix(tmp_path):
 
 
 @pytest.mark.parametrize("triangles", ["lower", "upper", "both"])
-def test_abaqus(tmp_path, triangles: str):
+def test_abaqus(tmp_path, triangles):
     read = read_matrices(write_abaqus(tmp_path, triangles=triangles))
     check(read, (1, 2, -7), 1e-14)
     assert read.files == ("job_STIF1.mtx", "job_MASS1.mtx")
 
 
 @pytest.mark.parametrize(("large", "rtol"), [(True, 1e-9), (False, 6e-4)])
-def test_nastran(tmp_path, large: bool, rtol: float):
+def test_nastran(tmp_path, large, rtol):
     check(read_matrices(write_nastran(tmp_path, large=large)), (1, 2, 10), rtol)
 
 
@@ -65,7 +54,7 @@ def test_names_of_files(tmp_path):
         read_matrices(tmp_path / "other")
 
 
-def edit(path: Path, old: str, new: str, count: int = 1) -> None:
+def edit(path, old, new, count=1):
     text = path.read_text()
     changed = re.sub(old, new, text, count=count, flags=re.MULTILINE)
     assert changed != text
@@ -87,7 +76,7 @@ def edit(path: Path, old: str, new: str, count: int = 1) -> None:
         ("dof", r"10.3", "10.2", r"job.sti: dof 2 of node 10 has two rows"),
     ],
 )
-def test_wrong_files_of_calculix(tmp_path, end: str, old: str, new: str, sentence: str):
+def test_wrong_files_of_calculix(tmp_path, end, old, new, sentence):
     job = write_calculix(tmp_path)
     edit(job.with_suffix(f".{end}"), old, new)
     with pytest.raises(SceneError, match=sentence):
@@ -111,7 +100,7 @@ def test_twice_the_size(tmp_path):
         (r"^1,1, 1,1,", "9999999999999,1, 1,1,", "job_STIF1.mtx: node 9999999999999"),
     ],
 )
-def test_wrong_files_of_abaqus(tmp_path, old: str, new: str, sentence: str):
+def test_wrong_files_of_abaqus(tmp_path, old, new, sentence):
     job = write_abaqus(tmp_path)
     edit(tmp_path / "job_STIF1.mtx", old, new)
     with pytest.raises(SceneError, match=sentence):
@@ -129,7 +118,7 @@ def test_wrong_files_of_abaqus(tmp_path, old: str, new: str, sentence: str):
         ("MAAX", "BAAX", "no matrix MAAX but KAAX, PAX, BAAX"),
     ],
 )
-def test_wrong_files_of_nastran(tmp_path, old: str, new: str, sentence: str):
+def test_wrong_files_of_nastran(tmp_path, old, new, sentence):
     job = write_nastran(tmp_path)
     edit(job.with_suffix(".pch"), old, new, 0 if "AAX" in old and "AX " not in old else 1)
     with pytest.raises(SceneError, match=sentence):
@@ -160,7 +149,7 @@ def test_large_fields_are_read_in_arrays(tmp_path, monkeypatch):
     taken: list[bool] = []
     plain_lines = nastran._Reader._plain_lines
 
-    def watched(reader: nastran._Reader, lines: list[str]) -> bool:
+    def watched(reader, lines):
         taken.append(plain_lines(reader, lines))
         return taken[-1]
 

@@ -1,7 +1,5 @@
 """Result files made up in memory, small and smooth, with everything that a figure may need."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Numbers of a figure and of the file, picked by plain indexing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

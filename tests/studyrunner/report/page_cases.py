@@ -1,7 +1,5 @@
 """Result files of random numbers for the tests of the page: any axes, some points failed, loops of some pairs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

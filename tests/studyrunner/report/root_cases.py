@@ -1,7 +1,5 @@
 """Result files with a mesh, for the tests of the root in three dimensions."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

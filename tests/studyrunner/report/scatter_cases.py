@@ -1,7 +1,5 @@
 """Result files of samples whose worn volumes follow from what they draw, and of scenes that differ in their pairs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Result files whose errors are known: worn volume and response by a formula of the settings."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path

@@ -1,62 +1,36 @@
 """The page in a real headless browser without a network: slider, clicks and lists show the numbers of the file."""
 
-from __future__ import annotations
-
-import re
-import shutil
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
+from selenium.webdriver.common.keys import Keys
 
-from studyrunner.report.page.page import write_page
-from tests.studyrunner.report.page_cases import SENTENCES, as_result, build_file
+from tests.studyrunner.report.browsing import (
+    DESKTOP,
+    FACTORS,
+    MARKS,
+    PHONE,
+    choose,
+    click_at,
+    load,
+    map_pairs,
+    map_values,
+    messages,
+    numbers,
+    press,
+    selected,
+    write,
+)
+from tests.studyrunner.report.page_cases import SENTENCES, build_file
 
-CHROMIUM, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
-]
-
+pytestmark = MARKS
 EVIL = "</script><img src=x onerror='window.hurt=1'><script>window.hurt=2</script>"
-FACTORS = {"mm": 1e3, "µm": 1e6, "nm": 1e9, "mm³": 1e9, "µm³": 1e18, "mm³ per kcycle": 1e12, "kPa": 1e-3, "Pa": 1.0}
-FACTORS |= {"%": 100.0, "mPa": 1e3, "mN": 1e3, "m": 1.0, "N": 1.0, "mm³ per cycle": 1e9, "µm³ per cycle": 1e18, "": 1.0}
 FAILED = 5
-DESKTOP, PHONE = (1400, 1000), (400, 800)
-PATIENCE = 120.0  # s
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for argument in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-dev-shm-usage",
-        "--host-resolver-rules=MAP * ~NOTFOUND",
-        "--enable-unsafe-swiftshader",  # draws in three dimensions without a graphics card
-        f"--window-size={DESKTOP[0]},{DESKTOP[1]}",
-    ):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(DRIVER))
-    driver.set_script_timeout(PATIENCE)
-    driver.set_page_load_timeout(PATIENCE)
-    yield driver
-    driver.quit()
-
-
-@pytest.fixture(scope="module")
-def dataset() -> xr.Dataset:
+def dataset():
     """16 points, one of them failed; loops of two pairs; two responses; a hostile title and a hostile surface."""
     surfaces = [EVIL] * 12 + ["extrados"] * 12
     found = build_file(failed=[FAILED], loops=[2, 5], responses=("tip", EVIL), surfaces=surfaces)
@@ -65,14 +39,13 @@ def dataset() -> xr.Dataset:
 
 
 @pytest.fixture(scope="module")
-def address(dataset: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> str:
+def address(dataset, tmp_path_factory):
     return write(dataset, tmp_path_factory.mktemp("page"))
 
 
 @pytest.fixture
-def page(browser: Any, address: str, dataset: xr.Dataset) -> Iterator[Any]:
+def page(browser, address, dataset):
     """The page as it looks at first, without errors to the end; loaded only where another one was: that takes time."""
-    from selenium.webdriver.common.keys import Keys
 
     if browser.current_url != address:
         load(browser, address)
@@ -87,115 +60,7 @@ def page(browser: Any, address: str, dataset: xr.Dataset) -> Iterator[Any]:
     assert messages(browser) == []
 
 
-def messages(browser: Any) -> list[Any]:
-    """What the browser has to say of the page, but for hints on the speed of drawing."""
-    return [each for each in browser.get_log("browser") if each["source"] != "rendering"]
-
-
-def write(dataset: xr.Dataset, folder: Path) -> str:
-    write_page(as_result(dataset, folder / "some.nc"), [], folder / "index.html")
-    return (folder / "index.html").as_uri()
-
-
-def load(browser: Any, address: str) -> None:
-    browser.get(address)
-    assert messages(browser) == []
-    assert browser.execute_script("return document.getElementById('explore-failed').hidden")
-    assert not browser.execute_script("return document.getElementById('explore').hidden")
-
-
-def map_values(page: Any) -> list[list[list[float]]]:
-    script = "return document.getElementById('map-plot').data.map(trace => trace.z)"
-    found: list[list[list[float]]] = page.execute_script(script)
-    return found
-
-
-def map_pairs(page: Any) -> list[list[list[int]]]:
-    script = "return document.getElementById('map-plot').data.map(trace => trace.customdata)"
-    found: list[list[list[int]]] = page.execute_script(script)
-    return found
-
-
-def numbers(page: Any) -> dict[str, float]:
-    """The list beside the plots, back in the units of the file."""
-    rows = "[...document.querySelectorAll('#readout div')]"
-    found = {}
-    for name, text in page.execute_script(f"return {rows}.map(row => [row.dataset.name, row.children[1].title])"):
-        number, unit = re.fullmatch(r"(\S+?)(?:\s(.*))?", re.sub(r"(?<=\d)\s(?=\d{3}\b)", "", text)).groups()  # type: ignore[union-attr]
-        try:
-            found[name] = float(number) / FACTORS.get(unit or "", 1.0)
-        except ValueError:
-            found[name] = np.nan
-    return found
-
-
-def choose(page: Any, name: str, index: int) -> None:
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.support.select import Select
-
-    Select(page.find_element(By.CSS_SELECTOR, f"select[name='{name}']")).select_by_index(index)
-
-
-def press(page: Any, *keys: str) -> None:
-    from selenium.webdriver.common.by import By
-
-    page.find_element(By.ID, "cycle").send_keys(*keys)
-    wait_for_frame(page)
-
-
-def wait_for_frame(page: Any) -> None:
-    page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(() => arguments[0]()))")
-
-
-def click_at(page: Any, point: int, name: str = "response-plot") -> None:
-    """A press of the mouse on the pixel at which a plot shows a point; the point is picked afterwards."""
-    from selenium.webdriver import ActionChains
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.support.wait import WebDriverWait
-
-    script = """
-    const plot = document.getElementById(arguments[1]);
-    plot.scrollIntoView({block: "center", behavior: "instant"});
-    const box = plot.getBoundingClientRect();
-    for (const trace of plot.data) {
-      const at = (trace.customdata || []).indexOf(arguments[0]);
-      if (at < 0 || !Number.isFinite(trace.y[at])) continue;
-      const { xaxis, yaxis } = plot._fullLayout;
-      const x = xaxis._offset + xaxis.d2p(trace.x[at]), y = yaxis._offset + yaxis.d2p(trace.y[at]);
-      return [x - box.width / 2, y - box.height / 2];
-    }"""
-    plot = page.find_element(By.ID, name)
-    # behind the listener of the page
-    page.execute_script(
-        """
-        const plot = arguments[0];
-        plot.clicked = null;
-        plot.listens ??= plot.on("plotly_click", (event) => { plot.clicked = event.points[0].customdata; });
-        """,
-        plot,
-    )
-
-    def hover(_: Any) -> bool:
-        # a click is one on what the plot has found under the mouse before, which it does in its own time
-        x, y = page.execute_script(script, point, name)
-        actions = ActionChains(page).move_to_element_with_offset(plot, round(x) - 3, round(y) + 2)
-        actions.move_by_offset(3, -2).perform()
-        wait_for_frame(page)
-        found = page.execute_script("return (arguments[0]._hoverdata || []).map((each) => each.customdata)", plot)
-        return point in found
-
-    wait = WebDriverWait(page, PATIENCE, poll_frequency=0.1)
-    wait.until(hover)
-    ActionChains(page).click().perform()
-    wait.until(lambda _: page.execute_script("return arguments[0].clicked", plot) == point)
-
-
-def selected(page: Any) -> str:
-    text: str = page.execute_script("return document.getElementById('selected').textContent")
-    return text
-
-
-def assert_maps_are(page: Any, dataset: xr.Dataset, name: str, point: int, cycle: int) -> None:
+def assert_maps_are(page, dataset, name, point, cycle):
     """The maps show a variable of the file at a point and a cycle, in whatever unit fits."""
     values = dataset[name].values.reshape(-1, 5, 24)[point, cycle].astype("f4")
     shown = np.concatenate([np.ravel(panel) for panel in map_values(page)])
@@ -205,20 +70,18 @@ def assert_maps_are(page: Any, dataset: xr.Dataset, name: str, point: int, cycle
     np.testing.assert_allclose(shown, values[pairs] * FACTORS[unit], rtol=1e-6)
 
 
-def shown_point(dataset: xr.Dataset) -> int:
+def shown_point(dataset):
     return int(np.nanargmax(dataset["worn_volume"].values.reshape(16, 5)[:, -1]))
 
 
-def test_the_page_begins_with_the_shown_point_and_the_last_cycle(
-    browser: Any, address: str, dataset: xr.Dataset
-) -> None:
+def test_the_page_begins_with_the_shown_point_and_the_last_cycle(browser, address, dataset):
     load(browser, address)
     assert_maps_are(browser, dataset, "mean_pressure", shown_point(dataset), 4)
     expected = dataset["worn_volume"].values.reshape(16, 5)[shown_point(dataset), 4]
     assert numbers(browser)["worn_volume"] == pytest.approx(expected, rel=2e-6)
 
 
-def test_numbers_have_as_many_digits_as_their_errors_allow(page: Any, dataset: xr.Dataset) -> None:
+def test_numbers_have_as_many_digits_as_their_errors_allow(page, dataset):
     script = "return document.querySelector(`#readout div[data-name='${arguments[0]}'] dd`).textContent"
     point = shown_point(dataset)
     volume, error = (
@@ -231,7 +94,7 @@ def test_numbers_have_as_many_digits_as_their_errors_allow(page: Any, dataset: x
     assert page.execute_script(script, "error_estimate").endswith("\u00a0%")
 
 
-def test_a_narrow_window_cuts_off_nothing(browser: Any, address: str) -> None:
+def test_a_narrow_window_cuts_off_nothing(browser, address):
     browser.set_window_size(*PHONE)
     load(browser, address)
     chosen = "[...document.querySelectorAll('figure svg, figure img, .main-svg, #explore')]"
@@ -242,7 +105,7 @@ def test_a_narrow_window_cuts_off_nothing(browser: Any, address: str) -> None:
     assert max(right) <= width + 1
 
 
-def test_texts_of_the_file_do_nothing(page: Any, dataset: xr.Dataset) -> None:
+def test_texts_of_the_file_do_nothing(page, dataset):
     assert page.title == " ".join(EVIL.split())
     assert page.execute_script("return window.hurt === undefined")
     assert page.execute_script("return document.querySelectorAll('img').length") == 0
@@ -250,8 +113,7 @@ def test_texts_of_the_file_do_nothing(page: Any, dataset: xr.Dataset) -> None:
     assert "<img" in shown
 
 
-def test_the_slider_turns_the_maps_to_another_cycle(page: Any, dataset: xr.Dataset) -> None:
-    from selenium.webdriver.common.keys import Keys
+def test_the_slider_turns_the_maps_to_another_cycle(page, dataset):
 
     point = shown_point(dataset)
     assert_maps_are(page, dataset, "mean_pressure", point, 4)
@@ -265,8 +127,7 @@ def test_the_slider_turns_the_maps_to_another_cycle(page: Any, dataset: xr.Datas
     assert page.execute_script("return document.getElementById('cycle-count').textContent") == "0 of 400"
 
 
-def test_the_response_is_that_of_the_cycle_with_the_first_as_ghost(page: Any, dataset: xr.Dataset) -> None:
-    from selenium.webdriver.common.keys import Keys
+def test_the_response_is_that_of_the_cycle_with_the_first_as_ghost(page, dataset):
 
     press(page, Keys.HOME, Keys.ARROW_RIGHT)
     data = "document.getElementById('response-plot').data"
@@ -282,7 +143,7 @@ def test_the_response_is_that_of_the_cycle_with_the_first_as_ghost(page: Any, da
             np.testing.assert_allclose(np.array(y, dtype=float), expected * 1e6, rtol=1e-6)
 
 
-def test_a_click_on_the_response_picks_the_point(page: Any, dataset: xr.Dataset) -> None:
+def test_a_click_on_the_response_picks_the_point(page, dataset):
     coefficient = np.unravel_index(shown_point(dataset), (4, 2, 1, 1, 2, 1))[1]
     points = np.arange(16).reshape(4, 2, 1, 1, 2, 1)[:, coefficient].ravel()
     point = int([each for each in points if each not in (FAILED, shown_point(dataset))][3])
@@ -303,7 +164,7 @@ def test_a_click_on_the_response_picks_the_point(page: Any, dataset: xr.Dataset)
     assert page.execute_script("return document.querySelector(\"select[name='axis scheme']\").value") == str(index[4])
 
 
-def test_a_point_that_ended_early_is_shown_as_far_as_it_went(browser: Any, tmp_path: Path) -> None:
+def test_a_point_that_ended_early_is_shown_as_far_as_it_went(browser, tmp_path):
     """With the band of its error, and with a cross on the response where it has no value."""
     dataset = build_file(cycles=(0.0, 100.0, 200.0, 300.0, 400.0))
     early = int(shown_point(dataset))
@@ -329,7 +190,6 @@ def test_a_point_that_ended_early_is_shown_as_far_as_it_went(browser: Any, tmp_p
     (crosses,) = [x for meta, x, _ in browser.execute_script(script.format("response-plot")) if meta == "failed"]
     assert crosses == [dataset["frequency"].values[place[0]]]
     assert map_values(browser) == []
-    from selenium.webdriver.common.keys import Keys
 
     press(browser, Keys.HOME)
     assert map_values(browser) != []
@@ -337,7 +197,7 @@ def test_a_point_that_ended_early_is_shown_as_far_as_it_went(browser: Any, tmp_p
     assert messages(browser) == []
 
 
-def test_the_lists_pick_points_variables_and_responses(page: Any, dataset: xr.Dataset) -> None:
+def test_the_lists_pick_points_variables_and_responses(page, dataset):
     index = (2, 1, 0, 0, 1, 0)
     for name, place in zip(("frequency", "wear coefficient", "scheme"), (2, 1, 1), strict=True):
         choose(page, f"axis {name}", place)
@@ -350,7 +210,7 @@ def test_the_lists_pick_points_variables_and_responses(page: Any, dataset: xr.Da
     assert numbers(page)["response_amplitude"] == pytest.approx(expected, rel=2e-6)
 
 
-def test_histories_and_loops_are_those_of_the_point(page: Any, dataset: xr.Dataset) -> None:
+def test_histories_and_loops_are_those_of_the_point(page, dataset):
     choose(page, "axis frequency", 0)
     choose(page, "axis wear coefficient", 0)
     choose(page, "axis scheme", 1)
@@ -390,7 +250,7 @@ UNUSUAL: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("case", UNUSUAL)
-def test_unusual_files_load_without_errors(browser: Any, tmp_path: Path, case: str) -> None:
+def test_unusual_files_load_without_errors(browser, tmp_path, case):
     dataset = build_file(**UNUSUAL[case])
     load(browser, write(dataset, tmp_path))
     assert "frequency" in selected(browser) or "harmonics" in selected(browser)

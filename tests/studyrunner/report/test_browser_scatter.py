@@ -1,54 +1,34 @@
 """Samples in a headless browser: a click picks a sample, whose depths, drawn values and history are then shown."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
-import xarray as xr
 
+from tests.studyrunner.report.browsing import MARKS, choose, click_at, load, map_values, messages, selected, write
 from tests.studyrunner.report.scatter_cases import N_SAMPLES, sample_file
-from tests.studyrunner.report.test_browser import (  # noqa: F401 - the fixture is used by its name
-    CHROMIUM,
-    DRIVER,
-    browser,
-    choose,
-    click_at,
-    load,
-    map_values,
-    messages,
-    selected,
-    write,
-)
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
-]
+pytestmark = MARKS
 
 SAMPLE = 7
 
 
 @pytest.fixture(scope="module")
-def dataset() -> xr.Dataset:
+def dataset():
     return sample_file(factor=1.05, jump=1.0)
 
 
 @pytest.fixture(scope="module")
-def page(browser: Any, dataset: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Any:  # noqa: F811
+def page(browser, dataset, tmp_path_factory):
     load(browser, write(dataset, tmp_path_factory.mktemp("samples")))
     yield browser
     assert messages(browser) == []
 
 
-def traces(page: Any, plot: str) -> dict[str, Any]:
+def traces(page, plot):
     script = "return document.getElementById(arguments[0]).data.map((each) => [each.meta, [...each.x], [...each.y]])"
     return {meta: (x, y) for meta, x, y in page.execute_script(script, plot)}
 
 
-def test_a_click_picks_a_sample(page: Any, dataset: xr.Dataset) -> None:
+def test_a_click_picks_a_sample(page, dataset):
     click_at(page, SAMPLE, "scatter-plot")
     assert selected(page).startswith(f"frequency 190\u00a0Hz, sample {SAMPLE}:")
     depth = dataset["wear_depth_last"].values[0, 0, SAMPLE]
@@ -59,7 +39,7 @@ def test_a_click_picks_a_sample(page: Any, dataset: xr.Dataset) -> None:
     assert float(drawn.split()[0]) == pytest.approx(float(dataset["sample_wear_coefficient"][SAMPLE]), rel=1e-4)
 
 
-def test_two_groups_stand_apart(page: Any, dataset: xr.Dataset) -> None:
+def test_two_groups_stand_apart(page, dataset):
     found = traces(page, "scatter-plot")
     lower, upper = found["group 1"][1], found["group 2"][1]
     assert [len(lower), len(upper)] == [N_SAMPLES // 2] * 2
@@ -67,7 +47,7 @@ def test_two_groups_stand_apart(page: Any, dataset: xr.Dataset) -> None:
     np.testing.assert_allclose(np.sort(lower + upper), worn, rtol=1e-6)
 
 
-def test_bands_run_over_cycles_and_frequency(page: Any, dataset: xr.Dataset) -> None:
+def test_bands_run_over_cycles_and_frequency(page, dataset):
     worn = dataset["worn_volume"].values * 1e9
     x, y = traces(page, "band-plot")["median"]
     assert x == dataset["cycle"].values.tolist()

@@ -1,35 +1,25 @@
 """Trends in a headless browser: the lists change what is drawn, numbers against the file, a click picks the point."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from numpy.typing import NDArray
+from selenium.webdriver.support.wait import WebDriverWait
 
-from tests.studyrunner.report.page_cases import AXES, SENTENCES, build_file
-from tests.studyrunner.report.test_browser import (  # noqa: F401 - the fixture is used by its name
-    CHROMIUM,
-    DRIVER,
+from tests.studyrunner.report.browsing import (
+    MARKS,
     PATIENCE,
-    browser,
     choose,
+    click_at,
     load,
     messages,
-    press,
     selected,
-    wait_for_frame,
     write,
 )
+from tests.studyrunner.report.page_cases import AXES, SENTENCES, build_file
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
-]
+pytestmark = MARKS
 
 FOUR = {**AXES, "wear_coefficient": (5e-12, 1e-12, 5e-11), "excitation_amplitude": (0.5, 1.5)}
 SHAPE = (4, 3, 2, 1, 2, 1)
@@ -39,7 +29,7 @@ ERROR, PEAK, SHIFT = 1, 2, 3  # places in the lists; the worn volume stands firs
 
 
 @pytest.fixture(scope="module")
-def dataset() -> xr.Dataset:
+def dataset():
     """Four axes, one point failed; the peaks lie inside the frequencies, but for one combination."""
     found = build_file(FOUR, failed=[FAILED], cycles=(0.0, 100.0, 400.0))
     found["error_estimate"].values[...] = np.random.default_rng(3).uniform(0.01, 0.2, SHAPE)
@@ -55,12 +45,12 @@ def dataset() -> xr.Dataset:
 
 
 @pytest.fixture(scope="module")
-def address(dataset: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> str:
+def address(dataset, tmp_path_factory):
     return write(dataset, tmp_path_factory.mktemp("trends"))
 
 
 @pytest.fixture
-def page(browser: Any, address: str) -> Any:  # noqa: F811
+def page(browser, address):
     """The page with the first point picked and the lists as at first."""
     if browser.current_url != address:
         load(browser, address)
@@ -71,13 +61,13 @@ def page(browser: Any, address: str) -> Any:  # noqa: F811
     assert messages(browser) == []
 
 
-def pick(page: Any, place: Sequence[int]) -> None:
+def pick(page, place):
     for name, index, size in zip(FOUR, place, SHAPE, strict=True):
         if size > 1:
             choose(page, f"axis {name.replace('_', ' ')}", index)
 
 
-def drawn(page: Any, plot: str, meta: str) -> dict[str, Any]:
+def drawn(page, plot, meta):
     """A trace of a plot as plain lists; empty where there is none."""
     script = """
     const trace = document.getElementById(arguments[0]).data.find((each) => each.meta === arguments[1]);
@@ -90,17 +80,17 @@ def drawn(page: Any, plot: str, meta: str) -> dict[str, Any]:
     return found
 
 
-def shown(values: Any) -> NDArray[np.float64]:
+def shown(values):
     return np.array(values, dtype=float)
 
 
-def worn_of(dataset: xr.Dataset) -> NDArray[np.float64]:
+def worn_of(dataset):
     """Final worn volumes, mm3."""
     values: NDArray[np.float64] = dataset["worn_volume"].values[..., -1] * 1e9
     return values
 
 
-def test_the_line_is_that_of_the_file_with_its_errors(page: Any, dataset: xr.Dataset) -> None:
+def test_the_line_is_that_of_the_file_with_its_errors(page, dataset):
     worn = worn_of(dataset)
     line = drawn(page, "trend-plot", "trend")
     assert line["x"] == [1e-12, 5e-12, 5e-11]
@@ -113,7 +103,7 @@ def test_the_line_is_that_of_the_file_with_its_errors(page: Any, dataset: xr.Dat
     np.testing.assert_allclose(drawn(page, "trend-plot", "trend")["y"], worn[2, order, 0, 0, 1, 0], rtol=1e-6)
 
 
-def test_peaks_and_shifts_are_those_of_the_parabolas(page: Any, dataset: xr.Dataset) -> None:
+def test_peaks_and_shifts_are_those_of_the_parabolas(page, dataset):
     pick(page, (1, 2, 1, 0, 1, 0))
     choose(page, "trend quantity", PEAK)
     line = drawn(page, "trend-plot", "trend")
@@ -126,7 +116,7 @@ def test_peaks_and_shifts_are_those_of_the_parabolas(page: Any, dataset: xr.Data
     np.testing.assert_allclose(drawn(page, "trend-plot", "trend")["bars"], expected, rtol=1e-3)
 
 
-def test_the_map_is_that_of_any_two_axes(page: Any, dataset: xr.Dataset) -> None:
+def test_the_map_is_that_of_any_two_axes(page, dataset):
     worn = worn_of(dataset)
     np.testing.assert_allclose(drawn(page, "trend-map-plot", "map")["z"], worn[1, [1, 0, 2], :, 0, 0, 0].T, rtol=1e-6)
     choose(page, "trend across", 0)
@@ -139,7 +129,7 @@ def test_the_map_is_that_of_any_two_axes(page: Any, dataset: xr.Dataset) -> None
     np.testing.assert_allclose(drawn(page, "trend-map-plot", "map")["z"], errors, rtol=1e-6)
 
 
-def test_a_failed_point_is_a_cross_that_says_why(page: Any, dataset: xr.Dataset) -> None:
+def test_a_failed_point_is_a_cross_that_says_why(page, dataset):
     place = np.unravel_index(FAILED, SHAPE)
     pick(page, [int(each) for each in place])
     for plot in ("trend-plot", "trend-map-plot"):
@@ -155,49 +145,13 @@ def test_a_failed_point_is_a_cross_that_says_why(page: Any, dataset: xr.Dataset)
     assert missing.sum() == 1
 
 
-def click(page: Any, plot: str, meta: str, point: int) -> None:
-    """A press of the mouse where a plot shows a point."""
-    from selenium.webdriver import ActionChains
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.support.wait import WebDriverWait
-
-    script = """
-    const [plot, meta, point] = arguments;
-    plot.scrollIntoView({block: "center", behavior: "instant"});
-    const trace = plot.data.find((each) => each.meta === meta);
-    const { xaxis, yaxis } = plot._fullLayout;
-    const box = plot.getBoundingClientRect();
-    let [x, y] = [null, null];
-    if (trace.z) {
-      trace.customdata.forEach((line, row) => { if (line.includes(point)) [x, y] = [line.indexOf(point), row]; });
-    } else {
-      const at = trace.customdata.indexOf(point);
-      [x, y] = [trace.x[at], trace.y[at]];
-    }
-    return [xaxis._offset + xaxis.d2p(x) - box.width / 2, yaxis._offset + yaxis.d2p(y) - box.height / 2];
-    """
-    element = page.find_element(By.ID, plot)
-
-    def hover(_: Any) -> bool:
-        x, y = page.execute_script(script, element, meta, point)
-        actions = ActionChains(page).move_to_element_with_offset(element, round(x) - 3, round(y) + 2)
-        actions.move_by_offset(3, -2).perform()
-        wait_for_frame(page)
-        found = page.execute_script("return (arguments[0]._hoverdata || []).map((each) => each.customdata)", element)
-        return point in found
-
-    WebDriverWait(page, PATIENCE, poll_frequency=0.1).until(hover)
-    ActionChains(page).click().perform()
-
-
 @pytest.mark.parametrize(
     ("plot", "meta", "place"),
     [("trend-plot", "trend", (1, 1, 1, 0, 0, 0)), ("trend-map-plot", "map", (1, 0, 0, 0, 0, 0))],
 )
-def test_a_click_picks_the_point_for_the_whole_page(page: Any, plot: str, meta: str, place: tuple[int, ...]) -> None:
-    from selenium.webdriver.support.wait import WebDriverWait
+def test_a_click_picks_the_point_for_the_whole_page(page, plot, meta, place):
 
-    click(page, plot, meta, int(np.ravel_multi_index(place, SHAPE)))
+    click_at(page, int(np.ravel_multi_index(place, SHAPE)), plot, meta)
     scheme, frequency = FOUR["scheme"][place[4]], FOUR["frequency"][place[0]]
     WebDriverWait(page, PATIENCE).until(lambda _: f"scheme {scheme}: {SENTENCES[0]}" in selected(page))
     assert selected(page).startswith(f"frequency {frequency:g}\u00a0Hz, ")

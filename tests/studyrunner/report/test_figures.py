@@ -1,7 +1,5 @@
 """All figures together: which there are in each case, that none is empty, that axes have units."""
 
-from __future__ import annotations
-
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -39,11 +37,11 @@ ALL_DRAWINGS = [
 WITHOUT_UNITS = {"contact pair", "nodal diameter", "estimated relative error", "scheme", "sweep", ""}
 
 
-def _complete() -> Result:
+def _complete():
     return with_sector(with_loops(make_result()))
 
 
-def _names(items: list[Drawing | Missing | Table], kind: type) -> list[str]:
+def _names(items, kind):
     return [item.name for item in items if isinstance(item, kind)]
 
 
@@ -85,7 +83,7 @@ LAID_OUT = {"scattered pairs", "two responses"}
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_no_figure_is_empty_and_all_axes_have_units(case: str) -> None:
+def test_no_figure_is_empty_and_all_axes_have_units(case):
     items = list(draw_report(CASES[case]()))
     names = [item.name for item in items]
     assert len(set(names)) == len(names)
@@ -106,7 +104,7 @@ def test_no_figure_is_empty_and_all_axes_have_units(case: str) -> None:
             assert all(len(row) == len(item.columns) for row in item.rows)
 
 
-def _check_panels(drawing: Drawing) -> None:
+def _check_panels(drawing):
     assert drawing.figure.axes
     for panel in drawing.figure.axes:
         values = [np.ma.masked_invalid(line.get_ydata()).compressed() for line in panel.get_lines()]
@@ -122,13 +120,13 @@ def _check_panels(drawing: Drawing) -> None:
 
 
 @pytest.mark.slow
-def test_a_complete_file_gives_every_figure_in_its_order() -> None:
+def test_a_complete_file_gives_every_figure_in_its_order():
     items = list(draw_report(_complete()))
     assert _names(items, Drawing) == ALL_DRAWINGS
     assert _names(items, Missing) == []
 
 
-def test_what_is_missing_says_which_output_to_ask_for() -> None:
+def test_what_is_missing_says_which_output_to_ask_for():
     items = list(draw_report(CASES["nothing asked for"]()))
     sentences = {item.name: item.sentence for item in items if isinstance(item, Missing)}
     assert sentences["worn_volume"] == "Add worn_volume to [outputs] variables."
@@ -139,7 +137,7 @@ def test_what_is_missing_says_which_output_to_ask_for() -> None:
     assert sentences["natural_frequencies"].startswith("Add natural_frequency and mesh to [outputs] variables.")
 
 
-def test_all_points_failed() -> None:
+def test_all_points_failed():
     items = list(draw_report(CASES["all failed"]()))
     assert _names(items, Drawing) == ["outcome_map"]
     assert "results" in _names(items, Missing)
@@ -149,7 +147,7 @@ def test_all_points_failed() -> None:
 
 
 @pytest.mark.slow
-def test_figures_are_saved_as_svg_and_png(tmp_path) -> None:
+def test_figures_are_saved_as_svg_and_png(tmp_path):
     before = dict(mpl.rcParams)
     # one in three dimensions is in the tests of the root; saving takes long
     for item in draw_report(make_result()):
@@ -167,7 +165,7 @@ def test_figures_are_saved_as_svg_and_png(tmp_path) -> None:
     assert dict(mpl.rcParams) == before
 
 
-def test_variables_are_read_no_more_than_needed(tmp_path) -> None:
+def test_variables_are_read_no_more_than_needed(tmp_path):
     path = tmp_path / "made.nc"
     make_result().dataset.to_netcdf(path)
     with xr.open_dataset(path) as dataset:
@@ -179,7 +177,7 @@ def test_variables_are_read_no_more_than_needed(tmp_path) -> None:
 
 
 @pytest.mark.slow
-def test_an_exact_answer_is_drawn_beside_the_computed_one() -> None:
+def test_an_exact_answer_is_drawn_beside_the_computed_one():
     result = make_result()
     exact = 1.02 * result.dataset["worn_volume"]
     amplitude = 1.01 * result.dataset["response_amplitude"]

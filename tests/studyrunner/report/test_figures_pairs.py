@@ -1,22 +1,16 @@
 """Figures of the contact pairs: what is drawn are the numbers of the file, each at its place."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
-from numpy.typing import NDArray
 
 from studyrunner.report.drawing import Drawing
 from studyrunner.report.page_contents import draw_report
-from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.figure_cases import make_result, with_loops, with_variables
 from tests.studyrunner.report.figure_numbers import cells_of, draw_figure, lines_of, values_of
 
 
-def test_wear_depth_of_each_pair() -> None:
+def test_wear_depth_of_each_pair():
     result = make_result()
     lines = lines_of(draw_figure(result, "wear_depth").figure.axes[0])
     for number, label in enumerate(("implicit scheme", "explicit scheme")):
@@ -25,14 +19,14 @@ def test_wear_depth_of_each_pair() -> None:
         np.testing.assert_allclose(y, 1e6 * values_of(result, "wear_depth", frequency=2, scheme=number, cycle=-1))
 
 
-def _by_position(result: Result, values: NDArray[np.float64], pairs: range) -> NDArray[np.float64]:
+def _by_position(result, values, pairs):
     """Values of a flank as (across, along): along grows with z, across goes down, where x falls."""
     x, z = result.dataset["contact_x"].values, result.dataset["contact_z"].values
     order = sorted(pairs, key=lambda pair: (-round(x[pair], 6), round(z[pair], 6)))
     return values[order].reshape(2, 3)
 
 
-def test_pressure_on_both_flanks_at_the_first_and_the_last_cycle() -> None:
+def test_pressure_on_both_flanks_at_the_first_and_the_last_cycle():
     result = make_result()
     panels = draw_figure(result, "mean_pressure").figure.axes[:4]
     titles = [panel.get_title() for panel in panels]
@@ -53,7 +47,7 @@ def test_pressure_on_both_flanks_at_the_first_and_the_last_cycle() -> None:
         )
 
 
-def test_worn_profile() -> None:
+def test_worn_profile():
     result = make_result()
     panels = draw_figure(result, "worn_profile").figure.axes
     depth = 1e6 * values_of(result, "wear_depth", frequency=2, scheme=0, cycle=-1)
@@ -75,10 +69,7 @@ def test_worn_profile() -> None:
         ("pair_motion", lambda move, _force: (1e6 * move[..., 1], 1e6 * move[..., 2])),
     ],
 )
-def test_loops_are_closed_and_those_of_the_file(
-    name: str,
-    take: Callable[[NDArray[np.float64], NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]],
-) -> None:
+def test_loops_are_closed_and_those_of_the_file(name, take):
     result = with_loops(make_result())
     drawing = draw_figure(result, name)
     assert [panel.get_title() for panel in drawing.figure.axes[:2]] == ["pair 0", "pair 11"]
@@ -95,14 +86,14 @@ def test_loops_are_closed_and_those_of_the_file(
         assert f"pair 0 {100 * share:.0f} %" in drawing.caption
 
 
-def test_only_the_most_worn_of_many_loops_are_shown() -> None:
+def test_only_the_most_worn_of_many_loops_are_shown():
     drawing = draw_figure(with_loops(make_result(), contacts=range(12)), "fretting_loops")
     assert [panel.get_title() for panel in drawing.figure.axes[:3]] == ["pair 9", "pair 10", "pair 11"]
     assert "pairs 0, 1, 2, 3, 4, 5, 6, 7, ..." in drawing.caption
 
 
 @pytest.mark.slow
-def test_a_pair_with_one_tangent_has_no_path() -> None:
+def test_a_pair_with_one_tangent_has_no_path():
     result = with_loops(make_result())
     only = result.dataset["loop_displacement"].where(result.dataset["component"] != "tangent_2")
     items = {item.name: item for item in draw_report(with_variables(result, loop_displacement=only))}
@@ -113,7 +104,7 @@ def test_a_pair_with_one_tangent_has_no_path() -> None:
     assert loops.figure.axes[0].get_xlabel() == "displacement along\ntangent 1 (µm)"
 
 
-def test_tangents_are_told_in_the_words_of_the_scene() -> None:
+def test_tangents_are_told_in_the_words_of_the_scene():
     """Names of the bundled scene are those of its page: first tangent axial, second along the flank."""
     first, second = "axial displacement (µm)", "displacement along the flank (µm)"
     result = with_loops(make_result())

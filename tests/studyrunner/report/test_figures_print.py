@@ -1,15 +1,11 @@
 """Figures on paper: legends cover no curve, nothing is cut off or runs into its neighbour, all text can be read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.legend import Legend
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
@@ -34,7 +30,7 @@ CASES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_nothing_is_covered_or_cut_off(case: str) -> None:
+def test_nothing_is_covered_or_cut_off(case):
     result: Callable[[], Result] = CASES[case]
     drawings = [item for item in draw_report(result()) if isinstance(item, Drawing)]
     assert sum(bool(_legends(drawing)) for drawing in drawings) >= 3
@@ -64,17 +60,17 @@ def test_nothing_is_covered_or_cut_off(case: str) -> None:
             assert not text.get_text() or text.get_fontsize() >= _LEAST_SIZE, (drawing.name, text.get_text())
 
 
-def _legends(drawing: Drawing) -> list[Legend]:
+def _legends(drawing):
     own = [panel.get_legend() for panel in drawing.figure.axes]
     return [*drawing.figure.legends, *(legend for legend in own if legend is not None)]
 
 
-def _overlap(one: Bbox, other: Bbox) -> bool:
+def _overlap(one, other):
     common = Bbox.intersection(one, other)
     return common is not None and bool(np.min(common.size) > _THIN)
 
 
-def test_a_legend_names_each_label_once_and_its_figure_grows() -> None:
+def test_a_legend_names_each_label_once_and_its_figure_grows():
     with style():
         heights = []
         for long in ("", " of a name that is much longer than half of the figure is wide, and longer still"):
@@ -93,7 +89,7 @@ def test_a_legend_names_each_label_once_and_its_figure_grows() -> None:
 
 
 @pytest.mark.slow
-def test_figures_of_one_panel_are_saved_for_a_column_too(tmp_path: Path) -> None:
+def test_figures_of_one_panel_are_saved_for_a_column_too(tmp_path):
     drawings = {item.name: item for item in draw_report(make_result()) if isinstance(item, Drawing)}
     assert drawings["final_worn_volume"].fits_column
     assert not drawings["worn_volume_map"].fits_column

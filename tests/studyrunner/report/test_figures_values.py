@@ -1,7 +1,5 @@
 """What is drawn are the numbers of the file: data of the artists against the dataset, picked by plain indexing."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -12,7 +10,7 @@ from tests.studyrunner.report.figure_cases import make_result, with_sector, with
 from tests.studyrunner.report.figure_numbers import cells_of, draw_figure, find_table, lines_of, values_of
 
 
-def test_worn_volume_over_cycles() -> None:
+def test_worn_volume_over_cycles():
     result = make_result()
     drawing = draw_figure(result, "worn_volume")
     lines = lines_of(drawing.figure.axes[0])
@@ -26,7 +24,7 @@ def test_worn_volume_over_cycles() -> None:
 
 
 @pytest.mark.parametrize(("name", "factor"), [("worn_volume", 1e9), ("wear_rate", 1e12)])
-def test_maps_over_frequency_and_cycles(name: str, factor: float) -> None:
+def test_maps_over_frequency_and_cycles(name, factor):
     result = make_result(frequency=[204.0, 200.0, 202.0, 201.0], failed=[2])
     drawing = draw_figure(result, f"{name}_map")
     for number in (0, 1):
@@ -38,7 +36,7 @@ def test_maps_over_frequency_and_cycles(name: str, factor: float) -> None:
     assert re.search(rf"The largest is {largest:.4g} mm³", drawing.caption)
 
 
-def test_frequency_response_of_both_sweeps_is_open_at_the_fold() -> None:
+def test_frequency_response_of_both_sweeps_is_open_at_the_fold():
     result = make_result(sweep=["up", "down"], scheme=["implicit"])
     branch, fold = result.dataset["branch"].copy(), result.dataset["fold_frequency"].copy()
     branch[2:, ..., 0] = 1
@@ -58,7 +56,7 @@ def test_frequency_response_of_both_sweeps_is_open_at_the_fold() -> None:
     assert "201.4 Hz (sweep up)" in drawing.caption
 
 
-def test_unstable_states_are_ringed() -> None:
+def test_unstable_states_are_ringed():
     result = make_result(scheme=["implicit"])
     stable = result.dataset["stable"].copy()
     stable[1, ..., -1] = 0
@@ -67,7 +65,7 @@ def test_unstable_states_are_ringed() -> None:
     np.testing.assert_allclose(y, 1e3 * values_of(result, "response_amplitude", frequency=1, cycle=-1))
 
 
-def test_natural_frequencies_and_mesh() -> None:
+def test_natural_frequencies_and_mesh():
     result = with_sector(make_result())
     drawing = draw_figure(result, "natural_frequencies")
     left, right = drawing.figure.axes
@@ -83,7 +81,7 @@ def test_natural_frequencies_and_mesh() -> None:
     assert "The lowest is 200 Hz" in drawing.caption
 
 
-def test_outcome_map_tells_each_number_and_its_sentence() -> None:
+def test_outcome_map_tells_each_number_and_its_sentence():
     result = make_result(failed=[2, 5])
     drawing = draw_figure(result, "outcome_map")
     panel = drawing.figure.axes[0]
@@ -95,7 +93,7 @@ def test_outcome_map_tells_each_number_and_its_sentence() -> None:
     assert "3: The branch was lost." in drawing.caption
 
 
-def test_table_of_folds_and_jumps() -> None:
+def test_table_of_folds_and_jumps():
     result = make_result(sweep=["up", "down"])
     fold, jumps = result.dataset["fold_frequency"].copy(), result.dataset["jump_cycle"].copy()
     fold[1, ..., 1] = 201.5
@@ -109,7 +107,7 @@ def test_table_of_folds_and_jumps() -> None:
     )
 
 
-def test_table_of_stability() -> None:
+def test_table_of_stability():
     assert find_table(make_result(), "stability") is None
     result = make_result(failed=[7])
     limit, oscillates = result.dataset["step_limit"].copy(), result.dataset["oscillates"].copy()

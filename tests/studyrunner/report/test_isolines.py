@@ -1,9 +1,6 @@
 """Isolines of maps: where they run, what is written at them, and that no label hides another line."""
 
-from __future__ import annotations
-
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.contour import ContourSet
 
@@ -11,11 +8,11 @@ from studyrunner.report.drawing import new_panels, style
 from studyrunner.report.isolines import add_colour_bar, add_isolines, find_levels
 
 
-def _contours(panel: Axes) -> list[ContourSet]:
+def _contours(panel):
     return [one for one in panel.collections if isinstance(one, ContourSet)]
 
 
-def test_lines_run_where_a_plane_has_their_level_and_tell_it() -> None:
+def test_lines_run_where_a_plane_has_their_level_and_tell_it():
     x, y = np.linspace(0.0, 10.0, 6), np.linspace(0.0, 4.0, 5)
     norm = Normalize(0.0, 10.0)
     with style():

@@ -1,9 +1,5 @@
 """What the report says of how well worn volumes are known: bands, bars, marks, sentences; and of older files."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 from matplotlib.collections import LineCollection
 
@@ -22,14 +18,14 @@ from tests.studyrunner.report.figure_numbers import draw_figure, lines_of, value
 EARLY, ABOVE, SENSITIVE, LOST = 2, 4, 5, 7
 
 
-def mixed() -> Result:
+def mixed():
     """One point ended early, one is above rtol, one sensitive and one has no state; others are known to rtol or not."""
     endings = {EARLY: (3, 6000.0), ABOVE: (6, 20_000.0), SENSITIVE: (15, 20_000.0)}
     messages = {ABOVE: "from cycle 1000 on the wear rate is known to 2.6 % only", EARLY: "it broke off"}
     return with_endings(make_result(failed=[LOST]), endings, messages)
 
 
-def test_sentences_begin_with_the_worn_volume(tmp_path: Path) -> None:
+def test_sentences_begin_with_the_worn_volume(tmp_path):
     result = mixed()
     assert tell_volumes(result) == (
         "The worn volume of 2 of 8 points is known to rtol = 1 %, of 4 less well, 2 not computed to the end; the worst"
@@ -44,7 +40,7 @@ def test_sentences_begin_with_the_worn_volume(tmp_path: Path) -> None:
     assert "202 Hz, implicit scheme: from cycle 1000 on the wear rate is known to 2.6 % only" in html
 
 
-def test_points_are_named_with_cycle_and_error() -> None:
+def test_points_are_named_with_cycle_and_error():
     result = mixed()
     assert describe_ended(result, 6) == [
         "202 Hz, implicit scheme: from cycle 1000 on the wear rate is known to 2.6 % only"
@@ -57,7 +53,7 @@ def test_points_are_named_with_cycle_and_error() -> None:
     assert (len(lines), lines[-1]) == (11, "and 30 more")
 
 
-def test_errors_that_were_never_estimated_say_so() -> None:
+def test_errors_that_were_never_estimated_say_so():
     result = mixed()
     estimates = result.dataset["error_estimate"].copy(deep=True)
     estimates.values.flat[[0, 1]] = np.nan
@@ -70,7 +66,7 @@ def test_errors_that_were_never_estimated_say_so() -> None:
     )
 
 
-def test_an_inaccurate_state_is_no_volume_above_rtol() -> None:
+def test_an_inaccurate_state_is_no_volume_above_rtol():
     """Table, header, marks and remarks count alike: known to rtol is what its error says, whatever the outcome."""
     result = with_endings(make_result(), {0: (6, 20_000.0)}, {0: "the response is known to 3 % only"})
     assert float(result.errors.flat[0]) < 0.01
@@ -84,7 +80,7 @@ def test_an_inaccurate_state_is_no_volume_above_rtol() -> None:
     assert remarks["0"] == "the response is known to 3 % only."
 
 
-def test_the_report_and_the_run_advise_the_same() -> None:
+def test_the_report_and_the_run_advise_the_same():
     """Settings of a point by its file are those by its study."""
     changes = ("axes.frequency=[200, 201]", "axes.scheme=['implicit', 'explicit']", "solver.harmonics=5")
     study = read_study("sdof_slider", (*changes, "slow_time.largest_depth=1e-6"))
@@ -94,7 +90,7 @@ def test_the_report_and_the_run_advise_the_same() -> None:
         assert settings_of(result, place) == of_study(study, place)
 
 
-def test_a_point_at_its_target_is_drawn_where_it_ended() -> None:
+def test_a_point_at_its_target_is_drawn_where_it_ended():
     """It is computed to the end, with no values at later counts."""
     result = with_endings(make_result(), dict.fromkeys(range(8), (0, 6000.0)), {})
     assert result.last_kept(result.shown_point()) == 2
@@ -102,7 +98,7 @@ def test_a_point_at_its_target_is_drawn_where_it_ended() -> None:
     assert "5000 cycles" in caption
 
 
-def test_a_history_that_ended_early_has_a_cross_where_it_did() -> None:
+def test_a_history_that_ended_early_has_a_cross_where_it_did():
     result = with_endings(make_result(), {5: (3, 6000.0)}, {})
     drawing = draw_figure(result, "worn_volume")
     lines = lines_of(drawing.figure.axes[0])
@@ -112,7 +108,7 @@ def test_a_history_that_ended_early_has_a_cross_where_it_did() -> None:
     assert "Ended early, at 6000 cycles: branch lost" in drawing.caption.replace("\N{NO-BREAK SPACE}", "")
 
 
-def test_final_volumes_have_bars_and_marks() -> None:
+def test_final_volumes_have_bars_and_marks():
     result = mixed()
     drawing = draw_figure(result, "final_worn_volume")
     panel = drawing.figure.axes[0]

@@ -1,9 +1,5 @@
 """Report, page, statistics and joined results of missions."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -24,7 +20,7 @@ SCATTER = {"samples": 8, "friction_coefficient": {"normal": {"std": 0.03}}, "nor
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def results(tmp_path_factory):
     """A folder with results of one point, of a grid in which a block fails for some, and of samples."""
     folder = tmp_path_factory.mktemp("missions")
     study = folder / "missions.toml"
@@ -42,11 +38,11 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def items(result: Result) -> dict[str, Drawing | Missing | Table]:
+def items(result):
     return {item.name: item for item in draw_report(result)}
 
 
-def test_the_report_tells_of_missions_and_blocks(results: Path) -> None:
+def test_the_report_tells_of_missions_and_blocks(results):
     result = open_for_report(results / "grid.nc")
     found = items(result)
     drawn = {name for name, item in found.items() if isinstance(item, Drawing)}
@@ -73,16 +69,14 @@ def test_the_report_tells_of_missions_and_blocks(results: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["grid", "scatter", "failed"])
-def test_page_and_files_for_paraview_are_written(
-    results: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_page_and_files_for_paraview_are_written(results, tmp_path, name, capsys):
     assert main([str(results / f"{name}.nc"), "-o", str(tmp_path / name)]) == 0, capsys.readouterr().err
     page = (tmp_path / name / "index.html").read_text(encoding="utf-8")
     assert "run-up, cruise, heavy" in page
     assert '"counted":"mission"' in page.replace(" ", "")
 
 
-def test_missing_variables_are_named(results: Path) -> None:
+def test_missing_variables_are_named(results):
     result = open_for_report(results / "one.nc")
     assert result.blocks is not None
     blocks = result.blocks.drop_vars(["block_share", "response_amplitude"])
@@ -91,7 +85,7 @@ def test_missing_variables_are_named(results: Path) -> None:
     assert isinstance(found["blocks"], Missing)
 
 
-def test_samples_of_missions_have_statistics(results: Path) -> None:
+def test_samples_of_missions_have_statistics(results):
     with xr.open_dataset(results / "scatter.nc") as dataset:
         statistics = dataset.fretwear.worn_volume_statistics([0.5])
         assert statistics.worn_volume_mean.dims[-2:] == ("mission", "bound")
@@ -100,7 +94,7 @@ def test_samples_of_missions_have_statistics(results: Path) -> None:
         assert dataset.fretwear.response().dims == dataset.response_amplitude.dims
 
 
-def test_results_of_missions_are_joined(results: Path) -> None:
+def test_results_of_missions_are_joined(results):
     with xr.open_dataset(results / "grid.nc") as dataset:
         whole = dataset.load()
     parts = [whole.isel(frequency=[place]) for place in (1, 0)]

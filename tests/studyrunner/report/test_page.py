@@ -1,7 +1,5 @@
 """The page as text: complete in itself, texts of the file harmless, every item in its place."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json
@@ -16,7 +14,7 @@ import pytest
 from studyrunner.report.drawing import Drawing, Missing, Table, new_figure
 from studyrunner.report.page import page
 from studyrunner.report.page.data import MOST_POINTS
-from studyrunner.report.page.page import Summary, write_page
+from studyrunner.report.page.page import write_page
 from tests.studyrunner.report.page_cases import AXES, as_result, build_file
 
 EVIL = "</script></title><img src=x onerror=alert(1)><script>alert(2)</script>&amp;\"'{{ 7 * 7 }}{% endif %}"
@@ -25,7 +23,7 @@ EVIL = "</script></title><img src=x onerror=alert(1)><script>alert(2)</script>&a
 class Reader(HTMLParser):
     """Elements with their attributes, and the text of each script."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text):
         super().__init__(convert_charrefs=True)
         self.elements: list[tuple[str, dict[str, str | None]]] = []
         self.scripts: list[str] = []
@@ -34,26 +32,26 @@ class Reader(HTMLParser):
         self.feed(text)
         self.close()
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         self.elements.append((tag, dict(attrs)))
         self._in_script = tag == "script"
         if self._in_script:
             self.scripts.append("")
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         self._in_script = self._in_script and tag != "script"
 
-    def handle_data(self, data: str) -> None:
+    def handle_data(self, data):
         if self._in_script:
             self.scripts[-1] += data
         else:
             self.text += data
 
-    def all(self, tag: str) -> list[dict[str, str | None]]:
+    def all(self, tag):
         return [attributes for name, attributes in self.elements if name == tag]
 
 
-def drawing(name: str, text: str = "a", n_points: int = 3) -> Drawing:
+def drawing(name, text="a", n_points=3):
     figure = new_figure(2.0)
     panel = figure.subplots()
     panel.plot(np.random.default_rng(0).random(n_points))
@@ -62,7 +60,7 @@ def drawing(name: str, text: str = "a", n_points: int = 3) -> Drawing:
     return Drawing(name, f"Title of {text}", f"Caption of {text}", figure)
 
 
-def read(path: Path) -> Reader:
+def read(path):
     return Reader(path.read_text(encoding="utf-8"))
 
 
@@ -76,7 +74,7 @@ FILES = ("svg", "png")
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
+def written(tmp_path_factory):
     """A page with all kinds of items."""
     folder = tmp_path_factory.mktemp("page")
     items = [drawing("first"), *ITEMS, drawing("second")]
@@ -84,11 +82,11 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
 
 
 @pytest.fixture
-def found(written: tuple[Path, Summary]) -> Reader:
+def found(written):
     return read(written[0] / "index.html")
 
 
-def test_items_stand_in_their_order(written: tuple[Path, Summary], found: Reader) -> None:
+def test_items_stand_in_their_order(written, found):
     folder, summary = written
     assert (summary.n_drawings, summary.n_tables, summary.n_missing) == (2, 1, 1)
     assert summary.n_bytes == (folder / "index.html").stat().st_size
@@ -102,7 +100,7 @@ def test_items_stand_in_their_order(written: tuple[Path, Summary], found: Reader
     assert {path.name for path in folder.iterdir()} == {"some.nc", "index.html", *figures}
 
 
-def test_nothing_comes_from_elsewhere(found: Reader) -> None:
+def test_nothing_comes_from_elsewhere(found):
     for tag, attributes in found.elements:
         assert tag not in ("link", "iframe", "object", "embed", "base")
         for name in ("src", "href", "xlink:href", "srcset", "data"):
@@ -112,7 +110,7 @@ def test_nothing_comes_from_elsewhere(found: Reader) -> None:
     assert "@import" not in style
 
 
-def test_the_policy_allows_the_scripts_of_the_page_only(found: Reader) -> None:
+def test_the_policy_allows_the_scripts_of_the_page_only(found):
     (policy,) = [each["content"] for each in found.all("meta") if each.get("http-equiv") == "Content-Security-Policy"]
     assert policy is not None
     kinds = [attributes.get("type") for attributes in found.all("script")]
@@ -123,7 +121,7 @@ def test_the_policy_allows_the_scripts_of_the_page_only(found: Reader) -> None:
     assert "default-src 'none'" in policy
 
 
-def test_texts_of_the_file_are_harmless(tmp_path: Path) -> None:
+def test_texts_of_the_file_are_harmless(tmp_path):
     axes = {**AXES, "scheme": (EVIL, "explicit")}
     surfaces = [EVIL] * 12 + ["other"] * 12
     attributes = {"study": EVIL, "versions": EVIL, "source": EVIL, "scene_sha256": EVIL}
@@ -147,7 +145,7 @@ def test_texts_of_the_file_are_harmless(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_heavy_drawings_become_pixels_until_the_rest_fits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_heavy_drawings_become_pixels_until_the_rest_fits(tmp_path, monkeypatch):
     result = as_result(build_file(), tmp_path / "some.nc")
     monkeypatch.setattr(page, "_DRAWINGS_LIMIT", 1e5)
     items = [drawing("light"), drawing("heavy", n_points=20_000)]
@@ -159,7 +157,7 @@ def test_heavy_drawings_become_pixels_until_the_rest_fits(tmp_path: Path, monkey
 
 
 @pytest.mark.slow
-def test_a_page_of_a_large_study_is_below_12_megabytes(tmp_path: Path) -> None:
+def test_a_page_of_a_large_study_is_below_12_megabytes(tmp_path):
     axes = {**AXES, "frequency": np.linspace(1.0, 2.0, 625).tolist()}
     result = as_result(build_file(axes, cycles=np.arange(21.0)), tmp_path / "some.nc")
     summary = write_page(result, [], tmp_path / "index.html")
@@ -168,7 +166,7 @@ def test_a_page_of_a_large_study_is_below_12_megabytes(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_too_many_points_leave_a_page_without_scripts(tmp_path: Path) -> None:
+def test_too_many_points_leave_a_page_without_scripts(tmp_path):
     axes = {**AXES, "frequency": np.linspace(1.0, 2.0, MOST_POINTS).tolist()}
     dataset = build_file(axes, cycles=(0.0,), positions=np.zeros((1, 3)), variables=("worn_volume",))
     summary = write_page(as_result(dataset, tmp_path / "some.nc"), [drawing("first")], tmp_path / "index.html")

@@ -1,20 +1,15 @@
 """The numbers on the page are those of the file, and there are never too many of them."""
 
-from __future__ import annotations
-
 import base64
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 import xarray as xr
-from numpy.typing import NDArray
 
 from studyrunner.report.page import kept as page_kept
-from studyrunner.report.page.data import COURSES, PageData, build_page_data
+from studyrunner.report.page.data import COURSES, build_page_data
 from studyrunner.report.page.maps import LOOPS, MAPS
 from studyrunner.report.page.panels import MOST_PANELS, build_panels
 from studyrunner.report.reading.result import Result
@@ -26,21 +21,21 @@ from tests.studyrunner.report.root_cases import dovetail_file
 PLENTY = 4e6
 
 
-def result_of(dataset: xr.Dataset) -> Result:
+def result_of(dataset):
     return Result(Path("some.nc"), dataset)
 
 
-def decode(entry: Mapping[str, Any], *shape: int) -> NDArray[np.float32]:
+def decode(entry, *shape):
     return np.frombuffer(base64.b64decode(entry["data"]), dtype="<f4").reshape(shape)
 
 
-def content_of(data: PageData) -> dict[str, Any]:
+def content_of(data):
     """As the browser reads it: through strict JSON."""
     found: dict[str, Any] = json.loads(json.dumps(data.content, allow_nan=False))
     return found
 
 
-def test_the_page_holds_the_numbers_of_the_file() -> None:
+def test_the_page_holds_the_numbers_of_the_file():
     dataset = build_file(failed=[3, 8], loops=[2, 5], responses=["tip", "root"])
     data = build_page_data(result_of(dataset), PLENTY)
     content = content_of(data)
@@ -66,7 +61,7 @@ def test_the_page_holds_the_numbers_of_the_file() -> None:
         np.testing.assert_array_equal(decode(content["loops"]["variables"][name], *expected.shape), expected)
 
 
-def test_the_root_is_there_with_a_quarter_of_the_room_at_most() -> None:
+def test_the_root_is_there_with_a_quarter_of_the_room_at_most():
     dataset = dovetail_file(density=4)
     result = Result(Path("some.nc"), dataset)
     surface = read_root(result)
@@ -86,7 +81,7 @@ def test_the_root_is_there_with_a_quarter_of_the_room_at_most() -> None:
     assert content_of(data)["maps"] is not None
 
 
-def test_cycles_of_pairs_are_thinned_out_first_then_points_lose_their_maps() -> None:
+def test_cycles_of_pairs_are_thinned_out_first_then_points_lose_their_maps():
     dataset = build_file(cycles=np.linspace(0.0, 1e4, 101), failed=[2])
     n_points, n_good, n_pairs = dataset["outcome"].size, dataset["outcome"].size - 1, dataset.sizes["contact"]
     whole = build_page_data(result_of(dataset), PLENTY)
@@ -117,13 +112,13 @@ def test_cycles_of_pairs_are_thinned_out_first_then_points_lose_their_maps() -> 
     assert any(f"the {len(points)} most worn of {n_good} points" in note for note in few.notes)
 
 
-def test_a_page_without_room_says_so() -> None:
+def test_a_page_without_room_says_so():
     data = build_page_data(result_of(build_file()), 1e3)
     assert data.content is None
     assert "do not fit" in data.notes[0]
 
 
-def test_reading_in_blocks_is_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reading_in_blocks_is_reading(tmp_path, monkeypatch):
     build_file(failed=[5], loops=[4]).to_netcdf(tmp_path / "some.nc")
     with xr.open_dataset(tmp_path / "some.nc") as dataset:
         whole = build_page_data(result_of(dataset), 2e5)
@@ -133,7 +128,7 @@ def test_reading_in_blocks_is_reading(tmp_path: Path, monkeypatch: pytest.Monkey
             assert build_page_data(result_of(dataset), 2e5) == whole
 
 
-def test_flanks_are_grids() -> None:
+def test_flanks_are_grids():
     panels = build_panels(result_of(build_file()))
     assert [(panel["title"], panel["kind"]) for panel in panels] == [("intrados", "grid"), ("extrados", "grid")]
     positions = flank_positions()
@@ -147,7 +142,7 @@ def test_flanks_are_grids() -> None:
     assert sorted(seen) == list(range(24))
 
 
-def test_many_surfaces_share_a_panel() -> None:
+def test_many_surfaces_share_a_panel():
     n_pairs = MOST_PANELS + 1
     dataset = build_file(positions=np.full((n_pairs, 3), np.nan), surfaces=[f"s{i}" for i in range(n_pairs)])
     assert build_panels(result_of(dataset)) == [

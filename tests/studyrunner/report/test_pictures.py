@@ -5,13 +5,9 @@ Which numbers the artists of a figure hold is compared with the file in `test_fi
 of them, and that this is not old.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import tomllib
-from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -31,23 +27,23 @@ RECOMPUTED = (211.0,)  # Hz; beside the resonance, which takes longer
 
 
 @pytest.fixture(scope="module")
-def stored() -> dict[str, Any]:
+def stored():
     return dict(json.loads((FOLDER / NUMBERS).read_text(encoding="utf-8")))
 
 
-def line_of(stored: dict[str, Any], figure: str, label: str) -> dict[float, float]:
+def line_of(stored, figure, label):
     """Values over the frequency."""
     x, y = stored["figures"][figure]["panels"][0]["lines"][label]
     return dict(zip(x, y, strict=True))
 
 
-def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(tmp_path: Path) -> None:
+def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(tmp_path):
     """Shares of red, green and blue: the light on a face, which differs, makes all of them larger or smaller."""
 
-    def shares(colours: np.ndarray) -> np.ndarray:
+    def shares(colours):
         return np.asarray(colours[..., :3] / colours[..., :3].sum(axis=-1, keepdims=True))
 
-    def of_faces(name: str, surface: str) -> np.ndarray:
+    def of_faces(name, surface):
         """Of a variable of pairs: a face has four of them at its corners."""
         pairs = shown.fretwear.flank(name, surface).values
         return np.asarray(0.25 * (pairs[1:, 1:] + pairs[1:, :-1] + pairs[:-1, 1:] + pairs[:-1, :-1])).ravel()
@@ -72,7 +68,7 @@ def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(tmp_path: Path) -> 
             assert np.linalg.norm(places - 1e3 * np.array([centre @ right, centre @ up]), axis=1).min() < 5.0
 
 
-def test_figures_of_the_bundled_study_are_all_written_down(stored: dict[str, Any]) -> None:
+def test_figures_of_the_bundled_study_are_all_written_down(stored):
     assert set(stored["figures"]) == set(NAMES)
     final = stored["figures"]["final_worn_volume"]["panels"][0]
     schemes = read_study("dovetail").axes.scheme
@@ -80,20 +76,20 @@ def test_figures_of_the_bundled_study_are_all_written_down(stored: dict[str, Any
     assert len(final["bars"]) > len(schemes)
 
 
-def test_pictures_are_of_the_bundled_study_as_it_is(stored: dict[str, Any]) -> None:
+def test_pictures_are_of_the_bundled_study_as_it_is(stored):
     """What a study has been given since, with a default, changes nothing; outputs are not what is computed."""
     now, then = tomllib.loads(format_study(read_study("dovetail"))), tomllib.loads(stored["study"])
     for table in set(then) - {"outputs"}:
         assert {key: now[table].get(key) for key in then[table]} == then[table], f"run {NUMBERS} again: {table} differs"
 
 
-def test_pictures_are_those_that_were_written_with_the_numbers(stored: dict[str, Any]) -> None:
+def test_pictures_are_those_that_were_written_with_the_numbers(stored):
     for name, digest in stored["pictures"].items():
         assert hashlib.sha256((FOLDER / name).read_bytes()).hexdigest() == digest, name
 
 
 @pytest.mark.slow
-def test_points_computed_anew_agree_within_the_errors(stored: dict[str, Any], tmp_path: Path) -> None:
+def test_points_computed_anew_agree_within_the_errors(stored, tmp_path):
     changes = {
         "axes.frequency": list(RECOMPUTED),
         "axes.scheme": "adaptive",

@@ -1,7 +1,5 @@
 """Error against run time, on files whose errors are known, against plain loops."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter
@@ -11,48 +9,47 @@ import pandas as pd
 import pytest
 
 from studyrunner.report.drawing import Table
-from studyrunner.report.precision.comparison import Precision, study_precision
+from studyrunner.report.precision.comparison import study_precision
 from studyrunner.report.precision.errors import pareto_front
 from studyrunner.report.precision.figures import draw_precision
 from studyrunner.report.precision.findings import TARGETS, find_orders, find_stable_step, recommend
 from studyrunner.report.precision.settings import Setting
-from studyrunner.report.reading.result import Result
-from tests.studyrunner.report.synthetic import WORN, Point, synthetic
+from tests.studyrunner.report.synthetic import WORN, synthetic
 
 STEPS = (10.0, 20.0, 50.0, 100.0)
 HARMONICS = (1, 3, 5, 9)
 SIGN = {"explicit": 1.0, "implicit": -1.0, "adaptive": 0.0}
 
 
-def error_of(point: Point) -> float:
+def error_of(point):
     """First order in the step, second in the harmonics; larger at the second frequency."""
     size = 1.0 if point["frequency"] == 100.0 else 2.0
     step, harmonics = float(point.get("step", 0.0)), float(point.get("harmonics", np.inf))
     return size * (SIGN[str(point["scheme"])] * 1e-4 * step + 0.03 / harmonics**2)
 
 
-def time_of(point: Point) -> float:
+def time_of(point):
     steps = 30.0 if point["scheme"] == "adaptive" else 1000.0 / float(point["step"])
     return 0.1 + 0.01 * steps * float(point.get("harmonics", 1)) ** 1.5 * (1.0 + 0.001 * float(point["frequency"]))
 
 
-def precision_of(result: Result) -> Precision:
+def precision_of(result):
     found = study_precision(result)
     assert found is not None
     return found
 
 
-def exact_file(**options: object) -> Result:
+def exact_file(**options):
     axes = {"frequency": [100.0, 200.0], "step": STEPS, "scheme": ["implicit", "explicit"], "harmonics": HARMONICS}
     return synthetic(axes, error_of, time_of, exact=True, **options)  # type: ignore[arg-type]
 
 
-def finest_file(**options: object) -> Result:
+def finest_file(**options):
     axes = {"frequency": [100.0, 200.0], "step": STEPS, "scheme": list(SIGN), "harmonics": HARMONICS}
     return synthetic(axes, error_of, time_of, **options)  # type: ignore[arg-type]
 
 
-def test_errors_against_the_exact_answer_are_those_of_the_formula() -> None:
+def test_errors_against_the_exact_answer_are_those_of_the_formula():
     precision = precision_of(exact_file())
     assert precision.keys == ("scheme", "step", "harmonics")
     assert [point.label for point in precision.points] == ["100 Hz", "200 Hz"]
@@ -72,7 +69,7 @@ def test_errors_against_the_exact_answer_are_those_of_the_formula() -> None:
         assert times == sorted(times)
 
 
-def test_the_finest_setting_is_the_reference_and_no_setting_of_the_lines() -> None:
+def test_the_finest_setting_is_the_reference_and_no_setting_of_the_lines():
     precision = precision_of(finest_file(estimate=lambda point: 2e-4 if point["scheme"] == "adaptive" else 9e-4))
     reference_error = 0.03 / 81
     for point, size in zip(precision.points, (1.0, 2.0), strict=True):
@@ -91,7 +88,7 @@ def test_the_finest_setting_is_the_reference_and_no_setting_of_the_lines() -> No
             assert item.volume_resolved == (known >= 3.0 * 2e-4)
 
 
-def test_automatic_harmonics_use_rtol_and_rank_by_what_they_took() -> None:
+def test_automatic_harmonics_use_rtol_and_rank_by_what_they_took():
     axes = {"harmonics": ["1", "auto"], "rtol": [0.1, 0.01], "step": STEPS}
     result = synthetic(axes, lambda point: 0.0 if point["harmonics"] == "auto" else 0.1, lambda _: 1.0)
     used = np.full((*result.computed.shape, 3), 1)
@@ -104,8 +101,8 @@ def test_automatic_harmonics_use_rtol_and_rank_by_what_they_took() -> None:
     assert len(point.measured) == 3 * len(STEPS) - 1
 
 
-def test_failed_settings_are_counted_and_never_compared() -> None:
-    def fails(point: Point) -> int:
+def test_failed_settings_are_counted_and_never_compared():
+    def fails(point):
         return 4 * (point["harmonics"] == 9 or (point["scheme"] == "explicit" and point["step"] == 100.0))
 
     precision = precision_of(finest_file(outcome=fails))
@@ -119,7 +116,7 @@ def test_failed_settings_are_counted_and_never_compared() -> None:
     assert precision.outcomes["march_failed"] == 2 * (2 * len(STEPS) + 4)
 
 
-def test_nothing_is_compared_where_all_failed() -> None:
+def test_nothing_is_compared_where_all_failed():
     assert study_precision(finest_file(outcome=lambda _: 4)) is None
     half = precision_of(finest_file(outcome=lambda point: 4 * (point["frequency"] == 200.0)))
     assert half.points[1].reference is None
@@ -129,7 +126,7 @@ def test_nothing_is_compared_where_all_failed() -> None:
     assert {row[0] for row in table.rows} == {"100 Hz"}
 
 
-def test_front_is_that_of_all_pairs_compared() -> None:
+def test_front_is_that_of_all_pairs_compared():
     rng = np.random.default_rng(1)
     numbers = rng.integers(1, 12, (60, 2)).astype(float)
     index = pd.Index([Setting(step=float(n)) for n in range(len(numbers))], dtype=object)
@@ -147,10 +144,10 @@ def test_front_is_that_of_all_pairs_compared() -> None:
 
 @pytest.mark.parametrize("power", [1.0, 2.0])
 @pytest.mark.parametrize("against", ["adaptive", "exact"])
-def test_order_in_the_step_is_that_of_the_formula(power: float, against: str) -> None:
+def test_order_in_the_step_is_that_of_the_formula(power, against):
     schemes = ["implicit", "explicit"] + (["adaptive"] if against == "adaptive" else [])
 
-    def error(point: Point) -> float:
+    def error(point):
         return SIGN[str(point["scheme"])] * 1e-4 * float(point["step"]) ** power
 
     result = synthetic({"step": STEPS, "scheme": schemes}, error, time_of, exact=against == "exact", rtol=1e-4)
@@ -164,8 +161,8 @@ def test_order_in_the_step_is_that_of_the_formula(power: float, against: str) ->
 
 
 @pytest.mark.parametrize("how", ["oscillates", "outcome"])
-def test_largest_stable_step_is_the_last_before_the_first_unstable_one(how: str) -> None:
-    def unstable(point: Point) -> int:
+def test_largest_stable_step_is_the_last_before_the_first_unstable_one(how):
+    def unstable(point):
         return int(point["scheme"] == "explicit" and point["step"] in (50.0, 250.0)) * (4 if how == "outcome" else 1)
 
     steps = [10.0, 20.0, 50.0, 100.0, 250.0, 300.0]
@@ -179,8 +176,8 @@ def test_largest_stable_step_is_the_last_before_the_first_unstable_one(how: str)
     assert found.unjudged == (300.0,)
 
 
-def test_recommended_is_the_cheapest_of_all_that_are_exact_enough() -> None:
-    def oscillates(point: Point) -> int:
+def test_recommended_is_the_cheapest_of_all_that_are_exact_enough():
+    def oscillates(point):
         return int(point["scheme"] == "explicit" and point["step"] == 20.0)
 
     precision = precision_of(exact_file(oscillates=oscillates))
@@ -200,7 +197,7 @@ def test_recommended_is_the_cheapest_of_all_that_are_exact_enough() -> None:
             assert found.volume <= target
 
 
-def test_wear_where_there_is_none_is_infinitely_wrong() -> None:
+def test_wear_where_there_is_none_is_infinitely_wrong():
     result = exact_file(worn=0.0)
     worn = result.dataset["worn_volume"].values.copy()
     worn[0, 0, 0, 0, 0, -1] = WORN

@@ -1,23 +1,20 @@
 """What is drawn and listed of error against run time is what was measured."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from studyrunner.report.drawing import Drawing, Missing, Table
-from studyrunner.report.precision.comparison import Precision, study_precision
+from studyrunner.report.precision.comparison import study_precision
 from studyrunner.report.precision.figures import draw_precision
 from studyrunner.report.precision.findings import show_percent
 from tests.studyrunner.report.synthetic import synthetic
 from tests.studyrunner.report.test_precision import HARMONICS, STEPS, exact_file, finest_file, precision_of
 
 
-def items_of(precision: Precision) -> dict[str, Drawing | Missing | Table]:
+def items_of(precision):
     items = list(draw_precision(precision))
     names = [item.name for item in items]
     assert len(set(names)) == len(names)
@@ -28,7 +25,7 @@ def items_of(precision: Precision) -> dict[str, Drawing | Missing | Table]:
     return dict(zip(names, items, strict=True))
 
 
-def test_every_setting_is_a_mark_and_a_row(tmp_path: Path) -> None:
+def test_every_setting_is_a_mark_and_a_row(tmp_path):
     precision = precision_of(finest_file(estimate=lambda _: 1e-4))
     items = items_of(precision)
     drawing = items["precision"]
@@ -60,7 +57,7 @@ def test_every_setting_is_a_mark_and_a_row(tmp_path: Path) -> None:
     ElementTree.parse(tmp_path / "precision.svg")
 
 
-def test_marks_of_errors_that_are_not_resolved_are_hollow() -> None:
+def test_marks_of_errors_that_are_not_resolved_are_hollow():
     precision = precision_of(finest_file(estimate=lambda _: 2e-3))
     drawing = items_of(precision)["precision"]
     assert isinstance(drawing, Drawing)
@@ -72,7 +69,7 @@ def test_marks_of_errors_that_are_not_resolved_are_hollow() -> None:
     assert "known to 0.2 %" in drawing.caption
 
 
-def test_failed_points_are_told_and_listed() -> None:
+def test_failed_points_are_told_and_listed():
     precision = precision_of(finest_file(outcome=lambda point: 4 * (point["scheme"] == "explicit")))
     items = items_of(precision)
     drawing, table = items["precision"], items["precision_settings_1"]
@@ -82,7 +79,7 @@ def test_failed_points_are_told_and_listed() -> None:
     assert sum("march failed" in row[-1] for row in table.rows) == len(STEPS) * len(HARMONICS)
 
 
-def test_recommendations_are_listed_for_each_point_and_all() -> None:
+def test_recommendations_are_listed_for_each_point_and_all():
     table = items_of(precision_of(exact_file()))["precision_recommended"]
     assert isinstance(table, Table)
     assert [row[:2] for row in table.rows] == [
@@ -90,14 +87,14 @@ def test_recommendations_are_listed_for_each_point_and_all() -> None:
     ]
 
 
-def test_settings_that_all_agree_are_one_sentence() -> None:
+def test_settings_that_all_agree_are_one_sentence():
     precision = study_precision(synthetic({"step": STEPS}, lambda _: 0.0, lambda _: 1.0))
     assert precision is not None
     (item,) = draw_precision(precision)
     assert isinstance(item, Missing)
 
 
-def test_one_response_less_is_one_panel_less() -> None:
+def test_one_response_less_is_one_panel_less():
     result = finest_file()
     lesser = type(result)(result.path, result.dataset.drop_vars("response_amplitude"))
     drawing = items_of(precision_of(lesser))["precision"]
@@ -108,5 +105,5 @@ def test_one_response_less_is_one_panel_less() -> None:
 @pytest.mark.parametrize(
     ("value", "text"), [(0.05, "5 %"), (0.00123, "0.12 %"), (0.0, "0 %"), (1e-9, "1e-07 %"), (math.inf, "not known")]
 )
-def test_percent(value: float, text: str) -> None:
+def test_percent(value, text):
     assert show_percent(value) == text

@@ -1,12 +1,9 @@
 """The command `study-report`: what it writes, what it says, how it ends."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,13 +16,13 @@ from tests.studyrunner.report.page_cases import build_file
 pytestmark = pytest.mark.processes
 
 
-def short_report(_result: object) -> Iterator[Missing | Table]:
+def short_report(_result):
     yield Missing("loops", "[bold]Loops", "Ask for them.")
     yield Table("t", "Table", ("a",), (("b",),))
 
 
 @pytest.fixture
-def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+def short(monkeypatch, tmp_path):
     """A folder to work in, with a result file; a report has no figures."""
     monkeypatch.setattr(page_contents, "draw_report", short_report)
     monkeypatch.chdir(tmp_path)
@@ -34,7 +31,7 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_folder_is_named_after_the_file_and_lies_here(short: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_folder_is_named_after_the_file_and_lies_here(short, capsys):
     assert main(["results/worn.x.nc"]) == WRITTEN
     said = capsys.readouterr()
     assert (short / "worn.x-report" / "index.html").is_file()
@@ -56,7 +53,7 @@ def test_the_folder_is_named_after_the_file_and_lies_here(short: Path, capsys: p
         (["results/worn.x.nc", "-o", "text.nc/inside"], '-o = "text.nc/inside"'),
     ],
 )
-def test_bad_input_is_one_line(short: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], key: str) -> None:
+def test_bad_input_is_one_line(short, capsys, arguments, key):
     (short / "text.nc").write_text("no result")
     assert main(arguments) == BAD_INPUT
     said = capsys.readouterr()
@@ -67,10 +64,8 @@ def test_bad_input_is_one_line(short: Path, capsys: pytest.CaptureFixture[str], 
     assert sorted(path.name for path in short.iterdir()) == ["results", "text.nc"]
 
 
-def test_an_unexpected_failure_has_a_traceback(
-    short: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(_result: object) -> Iterator[Missing]:
+def test_an_unexpected_failure_has_a_traceback(short, capsys, monkeypatch):
+    def fail(_result):
         raise ZeroDivisionError("broken")
 
     monkeypatch.setattr(page_contents, "draw_report", fail)
@@ -91,7 +86,7 @@ sys.exit(main())
 """
 
 
-def start_apart(drawing: str, folder: Path) -> subprocess.Popen[str]:
+def start_apart(drawing, folder):
     """The command, as a shell starts it, with an expression in place of its drawings."""
     command = [sys.executable, "-c", APART.format(drawing), "results/worn.x.nc"]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
@@ -107,7 +102,7 @@ def start_apart(drawing: str, folder: Path) -> subprocess.Popen[str]:
         ("os.kill(os.getpid(), signal.SIGKILL)", UNEXPECTED, "ended by signal 9 (Killed)\n"),
     ],
 )
-def test_a_crash_of_a_library_while_it_draws_is_one_line(drawing: str, status: int, said: str, short: Path) -> None:
+def test_a_crash_of_a_library_while_it_draws_is_one_line(drawing, status, said, short):
     """A file may be damaged where nobody has looked before: most of a large variable is read for the drawings only."""
     with start_apart(drawing, short) as started:
         out, error = started.communicate()
@@ -115,7 +110,7 @@ def test_a_crash_of_a_library_while_it_draws_is_one_line(drawing: str, status: i
 
 
 @pytest.mark.slow
-def test_what_ends_the_command_ends_the_process_that_draws(short: Path) -> None:
+def test_what_ends_the_command_ends_the_process_that_draws(short):
     with start_apart("print(os.getpid(), flush=True) or time.sleep(600)", short) as started:
         assert started.stdout is not None
         drawing = int(started.stdout.readline())
@@ -126,7 +121,7 @@ def test_what_ends_the_command_ends_the_process_that_draws(short: Path) -> None:
         os.kill(drawing, 0)
 
 
-def test_help_has_examples_and_does_not_load_the_libraries(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_has_examples_and_does_not_load_the_libraries(capsys):
     assert main(["--help"]) == WRITTEN
     text = capsys.readouterr().out
     assert "study-report dovetail.nc" in text

@@ -1,9 +1,5 @@
 """The result file as the report reads it: opening, shown point, choice of combinations, units."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -15,7 +11,7 @@ from studyrunner.user_error import UserError
 from tests.studyrunner.report.figure_cases import make_result
 
 
-def test_a_result_file_is_opened_lazily(tmp_path: Path) -> None:
+def test_a_result_file_is_opened_lazily(tmp_path):
     path = tmp_path / "made.nc"
     made = make_result()
     made.dataset.to_netcdf(path)
@@ -44,7 +40,7 @@ def test_a_result_file_is_opened_lazily(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_is_no_result_file_is_refused_in_one_line(tmp_path: Path, content: object, remedy: str) -> None:
+def test_what_is_no_result_file_is_refused_in_one_line(tmp_path, content, remedy):
     path = tmp_path / "file.nc"
     if isinstance(content, bytes):
         path.write_bytes(content)
@@ -57,7 +53,7 @@ def test_what_is_no_result_file_is_refused_in_one_line(tmp_path: Path, content: 
     assert "\n" not in str(caught.value)
 
 
-def test_the_shown_point_wears_most_of_those_to_be_trusted() -> None:
+def test_the_shown_point_wears_most_of_those_to_be_trusted():
     result = make_result()
     # The explicit scheme wears more everywhere, but is not shown.
     volume = result.dataset["worn_volume"].isel(cycle=-1)
@@ -65,7 +61,7 @@ def test_the_shown_point_wears_most_of_those_to_be_trusted() -> None:
     assert result.shown_point() == dict.fromkeys(result.axes, 0) | {"frequency": 2, "scheme": 0}
 
 
-def test_combinations_within_the_limit_are_all_chosen() -> None:
+def test_combinations_within_the_limit_are_all_chosen():
     choice = choose(make_result(sweep=["up", "down"]), ["frequency"], 4)
     assert choice.labels == (
         "implicit scheme, sweep up",
@@ -77,7 +73,7 @@ def test_combinations_within_the_limit_are_all_chosen() -> None:
     assert all("frequency" not in point for point in choice.points)
 
 
-def test_points_in_words() -> None:
+def test_points_in_words():
     result = make_result(frequency=[212.25, 213.0])
     assert result.describe({"frequency": 0, "scheme": 1}) == "212.25 Hz, explicit scheme"
     single = make_result(frequency=[212.25], scheme=["implicit"])
@@ -102,11 +98,11 @@ def test_points_in_words() -> None:
         ("m", 0.0, "0 mm"),
     ],
 )
-def test_prefixes_fit_the_values(units: str, largest: float, shown: str) -> None:
+def test_prefixes_fit_the_values(units, largest, shown):
     assert scale_for(units, [np.nan, 0.1 * largest, -largest]).show(largest) == shown
 
 
-def test_numbers_in_words() -> None:
+def test_numbers_in_words():
     assert show_number(100000.0) == "100\N{NO-BREAK SPACE}000"
     assert show_number(1234.5678) == "1234.57"
     assert show_number(23412.87, 4) == "23\N{NO-BREAK SPACE}410"

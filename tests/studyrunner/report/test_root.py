@@ -1,38 +1,34 @@
 """The root in three dimensions: which faces are in contact, the worn shape, views, patches, fewer faces, figures."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from studies.finite_element.joint.pairing import build_contact_pairs
 from studies.finite_element.joint.surfaces import describe_mesh as describe_fe_mesh
-from studyrunner.report.reading.result import Result
 from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.figures import draw_root
 from studyrunner.report.root.simplified import simplify
-from studyrunner.report.root.surface import RootSurface, read_root
+from studyrunner.report.root.surface import read_root
 from tests.studies.fe_models.sectors import Sector
 from tests.studyrunner.report.page_cases import as_result, build_file, flank_positions
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs, volume, with_mesh
 
 
 @pytest.fixture(scope="module")
-def dovetail(tmp_path_factory: pytest.TempPathFactory) -> Result:
+def dovetail(tmp_path_factory):
     return as_result(dovetail_file(), tmp_path_factory.mktemp("root") / "dovetail.nc")
 
 
 @pytest.fixture(scope="module")
-def surface(dovetail: Result) -> RootSurface:
+def surface(dovetail):
     found = read_root(dovetail)
     assert found is not None
     return found
 
 
-def test_the_flanks_of_both_bodies_are_found_with_area_and_normals_of_the_pairs(surface: RootSurface) -> None:
+def test_the_flanks_of_both_bodies_are_found_with_area_and_normals_of_the_pairs(surface):
     pairs = dovetail_pairs()
     assert surface.bodies == ("disk", "blade")
     assert surface.flanks == ("intrados", "extrados")
@@ -53,7 +49,7 @@ def test_the_flanks_of_both_bodies_are_found_with_area_and_normals_of_the_pairs(
 
 
 @pytest.mark.parametrize("body", [0, 1])
-def test_the_worn_shape_loses_the_worn_volume(surface: RootSurface, body: int) -> None:
+def test_the_worn_shape_loses_the_worn_volume(surface, body):
     """To first order a depth h of the pairs takes sum(h alpha) off a body: alpha is the integral of shape functions."""
     pairs = dovetail_pairs()
     depth = np.random.default_rng(3).uniform(0.5, 1.0, len(pairs.area)) * 1e-9
@@ -66,7 +62,7 @@ def test_the_worn_shape_loses_the_worn_volume(surface: RootSurface, body: int) -
 
 
 @pytest.mark.parametrize("kinds", [("C3D10", "C3D8"), ("C3D8", "C3D20R")])
-def test_meshes_that_do_not_match_are_in_contact_on_both_sides(kinds: tuple[str, str], tmp_path: Path) -> None:
+def test_meshes_that_do_not_match_are_in_contact_on_both_sides(kinds, tmp_path):
     """A blade on a disk, one of them meshed coarser: the pairing of the model knows the faces."""
     sector = Sector(*kinds, disk=(2, 6, 5), blade=(3, 5, 4))
     pairs = build_contact_pairs(
@@ -94,14 +90,14 @@ def test_meshes_that_do_not_match_are_in_contact_on_both_sides(kinds: tuple[str,
 
 
 @pytest.mark.parametrize("deepest", [1e-9, 3e-7, 1.07e-5, 2e-3, 0.2])
-def test_the_exaggeration_is_a_round_number_that_shows_the_depth(surface: RootSurface, deepest: float) -> None:
+def test_the_exaggeration_is_a_round_number_that_shows_the_depth(surface, deepest):
     factor = surface.exaggeration(deepest)
     head = factor / 10.0 ** math.floor(math.log10(factor) + 1e-9)
     assert min(abs(head - each) for each in (1.0, 2.0, 5.0)) < 1e-9
     assert 0.4 * surface.well_seen <= factor * deepest <= surface.well_seen * (1.0 + 1e-9)
 
 
-def test_pairs_without_a_mesh_are_patches_that_do_not_overlap(tmp_path: Path) -> None:
+def test_pairs_without_a_mesh_are_patches_that_do_not_overlap(tmp_path):
     positions = flank_positions(n_along=9, n_across=4)
     result = as_result(build_file(positions=positions), tmp_path / "patches.nc")
     surface = read_root(result)
@@ -122,7 +118,7 @@ def test_pairs_without_a_mesh_are_patches_that_do_not_overlap(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("wrong", ["no faces", "elsewhere"])
-def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path: Path, wrong: str) -> None:
+def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path, wrong):
     dataset = dovetail_file()
     if wrong == "no faces":
         dataset = dataset.isel(mesh_quad_index=slice(0, 0))
@@ -135,7 +131,7 @@ def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path: Path, wrong: str) -
 
 
 @pytest.mark.slow
-def test_fewer_faces_keep_those_in_contact_and_the_shape(tmp_path: Path) -> None:
+def test_fewer_faces_keep_those_in_contact_and_the_shape(tmp_path):
     surface = read_root(as_result(dovetail_file(density=4), tmp_path / "fine.nc"))
     assert surface is not None
     in_contact = int((surface.contact.flank >= 0).sum())
@@ -150,7 +146,7 @@ def test_fewer_faces_keep_those_in_contact_and_the_shape(tmp_path: Path) -> None
     assert simplify(surface, len(surface.faces)) is surface
 
 
-def test_the_figures_of_the_dovetail(dovetail: Result) -> None:
+def test_the_figures_of_the_dovetail(dovetail):
     worn, numbers, disk = list(draw_root(dovetail))
     assert [worn.name, numbers.name, disk.name] == ["worn_root", "pair_numbers", "whole_disk"]
     depth = dovetail.at("wear_depth", dovetail.shown_point(), -1).values
@@ -165,7 +161,7 @@ def test_the_figures_of_the_dovetail(dovetail: Result) -> None:
     assert "47 sectors" in disk.caption
 
 
-def test_pairs_on_a_line_are_strips_beside_each_other(tmp_path: Path) -> None:
+def test_pairs_on_a_line_are_strips_beside_each_other(tmp_path):
     positions = np.column_stack([np.linspace(-2e-4, 2e-4, 9), np.zeros(9), np.zeros(9)])
     surface = read_root(as_result(build_file(positions=positions, surfaces=["line"] * 9), tmp_path / "line.nc"))
     assert surface is not None

@@ -1,54 +1,38 @@
 """The root in three dimensions in a headless browser: colours, worn shape, view, rotation, slider, points, play."""
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
+from selenium.webdriver import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
 
+from tests.studyrunner.report.browsing import FACTORS, MARKS, PATIENCE, choose, load, messages, press, write
 from tests.studyrunner.report.page_cases import build_file
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs
-from tests.studyrunner.report.test_browser import (  # noqa: F401 - the fixture is used by its name
-    CHROMIUM,
-    DRIVER,
-    FACTORS,
-    PATIENCE,
-    browser,
-    choose,
-    load,
-    messages,
-    press,
-    shown_point,
-    write,
-)
+from tests.studyrunner.report.test_browser import shown_point
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.slow,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
-]
+pytestmark = MARKS
 
 PLOT = "document.getElementById('root-plot')"
 CAMERA = f"return {PLOT}._fullLayout.scene._scene.getCamera()"
 
 
 @pytest.fixture(scope="module")
-def dataset() -> xr.Dataset:
+def dataset():
     return dovetail_file(failed=[5])
 
 
 @pytest.fixture(scope="module")
-def page(browser: Any, dataset: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Any:  # noqa: F811
+def page(browser, dataset, tmp_path_factory):
     load(browser, write(dataset, tmp_path_factory.mktemp("root")))
     return browser
 
 
 @pytest.fixture(autouse=True)
-def clean(page: Any) -> Any:
-    from selenium.webdriver.common.keys import Keys
+def clean(page):
 
     for name in ("root colour", "root view", "root shape"):
         choose(page, name, 1 if name == "root colour" else 0)
@@ -57,7 +41,7 @@ def clean(page: Any) -> Any:
     assert messages(page) == []
 
 
-def trace(page: Any, meta: str) -> dict[str, Any]:
+def trace(page, meta):
     script = f"""
     const found = {PLOT}.data.find((each) => each.meta === arguments[0]);
     const lists = ["x", "y", "z", "i", "j", "k", "intensity"].map((name) => [name, Array.from(found[name] || [])]);
@@ -67,7 +51,7 @@ def trace(page: Any, meta: str) -> dict[str, Any]:
     return found
 
 
-def assert_root_is(page: Any, dataset: xr.Dataset, name: str, point: int, cycle: int) -> None:
+def assert_root_is(page, dataset, name, point, cycle):
     """Colours and worn shape are those of the file at a point and a cycle; the factor is the one that is told."""
     contact, pairs = trace(page, "contact"), dovetail_pairs()
     unit = page.execute_script(f"return {PLOT}.layout.coloraxis.colorbar.title.text")
@@ -87,29 +71,25 @@ def assert_root_is(page: Any, dataset: xr.Dataset, name: str, point: int, cycle:
     assert f"exaggerated {factor:g} times" in title.replace("\u00a0", "")
 
 
-def pixels(page: Any) -> bytes:
-    from selenium.webdriver.common.by import By
+def pixels(page):
 
     picture: bytes = page.find_element(By.ID, "root-plot").screenshot_as_png
     return picture
 
 
-def test_the_root_begins_as_the_shown_point_after_wear(page: Any, dataset: xr.Dataset) -> None:
+def test_the_root_begins_as_the_shown_point_after_wear(page, dataset):
     assert_root_is(page, dataset, "wear_depth", shown_point(dataset), 4)
     # beside the pairs at z < 0
     assert 1.2 < trace(page, "leading")["z"][0] / (1e3 * dataset["contact_z"].values.min()) < 1.4
 
 
-def test_the_menu_changes_what_colours_the_root(page: Any, dataset: xr.Dataset) -> None:
+def test_the_menu_changes_what_colours_the_root(page, dataset):
     for place, name in enumerate(["mean_pressure", "wear_depth", "open_fraction", "slip_range"]):
         choose(page, "root colour", place)
         assert_root_is(page, dataset, name, shown_point(dataset), 4)
 
 
-def test_a_drag_of_the_mouse_rotates_and_the_slider_keeps_it(page: Any) -> None:
-    from selenium.webdriver import ActionChains
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.common.keys import Keys
+def test_a_drag_of_the_mouse_rotates_and_the_slider_keeps_it(page):
 
     plot = page.find_element(By.ID, "root-plot")
     page.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'})", plot)
@@ -131,9 +111,7 @@ def test_a_drag_of_the_mouse_rotates_and_the_slider_keeps_it(page: Any) -> None:
     assert [kept["eye"][axis] for axis in "xyz"] == pytest.approx(eyes[1].tolist(), abs=1e-3)
 
 
-def test_play_runs_through_the_cycles_and_stops_at_the_last(page: Any) -> None:
-    from selenium.webdriver.common.by import By
-    from selenium.webdriver.support.wait import WebDriverWait
+def test_play_runs_through_the_cycles_and_stops_at_the_last(page):
 
     page.execute_script(
         """
@@ -162,7 +140,7 @@ def test_play_runs_through_the_cycles_and_stops_at_the_last(page: Any) -> None:
     assert page.execute_script("return state.cycle") == stopped
 
 
-def test_a_browser_without_webgl_says_so(browser: Any, tmp_path: Path) -> None:  # noqa: F811
+def test_a_browser_without_webgl_says_so(browser, tmp_path):
     address = browser.current_url
     patch = """
     const getContext = HTMLCanvasElement.prototype.getContext;

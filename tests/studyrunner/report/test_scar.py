@@ -1,9 +1,6 @@
 """The scar of a cylinder and of a sphere, the measured one beside it, and the point that a report shows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +19,7 @@ X = 1e-5 * np.array([1.0, 1.0, 1.0, 3.0, 3.0, 5.0, 5.0, 5.0, 7.0, 7.0, 9.0, 9.0]
 Y = 1e-5 * np.array([1.0, 3.0, 5.0, 1.0, 3.0, 1.0, 3.0, 5.0, 1.0, 3.0, 1.0, 3.0])
 
 
-def half_space(model: str) -> Result:
+def half_space(model):
     result = make_result()
     x, y = (np.linspace(0.5, 11.5, 12) * 1e-5, np.zeros(12)) if model == "cylinder_on_flat" else (X, Y)
     places = {"contact_x": ("contact", x), "contact_y": ("contact", y), "contact_z": ("contact", np.zeros(12))}
@@ -32,7 +29,7 @@ def half_space(model: str) -> Result:
 
 
 @pytest.mark.parametrize("model", ["cylinder_on_flat", "sphere_on_flat"])
-def test_the_scar_is_symmetric_and_that_of_the_pairs(model: str) -> None:
+def test_the_scar_is_symmetric_and_that_of_the_pairs(model):
     result = half_space(model)
     scar = find_scar(result)
     assert scar is not None
@@ -49,7 +46,7 @@ def test_the_scar_is_symmetric_and_that_of_the_pairs(model: str) -> None:
     assert panel.yaxis_inverted()
 
 
-def test_every_patch_of_a_sphere_stands_at_four_places() -> None:
+def test_every_patch_of_a_sphere_stands_at_four_places():
     scar = find_scar(half_space("sphere_on_flat"))
     assert scar is not None
     assert np.bincount(scar.pairs).tolist() == [4] * 12
@@ -58,7 +55,7 @@ def test_every_patch_of_a_sphere_stands_at_four_places() -> None:
     assert scar.width == pytest.approx(2e-5)
 
 
-def test_the_measured_profile_is_drawn_beside_it(tmp_path: Path) -> None:
+def test_the_measured_profile_is_drawn_beside_it(tmp_path):
     path = tmp_path / "scar.csv"
     path.write_text("depth (um),x (mm),note\n1.5,0.02,a\n\n0.5,-0.02,b\n", encoding="utf-8")
     profile = read_profile(path)
@@ -82,7 +79,7 @@ def test_the_measured_profile_is_drawn_beside_it(tmp_path: Path) -> None:
         ("x_mm,depth_um\n1,nan\n", "finite"),
     ],
 )
-def test_what_is_wrong_with_a_profile_is_said(tmp_path: Path, text: str, words: str) -> None:
+def test_what_is_wrong_with_a_profile_is_said(tmp_path, text, words):
     path = tmp_path / "scar.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(UserError) as error:
@@ -91,7 +88,7 @@ def test_what_is_wrong_with_a_profile_is_said(tmp_path: Path, text: str, words: 
     assert words in str(error.value)
 
 
-def test_figures_show_the_chosen_point(tmp_path: Path) -> None:
+def test_figures_show_the_chosen_point(tmp_path):
     path = tmp_path / "out.nc"
     dataset = build_file()
     dataset.to_netcdf(path)
@@ -105,7 +102,7 @@ def test_figures_show_the_chosen_point(tmp_path: Path) -> None:
             open_for_report(path, wrong)
 
 
-def test_loops_stand_about_their_means_and_the_caption_tells_the_drift(tmp_path: Path) -> None:
+def test_loops_stand_about_their_means_and_the_caption_tells_the_drift(tmp_path):
     dataset: xr.Dataset = build_file(loops=[2])
     result = Result(tmp_path / "a.nc", dataset)
     loops = dataset["loop_displacement"]

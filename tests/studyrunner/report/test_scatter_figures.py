@@ -1,15 +1,11 @@
 """Figures of samples show the quantiles, probabilities, shares and groups that the drawn values lead to."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from studyrunner.report.drawing import Drawing, Missing, style
+from studyrunner.report.drawing import Missing, style
 from studyrunner.report.figures.frequency_course import find_course
 from studyrunner.report.page.study import describe_study
 from studyrunner.report.reading.result import Result
@@ -19,32 +15,26 @@ from tests.studyrunner.report.scatter_cases import N_SAMPLES, sample_file
 N_FREQUENCIES = 2
 
 
-def result_of(dataset: xr.Dataset) -> Result:
+def result_of(dataset):
     return Result(Path("samples.nc"), dataset)
 
 
-def drawn(dataset: xr.Dataset) -> dict[str, Drawing | Missing]:
+def drawn(dataset):
     with style():
         return {item.name: item for item in draw_scatter(result_of(dataset))}
 
 
 @pytest.fixture(scope="module")
-def dataset() -> xr.Dataset:
+def dataset():
     return sample_file()
 
 
 @pytest.fixture(scope="module")
-def items(dataset: xr.Dataset) -> dict[str, Any]:
+def items(dataset):
     return drawn(dataset)
 
 
-def test_each_figure_is_there(items: dict[str, Any]) -> None:
-    bands = ["worn_volume_bands", "worn_volume_bands_course"]
-    assert list(items) == [*bands, "exceedance", "sobol_indices", "deciding_input"]
-    assert all(isinstance(item, Drawing) for item in items.values())
-
-
-def test_the_median_over_cycles_is_that_of_the_samples(dataset: xr.Dataset, items: dict[str, Any]) -> None:
+def test_the_median_over_cycles_is_that_of_the_samples(dataset, items):
     panels = items["worn_volume_bands"].figure.axes
     assert len(panels) == N_FREQUENCIES
     expected = np.quantile(dataset["worn_volume"].values[0, 0], 0.5, axis=0, method="inverted_cdf") * 1e9
@@ -53,7 +43,7 @@ def test_the_median_over_cycles_is_that_of_the_samples(dataset: xr.Dataset, item
     assert f"{N_SAMPLES} samples" in items["worn_volume_bands"].caption
 
 
-def test_bands_over_the_frequency_ascend(dataset: xr.Dataset) -> None:
+def test_bands_over_the_frequency_ascend(dataset):
     turned = dataset.isel(frequency=[1, 0])
     turned["worn_volume"][0] *= 3.0
     panel = drawn(turned)["worn_volume_bands_course"].figure.axes[0]
@@ -64,7 +54,7 @@ def test_bands_over_the_frequency_ascend(dataset: xr.Dataset) -> None:
     assert median.get_ydata()[1] == pytest.approx(3.0 * median.get_ydata()[0])
 
 
-def test_samples_without_a_value_leave_the_band_open(dataset: xr.Dataset, items: dict[str, Any]) -> None:
+def test_samples_without_a_value_leave_the_band_open(dataset, items):
     lost = dataset.copy(deep=True)
     lost["worn_volume"][:, :, :10, -1] = np.nan
     item = drawn(lost)["worn_volume_bands"]
@@ -72,7 +62,7 @@ def test_samples_without_a_value_leave_the_band_open(dataset: xr.Dataset, items:
     assert "without a value" not in items["worn_volume_bands"].caption
 
 
-def test_the_wear_coefficient_decides(items: dict[str, Any]) -> None:
+def test_the_wear_coefficient_decides(items):
     item = items["sobol_indices"]
     bars = {bar.get_label(): bar for bar in item.figure.axes[0].containers if hasattr(bar, "patches")}
     shares = [patch.get_height() for patch in bars["alone"].patches]
@@ -82,7 +72,7 @@ def test_the_wear_coefficient_decides(items: dict[str, Any]) -> None:
     assert items["deciding_input"].title.endswith("wear coefficient")
 
 
-def test_the_scatter_plot_holds_every_sample(dataset: xr.Dataset, items: dict[str, Any]) -> None:
+def test_the_scatter_plot_holds_every_sample(dataset, items):
     for place, panel in enumerate(items["deciding_input"].figure.axes):
         (points,) = [found for found in panel.collections if found.get_label() == "samples"]
         at = np.asarray(points.get_offsets())
@@ -90,7 +80,7 @@ def test_the_scatter_plot_holds_every_sample(dataset: xr.Dataset, items: dict[st
         np.testing.assert_allclose(at[:, 1], dataset["worn_volume"].values[place, 0, :, -1] * 1e9)
 
 
-def test_two_groups_have_two_colours() -> None:
+def test_two_groups_have_two_colours():
     item = drawn(sample_file(factor=1.05, jump=1.0))["deciding_input"]
     found = {each.get_label(): each for each in item.figure.axes[0].collections}
     groups = [found["lower group"], found["upper group"]]
@@ -99,24 +89,24 @@ def test_two_groups_have_two_colours() -> None:
     assert f"{N_SAMPLES // 2} samples up to" in item.caption
 
 
-def test_few_samples_have_no_indices() -> None:
+def test_few_samples_have_no_indices():
     item = drawn(sample_file(4))["sobol_indices"]
     assert isinstance(item, Missing)
     assert "raise samples" in item.sentence
 
 
-def test_a_single_sample_has_no_statistics() -> None:
+def test_a_single_sample_has_no_statistics():
     assert drawn(sample_file(1)) == {}
 
 
 @pytest.mark.parametrize("study", ["", "no TOML", "[scatter]\nsamples = 64\nother = {normal = {std = 1}}\n"])
-def test_drawn_values_are_enough(dataset: xr.Dataset, study: str) -> None:
+def test_drawn_values_are_enough(dataset, study):
     result = result_of(dataset.assign_attrs(study=study))
     assert result.statistics is not None
     assert set(result.statistics["input"].values) == {"friction_coefficient", "wear_coefficient", "gap"}
 
 
-def test_counts_are_thinned_out_where_there_are_many(dataset: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_counts_are_thinned_out_where_there_are_many(dataset, monkeypatch):
     from studyrunner.report.reading import sample_statistics
 
     monkeypatch.setattr(sample_statistics, "_MOST_VALUES", 1)
@@ -128,7 +118,7 @@ def test_counts_are_thinned_out_where_there_are_many(dataset: xr.Dataset, monkey
     assert isinstance(item, Missing)
 
 
-def test_the_page_says_what_the_samples_say(dataset: xr.Dataset) -> None:
+def test_the_page_says_what_the_samples_say(dataset):
     facts = describe_study(result_of(dataset))
     assert "5 to 95 % of 64 samples" in facts.summary
     assert "wear coefficient decides" in facts.summary

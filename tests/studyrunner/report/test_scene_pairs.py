@@ -1,7 +1,5 @@
 """Figures and maps of pairs show those of one scene; the depth of the last count; coordinates that lie are refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -29,21 +27,21 @@ FEW, MANY = 12, 24
 
 
 @pytest.fixture(scope="module")
-def meshes() -> Result:
+def meshes():
     return Result(Path("meshes.nc"), check_dataset(mesh_file(), "meshes.nc"))
 
 
 @pytest.fixture(scope="module")
-def samples() -> Result:
+def samples():
     return Result(Path("samples.nc"), check_dataset(sample_file(), "samples.nc"))
 
 
 @pytest.fixture(scope="module")
-def page(samples: Result) -> Any:
+def page(samples):
     return build_page_data(samples, 4e6).content
 
 
-def test_a_scene_has_its_own_pairs(meshes: Result) -> None:
+def test_a_scene_has_its_own_pairs(meshes):
     shown = of_shown_scene(meshes)
     assert shown.shown_point() == meshes.shown_point() | {"mesh": 0}
     assert [shown.dataset.sizes["contact"], sum(len(flank.pairs) for flank in find_flanks(shown))] == [FEW, FEW]
@@ -55,21 +53,21 @@ def test_a_scene_has_its_own_pairs(meshes: Result) -> None:
     )
 
 
-def test_axes_of_the_scene_are_named_with_their_unit(meshes: Result) -> None:
+def test_axes_of_the_scene_are_named_with_their_unit(meshes):
     shown = of_shown_scene(meshes)
     assert "rpm, mesh 1" in shown.describe(shown.shown_point())
     choice = choose(shown, [], 4)
     assert choice.sentence == "Shown for mesh 1; the file also holds 1 other value of mesh."
 
 
-def test_figures_show_the_pairs_of_the_shown_scene(meshes: Result) -> None:
+def test_figures_show_the_pairs_of_the_shown_scene(meshes):
     with style():
         items = {item.name: item for item in draw_flanks(of_shown_scene(meshes))}
     assert set(items) == {"wear_depth", "mean_pressure", "worn_profile"}
     assert "mesh 1" in items["worn_profile"].caption
 
 
-def test_panels_of_each_scene_name_places_in_the_file(meshes: Result) -> None:
+def test_panels_of_each_scene_name_places_in_the_file(meshes):
     content = build_page_data(meshes, 4e6).content
     assert content is not None
     maps: Any = content["maps"]
@@ -79,7 +77,7 @@ def test_panels_of_each_scene_name_places_in_the_file(meshes: Result) -> None:
         assert sorted(pairs) == list(range(n_pairs))
 
 
-def test_the_depth_of_the_last_count_is_drawn(samples: Result) -> None:
+def test_the_depth_of_the_last_count_is_drawn(samples):
     with style():
         items = {item.name: item for item in draw_flanks(samples)}
     assert "worn_profile" in items
@@ -87,13 +85,13 @@ def test_the_depth_of_the_last_count_is_drawn(samples: Result) -> None:
     assert f"at pair {int(np.argmax(depth))}" in items["wear_depth"].caption
 
 
-def test_the_page_holds_the_depth_of_every_sample(samples: Result, page: Any) -> None:
+def test_the_page_holds_the_depth_of_every_sample(samples, page):
     entry = page["maps"]["variables"][LAST_DEPTH]
     expected = samples.dataset[LAST_DEPTH].values.reshape(len(entry["points"]), 1, -1)
     np.testing.assert_array_equal(decode(entry, *expected.shape), expected.astype("f4"))
 
 
-def test_the_page_holds_what_samples_draw(samples: Result, page: Any) -> None:
+def test_the_page_holds_what_samples_draw(samples, page):
     scatter = page["scatter"]
     assert scatter["axis"] == samples.axes.index("sample")
     by_label = {entry["label"]: entry for entry in scatter["inputs"]}
@@ -103,7 +101,7 @@ def test_the_page_holds_what_samples_draw(samples: Result, page: Any) -> None:
     assert [labels[place] for place in scatter["deciding"]] == ["wear coefficient"] * 2
 
 
-def test_little_room_takes_the_shown_combination(samples: Result) -> None:
+def test_little_room_takes_the_shown_combination(samples):
     data = build_page_data(samples, 3e4)
     assert data.content is not None
     scatter: Any = data.content["scatter"]
@@ -112,24 +110,13 @@ def test_little_room_takes_the_shown_combination(samples: Result) -> None:
 
 
 @pytest.mark.parametrize(("kind", "n_files"), [("meshes", 3), ("samples", 1)])
-def test_the_root_of_one_scene_is_written(
-    kind: str, n_files: int, request: pytest.FixtureRequest, tmp_path: Path
-) -> None:
+def test_the_root_of_one_scene_is_written(kind, n_files, request, tmp_path):
     result = request.getfixturevalue(kind)
     series = find_writer(result)(tmp_path)
     assert series.n_files == n_files
     mesh = meshio.read(tmp_path / "vtu" / f"root_{n_files - 1:04d}.vtu")
     expected = last_depth(result, result.shown_point())
     assert np.nanmax(mesh.point_data["wear_depth (m)"]) == np.nanmax(expected)
-
-
-def test_drawn_values_are_taken() -> None:
-    checked = check_dataset(sample_file(), "samples.nc")
-    assert {name for name in map(str, checked.coords) if name.startswith("sample_")} == {
-        "sample_friction_coefficient",
-        "sample_wear_coefficient",
-        "sample_gap",
-    }
 
 
 @pytest.mark.parametrize(
@@ -143,12 +130,12 @@ def test_drawn_values_are_taken() -> None:
         ("sample", np.full(64, 1e31)),
     ],
 )
-def test_drawn_values_that_lie_are_refused(wrong: Any) -> None:
+def test_drawn_values_that_lie_are_refused(wrong):
     with pytest.raises(UserError, match="sample_other"):
         check_dataset(sample_file().assign_coords(sample_other=wrong), "samples.nc")
 
 
-def test_too_many_inputs_or_values_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_inputs_or_values_are_refused(monkeypatch):
     from studyrunner.report.reading import schema_check
 
     monkeypatch.setattr(schema_check, "_MOST_DRAWN", 100)
@@ -159,7 +146,7 @@ def test_too_many_inputs_or_values_are_refused(monkeypatch: pytest.MonkeyPatch) 
         check_dataset(sample_file(), "samples.nc")
 
 
-def test_a_result_without_samples_has_no_drawn_values() -> None:
+def test_a_result_without_samples_has_no_drawn_values():
     dataset: xr.Dataset = sample_file().isel(sample=0, drop=True)
     with pytest.raises(UserError, match="sample_gap: dimensions contact"):
         check_dataset(dataset, "samples.nc")

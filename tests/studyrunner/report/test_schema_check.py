@@ -1,11 +1,8 @@
 """Result files that were made to do harm: one sentence and status 2, or a report that shows text as text."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -19,7 +16,6 @@ from studyrunner.report.reading.result import open_for_report
 from studyrunner.report.reading.schema_check import check_dataset, check_numbers
 from studyrunner.user_error import UserError
 from tests.studyrunner.own_time import Stopwatch
-from tests.studyrunner.reading_process import ReadingProcess
 from tests.studyrunner.report.page_cases import build_file
 from tests.studyrunner.report.scatter_cases import sample_file
 
@@ -30,28 +26,28 @@ MARKUP = "$\\bad{$ <b>bold</b> [red]&amp;"
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(tmp_path_factory):
     path = tmp_path_factory.mktemp("whole") / "whole.nc"
     build_file(loops=(0,)).to_netcdf(path)
     return path
 
 
 @pytest.fixture
-def folder(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(whole, tmp_path, monkeypatch):
     shutil.copy(whole, tmp_path / "out.nc")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def attribute(name: str, value: object, variable: str = "") -> Callable[[h5py.File], None]:
-    def change(file: h5py.File) -> None:
+def attribute(name, value, variable=""):
+    def change(file):
         (file[variable] if variable else file).attrs[name] = value
 
     return change
 
 
-def study(text: str) -> Callable[[h5py.File], None]:
-    def change(file: h5py.File) -> None:
+def study(text):
+    def change(file):
         del file.attrs["study"]
         file.create_dataset("text", data=0).attrs["x"] = 0
         del file["text"]
@@ -60,8 +56,8 @@ def study(text: str) -> Callable[[h5py.File], None]:
     return change
 
 
-def dimension_list(value: object) -> Callable[[h5py.File], None]:
-    def change(file: h5py.File) -> None:
+def dimension_list(value):
+    def change(file):
         del file["worn_volume"].attrs["DIMENSION_LIST"]
         if value is not None:
             file["worn_volume"].attrs["DIMENSION_LIST"] = value
@@ -69,31 +65,31 @@ def dimension_list(value: object) -> Callable[[h5py.File], None]:
     return change
 
 
-def short_dimension_list(file: h5py.File) -> None:
+def short_dimension_list(file):
     attributes = file["worn_volume"].attrs
     rows = attributes["DIMENSION_LIST"][:2]
     del attributes["DIMENSION_LIST"]
     attributes.create("DIMENSION_LIST", rows, dtype=h5py.vlen_dtype(h5py.ref_dtype))
 
 
-def dimension_of_no_scale(file: h5py.File) -> None:
+def dimension_of_no_scale(file):
     attributes = file["worn_volume"].attrs
     rows = attributes["DIMENSION_LIST"]
     rows[0] = np.array([file["worn_volume"].ref], dtype=h5py.ref_dtype)
     attributes["DIMENSION_LIST"] = rows
 
 
-def values(name: str, place: object, value: float) -> Callable[[h5py.File], None]:
-    def change(file: h5py.File) -> None:
+def values(name, place, value):
+    def change(file):
         file[name][place] = value
 
     return change
 
 
-def other_kind(name: str, content: object) -> Callable[[h5py.File], None]:
+def other_kind(name, content):
     """A variable of another type, its dimensions as before."""
 
-    def change(file: h5py.File) -> None:
+    def change(file):
         old = file[name]
         scales = [dict(dimension.items()) for dimension in old.dims]
         attributes = {key: old.attrs[key] for key in ("_Netcdf4Coordinates",) if key in old.attrs}
@@ -125,9 +121,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_refused_in_a_sentence(
-    case: str, folder: Path, capsys: pytest.CaptureFixture[str], reader: ReadingProcess
-) -> None:
+def test_refused_in_a_sentence(case, folder, capsys, reader):
     with h5py.File("out.nc", "r+") as file:
         REFUSED[case](file)
     watch, waited = Stopwatch(), reader.waited
@@ -145,7 +139,7 @@ def test_refused_in_a_sentence(
 
 
 @pytest.mark.slow
-def test_names_are_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_names_are_text(tmp_path, monkeypatch):
     """Of file, responses and surfaces, in figures, in the page, where the picture is text as well; long ones cut."""
     monkeypatch.chdir(tmp_path)
     axes = {"frequency": (190.0, 191.0), "scheme": ("implicit",)}
@@ -173,9 +167,7 @@ def test_names_are_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.parametrize("text", ["1.5.2", "nan"])
-def test_choices_are_numbers_or_auto(
-    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_choices_are_numbers_or_auto(text, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     build_file(axes={"frequency": (190.0, 191.0), "harmonics": ("auto", "3", text)}).to_netcdf("out.nc")
     assert main(["out.nc"]) == BAD_INPUT
@@ -183,7 +175,7 @@ def test_choices_are_numbers_or_auto(
 
 
 @pytest.mark.slow
-def test_numbers_that_are_damaged_where_they_are_large(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_numbers_that_are_damaged_where_they_are_large(folder, capsys):
     """What is not read beforehand shows its damage while it is drawn."""
     made = build_file(
         axes={"frequency": np.linspace(190.0, 200.0, 200), "scheme": ("implicit", "explicit")}, cycles=range(160)
@@ -214,9 +206,7 @@ def test_numbers_that_are_damaged_where_they_are_large(folder: Path, capsys: pyt
         (("frequency", "scheme", "sample"), 0, False),
     ],
 )
-def test_drawn_values_of_pairs_are_along_any_axes_in_order(
-    dimensions: tuple[str, ...], missing: int, right: bool
-) -> None:
+def test_drawn_values_of_pairs_are_along_any_axes_in_order(dimensions, missing, right):
     """missing: number of pairs that no sample has."""
     dataset = sample_file(4)
     gap = np.ones([dataset.sizes[name] for name in dimensions])

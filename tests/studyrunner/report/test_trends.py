@@ -1,7 +1,5 @@
 """Trends and maps of studies of several axes: against the file, a parabola in closed form, and what is left out."""
 
-from __future__ import annotations
-
 import base64
 from typing import Any
 
@@ -10,7 +8,6 @@ import pytest
 from matplotlib.collections import QuadMesh
 
 from studyrunner.report.page.trends import build_trend_numbers
-from studyrunner.report.reading.result import Result
 from studyrunner.report.trends.figures import draw_trends
 from studyrunner.report.trends.quantities import find_peak, find_quantities
 from tests.studyrunner.report.figure_cases import make_result, with_variables
@@ -18,12 +15,12 @@ from tests.studyrunner.report.figure_cases import make_result, with_variables
 FREQUENCIES = (199.0, 200.0, 201.0, 202.0, 203.0, 204.0, 205.0, 206.0)
 
 
-def many() -> Result:
+def many():
     """8 x 3 x 2 x 2 points; the harmonics of another file make 2 more of each."""
     return make_result(frequency=FREQUENCIES, wear_coefficient=(1e-12, 5e-12, 1e-11), sweep=("up", "down"))
 
 
-def test_a_peak_of_a_parabola_is_found_between_uneven_frequencies() -> None:
+def test_a_peak_of_a_parabola_is_found_between_uneven_frequencies():
     frequency = np.array([203.0, 200.0, 201.5, 202.2])
     centre, top = np.array([201.1, 201.9]), np.array([2e-3, 3e-3])
     amplitude = top - 1e-4 * (frequency[:, None] - centre) ** 2
@@ -35,11 +32,11 @@ def test_a_peak_of_a_parabola_is_found_between_uneven_frequencies() -> None:
 
 
 @pytest.mark.parametrize("values", [[1.0, 2.0, 3.0], [3.0, 2.0, 1.0], [np.nan, 2.0, 1.0], [np.nan] * 3])
-def test_a_peak_at_an_end_is_not_known(values: list[float]) -> None:
+def test_a_peak_at_an_end_is_not_known(values):
     assert np.isnan(find_peak(np.arange(3.0), np.array(values), 0)).all()
 
 
-def test_the_shift_is_that_of_the_response_between_the_first_and_the_last_cycle() -> None:
+def test_the_shift_is_that_of_the_response_between_the_first_and_the_last_cycle():
     result = many()
     amplitude = result.dataset["response_amplitude"].copy(deep=True)
     frequency = result.dataset["frequency"]
@@ -54,7 +51,7 @@ def test_the_shift_is_that_of_the_response_between_the_first_and_the_last_cycle(
     np.testing.assert_allclose(shift.errors, 0.3 + 0.4, rtol=1e-6)
 
 
-def test_lines_and_maps_are_those_of_the_file() -> None:
+def test_lines_and_maps_are_those_of_the_file():
     result = many()
     trends, maps = draw_trends(result)
     shown = result.shown_point()
@@ -79,7 +76,7 @@ def test_lines_and_maps_are_those_of_the_file() -> None:
     )
 
 
-def test_the_page_gets_the_numbers_of_the_file_in_si() -> None:
+def test_the_page_gets_the_numbers_of_the_file_in_si():
     result = many()
     dataset = result.dataset
     estimated = np.linspace(0.0, 0.3, result.computed.size).reshape(result.computed.shape)

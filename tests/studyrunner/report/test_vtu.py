@@ -1,14 +1,10 @@
 """The root as VTU files: read again they hold the numbers of the result, at the cycle counts of the PVD file."""
 
-from __future__ import annotations
-
-from pathlib import Path
 from xml.etree import ElementTree
 
 import meshio
 import numpy as np
 import pytest
-import xarray as xr
 
 from studyrunner.report import page_contents
 from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
@@ -20,14 +16,14 @@ TITLE = "wear --> after -- a title"
 
 
 @pytest.fixture(scope="module")
-def dataset() -> xr.Dataset:
+def dataset():
     dataset = dovetail_file()
     dataset.attrs["title"] = TITLE
     return dataset
 
 
 @pytest.fixture(scope="module")
-def folder(dataset: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(dataset, tmp_path_factory):
     folder = tmp_path_factory.mktemp("vtu")
     (folder / "vtu").mkdir()
     (folder / "vtu" / "root_9999.vtu").touch()  # of an older, longer series
@@ -37,14 +33,14 @@ def folder(dataset: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return folder
 
 
-def test_the_series_names_a_file_for_each_cycle_count(folder: Path, dataset: xr.Dataset) -> None:
+def test_the_series_names_a_file_for_each_cycle_count(folder, dataset):
     sets = ElementTree.parse(folder / "root.pvd").findall("Collection/DataSet")
     assert [float(each.attrib["timestep"]) for each in sets] == dataset["cycle"].values.tolist()
     named = [each.attrib["file"] for each in sets]
     assert sorted(named) == sorted(f"vtu/{path.name}" for path in (folder / "vtu").iterdir())
 
 
-def test_the_files_hold_the_numbers_of_the_pairs(folder: Path, dataset: xr.Dataset) -> None:
+def test_the_files_hold_the_numbers_of_the_pairs(folder, dataset):
     point = int(np.nanargmax(dataset["worn_volume"].values.reshape(16, 5)[:, -1]))
     pairs = dovetail_pairs()
     for cycle in (0, 4):
@@ -74,9 +70,7 @@ def test_the_files_hold_the_numbers_of_the_pairs(folder: Path, dataset: xr.Datas
 
 
 @pytest.mark.slow
-def test_the_command_writes_the_series_beside_the_page(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], dataset: xr.Dataset
-) -> None:
+def test_the_command_writes_the_series_beside_the_page(tmp_path, monkeypatch, capsys, dataset):
     monkeypatch.setattr(page_contents, "draw_report", lambda _: iter(()))
     monkeypatch.chdir(tmp_path)
     dataset.to_netcdf("some.nc")
@@ -86,9 +80,7 @@ def test_the_command_writes_the_series_beside_the_page(
 
 
 @pytest.mark.parametrize("wrong", ["no library", "no positions"])
-def test_what_stands_in_the_way_is_said_before_anything_is_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], wrong: str
-) -> None:
+def test_what_stands_in_the_way_is_said_before_anything_is_written(tmp_path, monkeypatch, capsys, wrong):
     monkeypatch.chdir(tmp_path)
     build_file(positions=np.full((2, 3), np.nan)).to_netcdf("some.nc")
     if wrong == "no library":
