@@ -17,7 +17,7 @@ from solver.missions.blocks import Begin, Mission
 from solver.missions.course import MissionCourse
 from solver.missions.history import integrate_missions
 from solver.missions.options import MISSIONS
-from solver.missions.passage import SweptState, _states, in_order, interval_errors, sweep_rate
+from solver.missions.passage import Swept, SweptState, _states, _swept, in_order, interval_errors, sweep_rate
 from solver.missions.step import Step, take_step
 from solver.packing import Packed
 from solver.results.history import StartState
@@ -378,6 +378,42 @@ def test_a_passage_wears_as_a_fixed_grid_of_frequencies():
     assert bar < 0.02 * volume
     assert history.outcome is Outcome.CONVERGED
     assert 0.0 < history.sweep_rate[0] < MISSIONS.largest_sweep_rate
+
+
+def swept_with(monkeypatch, density, depth, near=()):
+    """A passage from 1 to 2 Hz with given wear, m/Hz, of the frequency, at a depth before, m."""
+
+    def states(_case, _passage, frequencies):
+        return [state(at, density(at), response=1e-3) for at in frequencies]
+
+    monkeypatch.setattr("solver.missions.passage._states", states)
+    block = Block(scene("sdof_slider"), Passage(1.0, 2.0, 1.0), 10.0, FRICTION, begin="up")
+    case = BlockCase(Mission((block,), WEAR, (0, 1), SETTINGS), 0, np.array([depth]), None, False, SETTINGS, near)
+    swept = _swept(case, Passage(1.0, 2.0, 1.0), 0.25)
+    assert isinstance(swept, Swept)
+    return swept
+
+
+def test_wear_that_is_round_off_asks_for_no_more_frequencies(monkeypatch):
+    noise = np.random.default_rng(0)
+    assert len(swept_with(monkeypatch, lambda _: 1e-25 * noise.uniform(), 0.0).states) == MISSIONS.first_frequencies
+    assert len(swept_with(monkeypatch, lambda _: 1e-14 * noise.uniform(), 1e-6).states) == MISSIONS.first_frequencies
+
+
+def test_the_next_passage_begins_with_the_frequencies_that_count(monkeypatch):
+    """A peak of the wear: its frequencies are kept, and found anew after it has moved; those behind it are dropped."""
+
+    def peak(middle):
+        return lambda at: 1e-9 / (1.0 + ((at - middle) / 0.02) ** 2)
+
+    first = swept_with(monkeypatch, peak(1.3), 0.0)
+    again = swept_with(monkeypatch, peak(1.3), 0.0, first.needed)
+    assert len(first.states) > len(again.states) - 2 >= MISSIONS.first_frequencies
+    moved = swept_with(monkeypatch, peak(1.7), 0.0, first.needed)
+    for swept, middle in ((first, 1.3), (again, 1.3), (moved, 1.7)):
+        exact = 2e-11 * (np.arctan((2.0 - middle) / 0.02) - np.arctan((1.0 - middle) / 0.02))
+        assert swept.wear[0] == pytest.approx(exact, rel=SETTINGS.rtol)
+    assert sum(1.2 < at < 1.4 for at in moved.needed) < 0.6 * sum(1.2 < at < 1.4 for at in first.needed)
 
 
 # --- what users may get wrong ---
