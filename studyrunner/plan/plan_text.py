@@ -184,10 +184,11 @@ def _about(plan: TaskPlan, prepared_in: float) -> str:
 
 def _ranks(plan: TaskPlan, n_tasks: int) -> str:
     """What limits the use of many ranks."""
-    busy = max(1, n_tasks // _TASKS_A_RANK)
+    busy = n_tasks // _TASKS_A_RANK
+    many = f"up to about {busy} stay" if busy > 1 else "one stays"
     of = "the missions of a history are serial" if plan.marches[0][0].blocks else "a history follows its start state"
     return (
-        f"up to about {busy} stay busy to the end, with {_TASKS_A_RANK} tasks each; no number takes less"
+        f"{many} busy to the end, with {_TASKS_A_RANK} tasks each; no number takes less"
         f" than {format_seconds(plan.longest)}, as " + of
     )
 

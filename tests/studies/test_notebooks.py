@@ -27,6 +27,7 @@ FIGURES = {
     "python_api": 3,
     "scatter": 3,
     "modes": 3,
+    "mission": 3,
     "followed_resonance": 2,
 }
 LARGEST = 150_000  # bytes of a file

@@ -37,6 +37,7 @@ SMALL = {
         "solver.harmonics=3",
         "solver.samples=64",
     ],
+    "mission": ["slow_time.missions=1", "slow_time.outputs=2", "solver.harmonics=3", "solver.samples=64"],
     "modes": ["axes.modal_amplitude=[2e-4, 4e-4]"],
     "scatter": [
         "scatter.samples=2",
@@ -118,8 +119,15 @@ def resonates_lower_the_more_it_is_worn(result):
     assert first.sel(cycle=1e4) > 2.0 * first.sel(cycle=[0.0, 1e5]).max()
 
 
+def wears_in_run_up_and_dwells(result):
+    worn = result.block_worn_volume.isel(mission=-1).squeeze()
+    assert (worn.sel(block=["run-up", "climb", "cruise"]) > 0.1 * worn.sum()).all()
+    assert worn.sel(block="coast-down") < 1e-3 * worn.sum()
+
+
 SHOWN: dict[str, Callable[[xr.Dataset], None]] = {
     "scatter": wears_in_each_sample_another_volume,
+    "mission": wears_in_run_up_and_dwells,
     "modes": resonates_lower_the_more_it_is_worn,
     "dovetail": wears_near_its_resonance_only,
     "vibro_impact": has_two_branches,
