@@ -2,6 +2,8 @@
 
 A pair is inside where its neighbours surround it. Neighbours are those of a Delaunay triangulation in the plane of the
 surface, which a structured mesh of any side ratio and an unstructured one have alike.
+
+By hand: libraries of alpha shapes ask for a length, which cells that are long and thin do not have.
 """
 
 from __future__ import annotations
