@@ -3,6 +3,7 @@
 For use in Python, from this package itself:
 
 - `build_model`: a `ReducedModel` from mass, damping, stiffness and contact pairs;
+- `with_contact_stiffness`: the model with a spring in series with each pair, as rough surfaces are;
 - `frequency_response`: the joint over frequency, a `FrequencyResponse`;
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
 - `modal_response`: the response near a resonance from a nonlinear mode alone, a `ModalResponse`;
@@ -22,8 +23,8 @@ transient), `accuracy` (number of harmonics, refinement, reference solution and 
 `loading_history` (the unworn states of a sweep or a ramp), `modes` (nonlinear modes), `wear` (the integration over the
 slow time), `missions` (blocks in order). On top: `forced_response`, `nonlinear_modes`, `single_mode_theory`,
 `wear_history`, `mission_history`, `balance_functions`, `whole_response`, `tuning`. On the ground: `model`,
-`model_from_matrices`, `settings`, `outcome`, `clock`, `packing`. `PHYSICS.md` has the equations in one sign convention,
-the misprints of the paper, and measurements.
+`model_from_matrices`, `compliant_contact`, `settings`, `outcome`, `clock`, `packing`. `PHYSICS.md` has the equations in
+one sign convention, the misprints of the paper, and measurements.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from solver.balance_functions import HarmonicBalance, balance_of
+    from solver.compliant_contact import with_contact_stiffness
     from solver.forced_response import FrequencyResponse, frequency_response
     from solver.mission_history import integrate_mission
     from solver.missions.blocks import Block, Passage
@@ -72,6 +74,7 @@ __all__ = [
     "modal_response",
     "response_curve",
     "tuned",
+    "with_contact_stiffness",
 ]
 
 # Loaded at the first use: rooms import each other through this package, and loading numba takes a while.
@@ -98,6 +101,7 @@ _PLACES = {
     "modal_response": "single_mode_theory",
     "response_curve": "whole_response",
     "tuned": "tuning",
+    "with_contact_stiffness": "compliant_contact",
 }
 
 

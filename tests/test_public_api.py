@@ -185,7 +185,7 @@ def test_what_is_wrong_with_a_scene_is_said_in_one_line(tmp_path):
     for name, parameters, message in (
         ("nothing", {}, 'model: no bundled scene is called "nothing"; give one of'),
         ("sdof_slider", {"friction_coefficient": 0.3}, "friction_coefficient: 0.3; give it to the solver"),
-        ("sdof_slider", {"mas": 1.0}, "mas: unknown parameter; give one of mass, damping"),
+        ("sdof_slider", {"mas": 1.0}, "mas: unknown parameter; give one of contact_stiffness, mass"),
         ("sdof_slider", {"mass": -1.0}, "mass: -1.0; give a number above 0"),
         ("sdof_slider", {"mass": "1"}, "mass: 1; give a number"),
     ):

@@ -38,6 +38,8 @@ from solver.stability.options import STABILITY
 from solver.structure.identity import Identity
 from solver.structure.joint import Case, Joint
 
+_EPS = float(np.finfo(np.float64).eps)
+
 
 @dataclass(frozen=True)
 class Instability:
@@ -228,15 +230,25 @@ def _is_semidefinite(matrix: Matrix) -> bool:
 @lru_cache(maxsize=4)
 def _growing(of: Identity, moves: bytes) -> ComplexArray:
     found = exponents(cast("LinearModel", of.objects[0]), np.frombuffer(moves, bool))
-    return found[found.real > 0.0]
+    # round-off of a fast vibration is no growth
+    growing: ComplexArray = found[found.real > found.size * _EPS * np.abs(found).max(initial=0.0)]
+    return growing
 
 
 def exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:
     """Exponents sigma, 1/s, of all motions exp(sigma t) of a linear structure; moves: as in `growing_exponents`."""
-    mass, damping, stiffness = (part[np.ix_(moves, moves)] for part in (linear.mass, linear.damping, linear.stiffness))
-    eye, none = np.eye(len(mass)), np.zeros_like(stiffness)
-    # (0 1; -K -C) (y; v) = sigma (1 0; 0 M) (y; v): a displacement without mass has an infinite exponent
-    left = np.block([[none, eye], [-stiffness, -damping]])
-    right = np.block([[eye, none], [none, mass]])
+    parts = [part[np.ix_(moves, moves)] for part in (linear.mass, linear.damping, linear.stiffness)]
+    sizes, motions = np.linalg.eigh(parts[0])
+    n = len(sizes)
+    mass, damping, stiffness = (motions.conj().T @ part @ motions for part in parts)
+    # motions without mass come first, as the mass has no negative eigenvalues but round-off
+    light = int(np.count_nonzero(sizes <= n * _EPS * sizes.max(initial=0.0)))
+    damping[:light][np.abs(damping[:light]) <= n * _EPS * np.abs(damping).max(initial=0.0)] = 0.0
+    # y: all motions, v: velocities of those with mass; -K y - C v = sigma (C_light y_light + M v), sigma y_heavy = v.
+    # A motion without mass and damping has an infinite exponent.
+    heavy = n - light
+    left = np.block([[-stiffness, -damping[:, light:]], [np.zeros((heavy, n)), np.eye(heavy)]])
+    right = np.zeros_like(left)
+    right[:n, :light], right[light:n, n:], right[n:, light:n] = damping[:, :light], mass[light:, light:], np.eye(heavy)
     found = eigvals(left, right)
     return np.asarray(found[np.isfinite(found)], np.complex128)

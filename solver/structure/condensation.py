@@ -118,7 +118,8 @@ def build_structure(
     static = _static(Identity(still), tuple(relative.tolist()))
     first = model.harmonic_structure(1)[0] if orders else still
     n_bytes = 16 * len(orders) * relative.size**2
-    if n_bytes > STRUCTURE.dense_bytes and first is still and _is_real(still) and not model.nodal_diameter:
+    small = n_bytes <= max(STRUCTURE.dense_bytes, _shared_bytes(len(still.mass), relative.size, len(orders)))
+    if not small and first is still and _is_real(still) and not model.nodal_diameter:
         moving = _condense_shared(still, relative, omega * np.array(orders, np.float64), excitation_amplitude)
     else:
         moving = _condense_each(model, relative, omega, excitation_amplitude, orders)
@@ -129,6 +130,12 @@ def build_structure(
         static_offset=np.real(still.response @ static.held_motion),
         **vars(moving),
     )
+
+
+def _shared_bytes(n: int, n_rel: int, n_harmonics: int) -> int:
+    """Bytes that a product with a `SharedStiffness` reads: many where much lies behind the joint."""
+    behind = n - n_rel
+    return 24 * (n + behind) * n_rel + 16 * n_harmonics * behind**2
 
 
 @lru_cache(maxsize=2)

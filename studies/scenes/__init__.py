@@ -1,7 +1,8 @@
 """Registry of the bundled scenes.
 
-Every bundled scene is a module of this package with a pydantic class `Parameters`, whose first field is
-`friction_coefficient`, and a function `build(parameters, n_harmonics) -> ReducedModel`. It may also have the functions
+Every bundled scene is a module of this package with a pydantic class `Parameters`, whose first fields are
+`friction_coefficient` and `contact_stiffness`, and a function `build(parameters, n_harmonics) -> ReducedModel`, which
+leaves the contact stiffness to this registry. It may also have the functions
 
 - `describe_mesh(parameters) -> SurfaceMesh`,
 - `natural_frequencies(parameters) -> NaturalFrequencies`, where it knows more of them than its reduced model,
@@ -51,8 +52,13 @@ def build_scene(model: str, parameters: BaseModel, n_harmonics: int) -> ReducedM
     expected = scene_parameters(model)
     if not isinstance(parameters, expected):
         raise TypeError(f"scene {model} takes {expected.__module__}.Parameters, not {type(parameters).__qualname__}")
+    # imported here: listing the scenes costs nothing
+    from studies.contact_compliance import build_compliant
+
     build = cast("Callable[[BaseModel, int], ReducedModel]", _scene_attribute(model, "build"))
-    return build(parameters, n_harmonics)
+    key = f"{model} {n_harmonics} {parameters.model_dump_json(exclude={'contact_stiffness'})}"
+    contact_stiffness = cast("float | None", dict(parameters)["contact_stiffness"])
+    return build_compliant(key, contact_stiffness, lambda: build(parameters, n_harmonics))
 
 
 def scene_has(model: str, name: str) -> bool:

@@ -7,6 +7,7 @@ from math import cos, pi, radians, sin, tan
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from studies.contact_compliance import ContactStiffness
 from studies.scene_error import SceneError
 
 TRAVELLING_RETAINER = 1e7
@@ -23,6 +24,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient of the flanks, -")
+    contact_stiffness: ContactStiffness = None
     rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, which presses the flanks together, rpm")
     nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites the blades, -")
     loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")

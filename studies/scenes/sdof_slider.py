@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from studies.contact_compliance import ContactStiffness
 from studies.scene_answers import ExactAnswer
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider, worn_normal_force
 
@@ -26,6 +27,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient, 1")
+    contact_stiffness: ContactStiffness = None
     mass: float = Field(0.1, gt=0, description="mass, kg")
     damping: float = Field(0.0, ge=0, description="viscous damping of the mount, N s/m")
     stiffness: float = Field(1.6e5, gt=0, description="tangential stiffness of the mount, N/m")
@@ -86,13 +88,14 @@ def exact_answer(
     """Wear and vibration from Den Hartog's closed form and the differential equation of the wear depth.
 
     frequency: Hz. excitation_amplitude: N. wear_coefficients (n_wear,): 1/Pa. cycles (n_cycles,): counts. NaN where the
-    form does not hold: the mount is damped, the mass stops on its way, or the frequency is one of its singular ones.
+    form does not hold: the mount is damped, the contact is no rigid one, the mass stops on its way, or the frequency is
+    one of its singular ones.
     """
     p = parameters
     slider = DenHartogSlider(p.mass, p.stiffness, excitation_amplitude, 2.0 * np.pi * frequency)
     limit = p.friction_coefficient * p.normal_load
     sliding = np.multiply.outer(wear_coefficients, cycles)
-    if p.damping > 0.0 or not slider.holds(limit):
+    if p.damping > 0.0 or p.contact_stiffness is not None or not slider.holds(limit):
         return ExactAnswer(np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan))
     # the worn state depends on wear coefficient and cycle count through their product alone
     different, places = np.unique(sliding, return_inverse=True)

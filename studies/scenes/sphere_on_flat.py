@@ -16,6 +16,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from solver.model import ReducedModel
+from studies.contact_compliance import ContactStiffness
 from studies.scene_error import SceneError
 from studies.scenes.closed_forms.hertz import (
     point_radius,
@@ -50,6 +51,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     friction_coefficient: float = Field(0.6, ge=0, description="Coulomb friction coefficient mu, 1")
+    contact_stiffness: ContactStiffness = None
     R: float = Field(10e-3, gt=0, description="radius of the sphere, m")
     P: float = Field(100.0, gt=0, description="normal force, N")
     Q: float | None = Field(

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from studies.contact_compliance import ContactStiffness
 
 
 class Parameters(BaseModel):
@@ -22,6 +23,7 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient, 1")
+    contact_stiffness: ContactStiffness = None
     mass_1: float = Field(1.0, gt=0, description="mass that is excited, kg")
     mass_2: float = Field(1.0, gt=0, description="mass that slides, kg")
     damping_1: float = Field(0.02, ge=0, description="viscous damping between ground and mass 1, N s/m")

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from solver.model import ContactInterface, LinearModel, ReducedModel
+from studies.contact_compliance import ContactStiffness
 
 
 class Parameters(BaseModel):
@@ -26,6 +27,7 @@ class Parameters(BaseModel):
     friction_coefficient: float = Field(
         0.0, ge=0, description="Coulomb friction coefficient, 1; without influence: the pair has no tangent"
     )
+    contact_stiffness: ContactStiffness = None
     mass: float = Field(1.0, gt=0, description="mass, kg")
     damping: float = Field(0.05, ge=0, description="viscous damping of the mount, N s/m")
     stiffness: float = Field(1.0, gt=0, description="stiffness of the mount, N/m")

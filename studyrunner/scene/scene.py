@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
+from studies.contact_compliance import make_compliant
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.scene.computed import Computed, InMemory, model_once, scene_parameters_of
@@ -100,6 +101,9 @@ def _build(study: Study, progress: Callable[[str], None], computed: Computed) ->
         from studies.scene_file import read_scene
 
         model = read_scene(scene.path, given, scene.group)
+        # a scene in a result file is the one that was computed with
+        if not scene.group:
+            model = make_compliant(model, dict(scene.parameters)["contact_stiffness"])
     _check_friction(study, model)
     return model
 

@@ -111,7 +111,8 @@ def _user_errors(study: Study) -> Iterator[None]:
 
 def _has_frequencies(study: Study) -> bool:
     """Whether the scene knows more natural frequencies than those of its reduced model."""
-    return study.scene.is_bundled and scene_has(study.scene.model, "natural_frequencies")
+    rigid = dict(study.scene.parameters)["contact_stiffness"] is None
+    return study.scene.is_bundled and rigid and scene_has(study.scene.model, "natural_frequencies")
 
 
 def build_mesh(study: Study) -> SurfaceMesh | None:

@@ -23,7 +23,7 @@ AxisValue = float | int | bool | str
 _IN_WEAR = ("threshold", "surfaces")
 _MOST_COMBINATIONS = 10_000  # each of them is checked, which takes 0.2 ms
 _UNITS = {"-": "1", "1": "1", "degrees": "degree", "rpm": "rpm"}
-_UNITS |= dict.fromkeys(("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N s/m", "kg", "kg/m3", "J/m2"), "")
+_UNITS |= dict.fromkeys(("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N/m3", "N s/m", "kg", "kg/m3", "J/m2"), "")
 
 
 @dataclass(frozen=True)
@@ -131,6 +131,23 @@ def combinations(sections: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -
                 continue
             table[axis.key[0]] = value if len(axis.key) == 1 else _with(table.get(axis.key[0], {}), axis.key[1], value)
         yield tables
+
+
+def scene_with_axes(scene: Mapping[str, Any], axes: Mapping[str, Any], own: Sequence[str]) -> Table:
+    """[scene] of a result that holds its scene, with the only value of each axis that is a key of [scene].
+
+    own: keys that [axes] has of itself.
+    """
+    found = dict(scene)
+    for name, values in axes.items():
+        if name in (*own, *_IN_WEAR):
+            continue
+        if not is_table(values):
+            found[name] = only_table(values)
+        elif isinstance(only_table(found.get(name, {})), Mapping):
+            for inner, each in values.items():
+                found[name] = _with(found.get(name, {}), inner, only_table(each))
+    return found
 
 
 def as_checked(scene_axes: Sequence[SceneAxis], variants: Sequence[Any]) -> tuple[SceneAxis, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -50,19 +51,20 @@ def check_scene(
         return _check_model(model, parameters, source, path, archived)
     if names_file(model):
         found = _find_scene(model, source, path, archived)
-        return SceneSection(
-            model=model, parameters=check_table(SceneFileParameters, parameters, source, "scene"), **found
-        )
+        given = check_table(SceneFileParameters, parameters, source, "scene")
+        if found["group"] and archived is not None:
+            before = check_table(SceneFileParameters, _without_model(archived.scene), source, "scene")
+            _check_kept(given, before, ("contact_stiffness",), parameters, source)
+        return SceneSection(model=model, parameters=given, **found)
     try:
         kind = scene_parameters(model)
         offers = tuple(name for name, function in _OFFERED.items() if scene_has(model, function))
     except SceneError as error:
         raise UserError(source, "scene.model", model, error.remedy) from None
     checked, found = check_table(kind, parameters, source, "scene"), {}
-    if kept is not None and kept.holds_scene and model == kept.scene.get("model"):
-        before = {key: value for key, value in kept.scene.items() if key != "model"}
-        if checked == check_table(kind, before, source, "scene"):
-            found = _find_scene(model, source, path, kept)
+    holds = kept is not None and kept.holds_scene and model == kept.scene.get("model")
+    if kept is not None and holds and checked == check_table(kind, _without_model(kept.scene), source, "scene"):
+        found = _find_scene(model, source, path, kept)
     return SceneSection(model=model, parameters=checked, **{**found, "offers": offers})
 
 
@@ -81,17 +83,26 @@ def _check_model(model: str, table: Table, source: str, path: Path, archived: Ar
 
     parameters = check_table(Parameters, table, source, "scene")
     if archived is not None and archived.holds_scene and model == archived.scene.get("model"):
-        before = check_table(
-            Parameters, {key: archived.scene[key] for key in archived.scene if key != "model"}, source, "scene"
-        )
-        for key, value in parameters:
-            if value != getattr(before, key) and not (key == "friction_coefficient" and isinstance(value, float)):
-                remedy = "leave it out: the result holds the reduced scene; to change it run the study file again"
-                raise UserError(source, f"scene.{key}", table.get(key), remedy)
+        before = check_table(Parameters, _without_model(archived.scene), source, "scene")
+        own_friction = isinstance(parameters.friction_coefficient, float)
+        fixed = tuple(key for key in Parameters.model_fields if not (own_friction and key == "friction_coefficient"))
+        _check_kept(parameters, before, fixed, table, source)
         return SceneSection(model=model, parameters=parameters, **_find_scene(model, source, path, archived))
     with scene_errors(source, None):
         files = find_files(path.parent, model, parameters)
     return SceneSection(model=model, parameters=parameters, files=files, offers=("mesh",))
+
+
+def _without_model(scene: Mapping[str, object]) -> Table:
+    return {key: value for key, value in scene.items() if key != "model"}
+
+
+def _check_kept(given: BaseModel, before: BaseModel, fixed: tuple[str, ...], table: Table, source: str) -> None:
+    """Raises UserError where parameters `fixed` differ from those before, with which a kept scene was reduced."""
+    for key in fixed:
+        if getattr(given, key) != getattr(before, key):
+            remedy = "leave it out: the result holds the reduced scene; to change it run the study file again"
+            raise UserError(source, f"scene.{key}", table.get(key), remedy)
 
 
 def _find_scene(model: str, source: str, path: Path, archived: Archived | None) -> dict[str, Any]:

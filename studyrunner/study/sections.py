@@ -10,6 +10,7 @@ from typing import Annotated, Final
 from pydantic import BaseModel, BeforeValidator, Field, SerializeAsAny, TypeAdapter
 
 from solver.settings import TARGETS
+from studies.contact_compliance import ContactStiffness
 from studies.fe_models.model_files import ModelFiles
 from studyrunner.coordinates import SCENE
 from studyrunner.mission_variables import OF_MISSIONS
@@ -197,6 +198,7 @@ class SceneFileParameters(Section):
     """[scene] of a scene file: the friction coefficient only, if the file has none for each pair."""
 
     friction_coefficient: NotNegative | None = Field(None, description="a number, 0 or more")
+    contact_stiffness: ContactStiffness = None
 
 
 class SceneSection(Section):

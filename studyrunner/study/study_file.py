@@ -45,6 +45,7 @@ from studyrunner.study.scene_axes import (
     is_table,
     keys_as_given,
     only_table,
+    scene_with_axes,
     take_scene_axes,
 )
 from studyrunner.study.scene_errors import scene_errors
@@ -93,12 +94,12 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
     """
     argument = str(study)
     path = _study_path(argument)
-    archived = None
+    archived, own = None, tuple(AxesSection.model_fields)
     try:
         if is_hdf5(path):
             archived = read_archived(path, argument)
             table = read_toml(archived.study.encode(), argument)
-            archived = replace(archived, scene=dict(_section(table, "scene")))
+            archived = replace(archived, scene=scene_with_axes(_section(table, "scene"), _section(table, "axes"), own))
         else:
             table = read_toml_file(path, argument)
     except OSError as error:

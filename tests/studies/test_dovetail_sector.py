@@ -166,7 +166,7 @@ def test_parameters_out_of_range(key, value):
 def test_every_parameter_is_described_with_a_unit():
     fields = Parameters.model_fields
     assert next(iter(fields)) == "friction_coefficient"
-    units = {"-", "m", "rpm", "Pa", "kg/m3", "degrees", "N/m"}
+    units = {"-", "m", "rpm", "Pa", "kg/m3", "degrees", "N/m", "N/m3"}
     assert {(field.description or "").rpartition(", ")[2] for field in fields.values()} == units
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
+from studies.contact_compliance import ContactStiffness
 from studies.scene_error import SceneError
 
 
@@ -69,6 +70,7 @@ class Parameters(Table):
     friction_coefficient: float | dict[str, float] | None = Field(
         None, description="Coulomb's, of all pairs or by the name of a surface of each contact; default: the deck's, -"
     )
+    contact_stiffness: ContactStiffness = None
     matrices: str | None = Field(
         None, description="name that the files with the matrices have in common; without it they are assembled here"
     )

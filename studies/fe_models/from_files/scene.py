@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from importlib import metadata
 
 from pydantic import BaseModel
 
 from solver.model import ReducedModel
+from studies.contact_compliance import build_compliant
 from studies.fe_models.from_files.model import LoadedModel, load_mesh, load_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.mesh_files import read_mesh_file
@@ -30,7 +32,14 @@ def build(files: ModelFiles, parameters: BaseModel, n_harmonics: int, progress: 
     Raises SceneError where the files or parameters describe no possible joint.
     """
     own = checked(parameters)
-    return reduce_model(load_model(files, own, progress), own, n_harmonics, progress).model
+
+    def reduced() -> ReducedModel:
+        return reduce_model(load_model(files, own, progress), own, n_harmonics, progress).model
+
+    if own.contact_stiffness is None:
+        return reduced()
+    what = [describe_origin(files, own), own.model_dump_json(exclude={"contact_stiffness"}), n_harmonics]
+    return build_compliant(json.dumps(what), own.contact_stiffness, reduced)
 
 
 def reduce_model(loaded: LoadedModel, parameters: Parameters, n_harmonics: int, progress: Progress = silent) -> FeScene:

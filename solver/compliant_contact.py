@@ -1,0 +1,86 @@
+"""Compliance of the contact itself: a spring in series with each pair.
+
+Rough surfaces touch at their asperities only. The asperities let two bodies approach, and move along each other, by
+more than the smooth bodies deform. Per unit of area they are springs between the bodies, of the stiffnesses kappa_N and
+kappa_T, N/m3. With the relative displacements v of the bodies and u of the contact,
+
+    Z v = F - lambda,      lambda = kappa alpha (v - u),
+
+so that the condensed compliance of the joint grows by that of the springs: `Z_r^-1 + (kappa alpha)^-1`. The springs are
+linear and have no damping. Those of real surfaces stiffen with the pressure.
+
+kappa_T is `TANGENTIAL_RATIO` kappa_N. For one circular contact that sticks Mindlin, "Compliance of elastic bodies in
+contact", J. Appl. Mech. 16 (1949), gives the ratio 2 (1 - nu) / (2 - nu). Randomly rough surfaces have the same ratio
+(Campana, Persson and Mueser, "Transverse and normal interfacial stiffness of solids with randomly rough surfaces",
+J. Phys.: Condens. Matter 23 (2011) 085001).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+
+from solver.model import FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+
+TANGENTIAL_RATIO = 2.0 * (1.0 - 0.3) / (2.0 - 0.3)
+"""Tangential over normal contact stiffness: Mindlin's ratio for Poisson's ratio 0.3."""
+
+LARGEST_CONTACT_STIFFNESS = 1e22
+"""N/m3. A spring between two layers of atoms in a metal has 1e21: what is stiffer is rigid."""
+
+
+def with_contact_stiffness(model: ReducedModel, contact_stiffness: float) -> ReducedModel:
+    """The model with a spring in series with each displacement of each pair.
+
+    The relative displacements of the new model are those of the contact, at the same indices. Behind all displacements
+    of the model follow the scaled compressions of the springs, one for each relative displacement. Responses, loads and
+    all else are the same.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        The model of the joint without the springs.
+    contact_stiffness : float
+        Normal stiffness kappa_N per area, N/m3. The tangential one is `TANGENTIAL_RATIO` times as large.
+
+    Raises
+    ------
+    ValueError
+        The stiffness is not between 0 and `LARGEST_CONTACT_STIFFNESS`.
+    """
+    if not 0.0 < contact_stiffness <= LARGEST_CONTACT_STIFFNESS:
+        remedy = f"give a positive number, at most {LARGEST_CONTACT_STIFFNESS:g} N/m3"
+        raise ValueError(f"contact_stiffness is {contact_stiffness}: {remedy}")
+    components = np.flatnonzero(model.contact.dofs.ravel() >= 0)
+    relative = model.contact.dofs.ravel()[components]
+    share = np.where(components % 3 == 0, 1.0, TANGENTIAL_RATIO)
+    springs = contact_stiffness * share * model.contact.area[components // 3]
+    # Compressions of stiff springs are small. Their scale leaves all displacements with stiffnesses of one size.
+    largest = float(np.abs(np.diag(model.linear[0].stiffness)).max())
+    scale = np.sqrt(largest / (largest + springs)) if largest > 0.0 else np.ones(relative.size)
+    linear = {k: _softened(each, relative, scale, springs * scale**2) for k, each in model.linear.items()}
+    return replace(model, linear=linear)
+
+
+def _softened(linear: LinearModel, relative: IntArray, scale: FloatArray, springs: FloatArray) -> LinearModel:
+    """The linear model with the compressions over `scale` (n_rel,) as further displacements; springs (n_rel,): N/m."""
+    n = len(linear.mass)
+    # v = u + compression. With v as the second unknown the difference of two large stiffnesses would lose digits.
+    places = np.concatenate([np.arange(n), relative])
+    factor = np.concatenate([np.ones(n), scale])
+    mass, damping, stiffness = (
+        cast("Matrix", part[np.ix_(places, places)] * np.outer(factor, factor))
+        for part in (linear.mass, linear.damping, linear.stiffness)
+    )
+    own = np.arange(n, len(places))
+    stiffness[own, own] += springs
+    return LinearModel(
+        mass=mass,
+        damping=damping,
+        stiffness=stiffness,
+        load_static=linear.load_static[places] * factor,
+        load_harmonic=linear.load_harmonic[places] * factor,
+        response=linear.response[:, places] * factor,
+    )

@@ -1,0 +1,146 @@
+"""Springs in series with the pairs: condensed compliance, closed forms, other unknowns, the rigid limit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from solver import build_model, frequency_response, march_wear, with_contact_stiffness
+from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, TANGENTIAL_RATIO
+from solver.model import ReducedModel
+from solver.structure.condensation import build_structure, relative_indices
+from studies import build_scene
+from tests.references import den_hartog_amplitude, slider_wear_depth
+from tests.solver.models import OMEGA, cyclic_model, random_model
+
+KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
+SOFT = 2e11  # N/m3; with the areas of the models about their stiffness
+
+
+@pytest.mark.parametrize("contact_stiffness", [1e-3 * SOFT, SOFT, 1e4 * SOFT, LARGEST_CONTACT_STIFFNESS])
+@pytest.mark.parametrize("wave", [False, True])
+def test_contact_forces_move_the_contact_by_the_springs_more(wave: bool, contact_stiffness: float) -> None:
+    rigid = cyclic_model(9, KINDS, 6, 2, 5) if wave else random_model(1, KINDS, 4)
+    soft = with_contact_stiffness(rigid, contact_stiffness)
+    relative, components = relative_indices(rigid.contact)
+    assert relative_indices(soft.contact)[0].tolist() == relative.tolist()
+    orders = (1, 2, 3)
+    body, joint = (build_structure(model, OMEGA, 60.0, orders) for model in (rigid, soft))
+    # forces of the contact that drive the bodies to some motion v, and the motion u of the contact
+    moved = np.random.default_rng(2).normal(size=(relative.size, 7)) * 1e-6
+    force = body.force_h() - body.apply(moved)
+    ratio = np.where(components % 3 == 0, 1.0, 2.0 * 0.7 / 1.7)
+    springs = contact_stiffness * ratio * rigid.contact.area[components // 3]
+    contact = moved - force / springs[:, None]
+    assert np.abs(joint.force_h() - joint.apply(contact) - force).max() < 1e-9 * np.abs(force).max()
+    expected = body.response_h(moved)
+    assert joint.response_h(contact) == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+    # energy: the springs take none, so that what the excitation puts in leaves through the contact or the dampers
+    assert joint.input_work(contact) == pytest.approx(body.input_work(moved), rel=1e-8)
+
+
+def test_a_stuck_block_on_its_foundation_is_a_mass_on_two_springs() -> None:
+    contact_stiffness = 5e9
+    block = build_scene("sdof_slider", normal_load=1e6, normal_stiffness=0.0, contact_stiffness=contact_stiffness)
+    spring = 1.6e5 + TANGENTIAL_RATIO * contact_stiffness * 1e-4
+    for frequency in (160.0, 300.0):
+        found = frequency_response(block, frequency, 10.0, friction_coefficient=0.5).response[0, 0]
+        assert abs(found) == pytest.approx(10.0 / abs(spring - 0.1 * (2.0 * np.pi * frequency) ** 2), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_wall_and_its_contact_are_two_springs_in_series() -> None:
+    """The same bilinear spring: a wall of 100 N/m, and one of 200 N/m behind a contact of 200 N/m."""
+    one = build_scene("vibro_impact")
+    both = build_scene("vibro_impact", wall_stiffness=200.0, contact_stiffness=200.0 / 1e-4)
+    found, expected = (
+        frequency_response(model, [0.18, 0.19, 0.2], 0.02, friction_coefficient=0.0) for model in (both, one)
+    )
+    assert found.outcome == expected.outcome
+    assert found.response == pytest.approx(expected.response, rel=1e-7)
+
+
+@pytest.mark.slow
+def test_wear_relaxes_the_spring_that_presses_and_the_contact_in_series() -> None:
+    """Den Hartog's slider: along the support the contact is rigid beside the mount, across it twice as stiff."""
+    springs = {"normal_stiffness": 5e10, "contact_stiffness": 1e15}
+    cycles = np.array([0.0, 100.0, 250.0])
+    expected = slider_wear_depth(
+        cycles,
+        wear_coefficient=1.1e-14,
+        area=1e-4,
+        friction_coefficient=0.5,
+        # the far end of the pressing spring stays where it is
+        normal_load=10.0 / (1.0 + 5e10 / 1e11),
+        normal_stiffness=1.0 / (1.0 / 5e10 + 1.0 / 1e11),
+        amplitude=lambda friction: den_hartog_amplitude(0.1, 1.6e5, 10.0, friction, 2.0 * np.pi * 160.0),
+    )
+    history = march_wear(build_scene("sdof_slider", **springs), 160.0, 10.0, 0.5, 1.1e-14, cycles)
+    assert expected[-1] > 0.3 * 10.0 / 5e10
+    assert history.wear_depth[:, 0] == pytest.approx(expected, rel=5e-3)
+
+
+def _with_bodies_as_unknowns(model: ReducedModel, contact_stiffness: float) -> ReducedModel:
+    """The same joint in [u | v | inner displacements]: springs between contact and bodies, the mass on the bodies."""
+    linear, contact = model.linear[0], model.contact
+    relative, components = relative_indices(contact)
+    n_rel, n = relative.size, len(linear.mass)
+    springs = contact_stiffness * np.where(components % 3, TANGENTIAL_RATIO, 1.0) * contact.area[components // 3]
+    bodies = n_rel + np.arange(n)
+    mass, damping, stiffness = (np.zeros((n_rel + n, n_rel + n)) for _ in range(3))
+    for whole, part in ((mass, linear.mass), (damping, linear.damping), (stiffness, linear.stiffness)):
+        whole[np.ix_(bodies, bodies)] = part
+    own, there = np.arange(n_rel), n_rel + relative
+    stiffness[own, own] += springs
+    stiffness[there, there] += springs
+    stiffness[own, there] -= springs
+    stiffness[there, own] -= springs
+    dofs = np.full(contact.dofs.shape, -1)
+    dofs.ravel()[components] = own
+    none = np.zeros(n_rel)
+    return build_model(
+        mass,
+        damping,
+        stiffness,
+        dofs,
+        contact.area,
+        load_harmonic=np.concatenate([none, linear.load_harmonic]),
+        load_static=np.concatenate([none, linear.load_static]),
+        response=np.hstack([np.zeros((len(linear.response), n_rel)), linear.response]),
+        normal_load=contact.normal_load,
+    )
+
+
+@pytest.mark.slow
+def test_a_joint_is_the_same_whichever_displacements_are_its_unknowns() -> None:
+    rigid = random_model(3, ("3d", "3d", "one_tangent"), 3)
+    soft, bodies = with_contact_stiffness(rigid, SOFT), _with_bodies_as_unknowns(rigid, SOFT)
+    frequency = OMEGA / (2.0 * np.pi)
+    soft_response, expected = (frequency_response(model, frequency, 60.0, 0.3) for model in (soft, bodies))
+    stiff_response = frequency_response(rigid, frequency, 60.0, 0.3).response
+    assert soft_response.response == pytest.approx(expected.response, rel=1e-6)
+    assert np.abs(stiff_response / expected.response - 1.0).max() > 0.05
+    cycles = [0.0, 2000.0]
+    soft_wear, expected_wear = (
+        march_wear(model, frequency, 60.0, 0.3, 1e-12, cycles, scheme="implicit", step=1000.0)
+        for model in (soft, bodies)
+    )
+    assert expected_wear.wear_depth[-1].max() > 0.0
+    assert soft_wear.wear_depth == pytest.approx(expected_wear.wear_depth, rel=1e-5)
+
+
+def test_a_rigid_contact_is_the_limit() -> None:
+    rigid = build_scene("sdof_slider")
+    stiff = build_scene("sdof_slider", contact_stiffness=LARGEST_CONTACT_STIFFNESS)
+    found, expected = (
+        march_wear(model, 160.0, 10.0, 0.5, 1.1e-11, [0.0, 2000.0], scheme="implicit", step=1000.0)
+        for model in (stiff, rigid)
+    )
+    assert found.wear_depth == pytest.approx(expected.wear_depth, rel=1e-8)
+    assert found.response == pytest.approx(expected.response, rel=1e-8)
+
+
+@pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, np.inf, 1e23])
+def test_a_contact_stiffness_that_cannot_be_is_said(wrong: float) -> None:
+    with pytest.raises(ValueError, match="give a positive number, at most 1e"):
+        with_contact_stiffness(random_model(1, KINDS, 4), wrong)
