@@ -43,13 +43,20 @@ class _LinearJoint:
     def resonances(self, low: float, high: float) -> list[FloatArray]:
         """Frequencies, rad/s, around each resonance between two frequencies, closer than its width."""
         elastic = 0.5 * (self.stiffness + self.stiffness.conj().T)
-        squares, shapes = scipy.linalg.eigh(elastic, self.mass)
+        try:
+            squares, shapes = scipy.linalg.eigh(elastic, self.mass)
+        except np.linalg.LinAlgError:
+            # a displacement without mass
+            squares, shapes = scipy.linalg.eig(elastic, self.mass)
+            squares = np.where(np.isfinite(squares), squares, 0.0).real
         frequencies = np.sqrt(np.maximum(squares, 0.0))
         around = []
         for omega, shape in zip(frequencies, shapes.T, strict=True):
             if low <= omega <= high:
                 lost = self.stiffness - elastic + 1j * omega * self.damping
-                ratio = max(abs(np.vdot(shape, lost @ shape).imag) / (2.0 * omega**2), COMMON.negligible)
+                inertia = np.vdot(shape, self.mass @ shape).real
+                ratio = abs(np.vdot(shape, lost @ shape).imag) / (2.0 * omega**2 * inertia)
+                ratio = max(ratio, COMMON.negligible)
                 around.append(omega * (1.0 + ratio * np.linspace(-4.0, 4.0, 65)))
         return around
 
@@ -70,7 +77,7 @@ def find_other_peak(model: ReducedModel, state: PeriodicState, follow: FollowedF
         products, responses = np.array([joint.values(float(omega)) for omega in places]).T
         here = joint.values(state.omega)
     except np.linalg.LinAlgError:
-        # a displacement without mass, or without stiffness: no other one is known
+        # a displacement without mass and stiffness: no other one is known
         return math.nan
     if follow.of == "resonance":
         size, present = np.abs(products.imag), abs(here[0].imag)

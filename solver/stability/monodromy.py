@@ -25,7 +25,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from scipy.sparse import csr_array
 
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit, sample_tangents
@@ -75,78 +74,57 @@ class Monodromy:
         return 4 * len(self.inertia)
 
     @cached_property
-    def _operators(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Arrays of a time step.
-
-        - (n, 2n): from the acceleration and the velocity without the step to minus the free motion.
-        - (n, 3p): motion under unit contact forces, m/N.
-        - (N, 3p, 3p): inverse of the law for the forces.
-        - (N, p, 3, 12): from the motion and the velocity at the sample before, the free motion and the velocity without
-          the step to the right-hand side of the law.
-        """
-        free = np.hstack([self.compliance @ self.inertia, self.compliance @ self.drag])
-        spread = np.ascontiguousarray((self.select @ self.compliance).T)
+    def _contact(self) -> tuple[FloatArray, FloatArray]:
+        """Motion under unit contact forces (n, 3p), m/N, and the inverse (N, 3p, 3p) of the law for the forces."""
+        spread = np.asarray(self.select @ self.compliance).T
         flexibility = np.asarray(self.select @ spread)
         n_samples, n_pairs = self.law.by_force.shape[:2]
         blocks = flexibility.reshape(n_pairs, 3, 3 * n_pairs)
         inverse = np.empty((n_samples, 3 * n_pairs, 3 * n_pairs))
         pairs = np.arange(n_pairs)
-        law = self.law
-        by_free = law.by_motion + 1.5 * law.by_speed
         for n in range(n_samples):
-            system = -(by_free[n] @ blocks)
-            system.reshape(n_pairs, 3, n_pairs, 3)[pairs, :, pairs] += law.by_force[n]
+            system = -((self.law.by_motion[n] + 1.5 * self.law.by_speed[n]) @ blocks)
+            system.reshape(n_pairs, 3, n_pairs, 3)[pairs, :, pairs] += self.law.by_force[n]
             inverse[n] = np.linalg.inv(system.reshape(3 * n_pairs, 3 * n_pairs))
-        right = np.concatenate([law.by_last_motion, law.by_last_speed, -by_free, -law.by_speed], axis=3)
-        return free, spread, inverse, right
+        return spread, inverse
 
     @cached_property
-    def _chosen(self) -> IntArray:
-        """Displacement (3p,) that is each motion of the switching pairs, -1 where there is none."""
-        rows, places = self.select.nonzero()
-        chosen = np.full(self.select.shape[0], -1)
-        chosen[rows] = places
-        return chosen
+    def _response(self) -> FloatArray:
+        """Motion (n, 2n) without contact forces from the known parts of acceleration and velocity, m per sample."""
+        return -self.compliance @ np.hstack([self.inertia, self.drag])
+
+    @cached_property
+    def _law_of_past(self) -> FloatArray:
+        """Right-hand side of the law (N, p, 3, 12) from `du` without contact forces, `du'`, known velocity, `dv'`."""
+        law = self.law
+        parts = (-law.by_motion - 1.5 * law.by_speed, law.by_last_motion, -law.by_speed, law.by_last_speed)
+        return np.concatenate(parts, axis=3)
+
+    @cached_property
+    def _places(self) -> IntArray:
+        """Places (12p,) of what `_law_of_past` takes in four motions of n rows, and 4n for what does not exist."""
+        n, n_rows = len(self.inertia), self.select.shape[0]
+        place = np.full(n_rows, -1)
+        place[np.repeat(np.arange(n_rows), np.diff(self.select.indptr))] = self.select.indices
+        places = place.reshape(-1, 1, 3) + n * np.arange(4)[:, None]
+        return np.where(place.reshape(-1, 1, 3) < 0, 4 * n, places).ravel()
 
     def apply(self, disturbance: FloatArray) -> FloatArray:
         """Disturbances (size, j) a period later: displacements now and at the sample before, velocities likewise."""
-        parts = np.ascontiguousarray(disturbance.reshape(4, -1, disturbance.shape[1]))
-        return _integrate(*self._operators, self._chosen, parts).reshape(disturbance.shape)
-
-
-@njit(cache=True)
-def _integrate(
-    free: FloatArray, spread: FloatArray, inverse: FloatArray, law: FloatArray, chosen: IntArray, parts: FloatArray
-) -> FloatArray:
-    """Disturbances (4, n, j) a period later; the operators are those of `Monodromy`."""
-    now, before, speed, speed_before = parts[0].copy(), parts[1].copy(), parts[2].copy(), parts[3].copy()
-    size, columns = now.shape
-    moved = np.zeros((4, chosen.size, columns))
-    right = np.zeros((chosen.size, columns))
-    pushed = np.zeros((2 * size, columns))
-    for n in range(len(inverse)):
-        # BDF2: v = 3/2 y + known; acceleration from v in the same way
-        known = 0.5 * before - 2.0 * now
-        pushed[:size] = 1.5 * known + 0.5 * speed_before - 2.0 * speed
-        pushed[size:] = known
-        after = -np.dot(free, pushed)
-        if chosen.size:
-            for row in range(chosen.size):
-                place = chosen[row]
-                if place >= 0:
-                    moved[0, row], moved[1, row] = now[place], speed[place]
-                    moved[2, row], moved[3, row] = after[place], known[place]
-            for row in range(chosen.size):
-                pair, own = row // 3, row % 3
-                right[row] = 0.0
-                for part in range(4):
-                    for other in range(3):
-                        right[row] += law[n, pair, own, 3 * part + other] * moved[part, 3 * pair + other]
-            after -= np.dot(spread, np.dot(inverse[n], right))
-        now, before, speed, speed_before = after, now, 1.5 * after + known, speed
-    last = np.empty_like(parts)
-    last[0], last[1], last[2], last[3] = now, before, speed, speed_before
-    return last
+        n_columns = disturbance.shape[1]
+        now, before, speed, speed_before = np.split(disturbance, 4)
+        spread, inverse = self._contact
+        nothing = np.zeros((1, n_columns))
+        for n, solve in enumerate(inverse):
+            # BDF2: v = 3/2 y + known; acceleration from v in the same way
+            known = 0.5 * before - 2.0 * now
+            after = self._response @ np.concatenate([1.5 * known + 0.5 * speed_before - 2.0 * speed, known])
+            if solve.size:
+                past = np.concatenate([after, now, known, speed, nothing])[self._places]
+                right = self._law_of_past[n] @ past.reshape(-1, 12, n_columns)
+                after -= spread @ (solve @ right.reshape(-1, n_columns))
+            now, before, speed, speed_before = after, now, 1.5 * after + known, speed
+        return np.concatenate([now, before, speed, speed_before])
 
 
 def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples: int) -> Monodromy:

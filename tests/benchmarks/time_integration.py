@@ -16,7 +16,9 @@ after a fast ramp. Nothing of the solver is used but the model.
 - The first mode of the glued joint dies out slowly, in some 300 periods. While the joint wears, and while an unworn
   motion settles, its complex amplitude goes several times as far in each period as by itself (projective integration,
   Gear and Kevrekidis, SIAM J. Sci. Comput. 24 (2003) 1091); all else follows in a few periods. The motion lags behind
-  the wear, an error of first order in the cycles of a period. A motion that does not settle ends the run.
+  the wear: at first an error as the cycles of a period, at the end of the wear about as their square (1e5 cycles,
+  212.42 Hz, 80, 40, 20 cycles a period: 1.8946, 1.8856, 1.8832 mm3; 212.6 Hz: 1.8189, 1.8100, 1.8096; 250 or 500 steps:
+  1.8946, 1.8948). A motion that does not settle ends the run.
 """
 
 import argparse
