@@ -1,4 +1,7 @@
-"""Errors that a user can cause: one line that names the file, the key, the value and what would be right."""
+"""Errors that a user can cause: one line that names the file, the key, the value and what would be right.
+
+By hand: `rich` takes five control characters out of a text, and leaves those that move the cursor.
+"""
 
 from __future__ import annotations
 

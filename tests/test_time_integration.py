@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from solver import backbone, build_model
+from tests.benchmarks.free_decay import decay_of, free_decay
 from tests.benchmarks.time_integration import (
-    advance,
     at_rest,
     build,
     first_harmonic,
@@ -72,34 +72,6 @@ def test_wear_of_a_slider_follows_its_differential_equation():
     )
     assert cycle == pytest.approx(1e5)
     assert depth[0] == pytest.approx(exact[-1], rel=1e-2)
-
-
-def free_decay(structure, motion, gap, periods):
-    """Displacements (n_times, n), m, without excitation from a motion on, in the steps of the structure."""
-    n_steps = round(2.0 * np.pi / (structure.omega * structure.step))
-    loads = np.repeat(structure.static[None], n_steps, axis=0)
-    seen = []
-    for _ in range(periods):
-        motion = advance(structure, motion, gap, loads)
-        seen.append(motion.responses)
-    return np.concatenate(seen)
-
-
-def decay_of(signal, step):
-    """Amplitude, frequency, Hz, and damping ratio of each cycle of a decaying signal (n_times,).
-
-    From its peaks up and down, each by a parabola through three samples: amplitude over half a cycle to both sides.
-    """
-    middle = signal[1:-1]
-    turns = 1 + np.flatnonzero((middle - signal[:-2]) * (signal[2:] - middle) < 0.0)
-    left, here, right = signal[turns - 1], signal[turns], signal[turns + 1]
-    offset = 0.5 * (left - right) / (left - 2.0 * here + right)
-    times, peaks = step * (turns + offset), here - 0.25 * (left - right) * offset
-    heights = 0.5 * np.abs(np.diff(peaks))
-    middles = 0.5 * (times[1:] + times[:-1])
-    span = middles[2:] - middles[:-2]
-    rate = np.log(heights[:-2] / heights[2:])
-    return heights[1:-1], 1.0 / span, rate / np.hypot(2.0 * np.pi, rate)
 
 
 def decaying(model, place, pull, frequency, periods):

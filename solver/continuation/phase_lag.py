@@ -158,7 +158,8 @@ def frequency_derivative(state: LaggingState) -> FrequencyDerivative:
     slope = frequency_slope(joint.model, joint.omega, amplitude, orders, u)
     residual, product, response = slope.force, slope.product, complex(slope.response[0])
     if joint.penalty.inertial.any():
-        length = COMMON.difference * joint.omega
+        # longer than usual: the round-off of the static forces is small against the change of all others
+        length = 10.0 * COMMON.difference * joint.omega
         ahead = replace(state.balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
         motion = (ahead.displacement_h - at.displacement_h) / length
         residual = residual + (ahead.residual - at.residual) / length

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
 from solver.continuation.largest_response import solve_at_peak
 from solver.continuation.phase_lag import phase_lag
@@ -119,6 +118,8 @@ def _between(excess: Callable[[float], float], one: float, other: float, nodes: 
     if excess(one) <= 0.0:
         # zero but for round-off
         return one
+    from scipy.optimize import brentq  # where it is used: it takes a while to load
+
     found = float(brentq(excess, one, other, xtol=nodes.case.settings.tolerance * one, rtol=1e-12))
     assert nodes.ahead is not None
     for fold in nodes.ahead.folds:

@@ -128,7 +128,7 @@ def _change(problem: ModeProblem, state: ModeState, resolution: Resolution, budg
 
 
 def describe_loss(sweep: AmplitudeSweep) -> str:
-    """Sentence about the end of a mode: the last amplitude, and an internal resonance where there is one."""
+    """Sentence about the end of a mode: the last amplitude, and what ends the mode there."""
     here, problem = sweep.nodes.here, sweep.nodes.problem
     way = "up" if sweep.direction > 0.0 else "down"
     said = f"the mode is followed {way} to the amplitude {here.amplitude:.4g} m sqrt(kg), at {_hertz(here.omega)}"
@@ -139,7 +139,8 @@ def describe_loss(sweep: AmplitudeSweep) -> str:
         near = omegas[np.abs(omegas - order * here.omega) < MODES.near_resonance * order * here.omega]
         if near.size:
             return f"{said}, where harmonic {order} meets the natural frequency {_hertz(float(near[0]))} of the joint"
-    return said
+    beyond = "larger" if sweep.direction > 0.0 else "smaller"
+    return f"{said}; no state is found at a {beyond} amplitude: the mode turns back there (a fold), or ends"
 
 
 def _hertz(omega: float) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from solver.clock import computing_time
 from solver.model import FloatArray, ReducedModel
 from solver.modes.amplitude_sweep import AmplitudeSweep, Nodes
-from solver.modes.mode_point import ModePoint, judge_point, solve_point
+from solver.modes.mode_point import ModePoint, describe_loss, judge_point, solve_point
 from solver.modes.mode_start import Rest, find_rest, first_amplitude, first_node, sliding_node
 from solver.modes.options import MODES
 from solver.newton.solve_balance import Budget, OutOfTimeError
@@ -123,6 +123,10 @@ class _Way:
         sweep = None if first else self._sweep_to(self._rest, amplitude)
         if sweep is None and not first:
             return self._failed()
+        if self._direction == "down" and amplitude > self._down[top_of(amplitude)].nodes.here.amplitude:
+            # the mode could not be raised to the amplitude from which it is lowered
+            assert self._up is not None
+            return ModePoint(Outcome.BRANCH_LOST, describe_loss(self._up))
         before = self.budget.iterations
         try:
             if sweep is not None:

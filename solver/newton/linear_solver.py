@@ -18,6 +18,7 @@ from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.cost import is_dense_cheapest, worthwhile_products
 from solver.newton.krylov import Recycled, ritz_values, solve_gmres
 from solver.newton.options import NEWTON
+from solver.newton.period_preconditioner import PeriodFactor
 from solver.newton.preconditioner import Factor, build_factor
 from solver.newton.slip_preconditioner import SlipFactor, build_slip_factor, find_slip_space
 
@@ -28,6 +29,7 @@ class JacobianSolver:
 
     _factor: Factor | None = field(default=None, repr=False)
     _recycled: Recycled = field(default_factory=Recycled, repr=False)
+    _products: list[int] = field(default_factory=list, repr=False)
     _by_parameter: FloatArray | None = field(default=None, repr=False)
     _epoch: int = field(default=0, repr=False)
 
@@ -159,8 +161,20 @@ class JacobianSolver:
         return factor.sign * float((-1) ** negative), _settled(values, residuals)
 
     def _keep(self, factor: Factor) -> Factor:
-        self._factor, self._recycled = factor, Recycled()
+        self._factor, self._recycled, self._products = factor, Recycled(), []
         return factor
+
+    def _note(self, products: int) -> None:
+        """Note the products of a solve; drop a march through the period whose products have grown.
+
+        Products grow slowly while a joint wears. The march is dropped when the products beyond those of its first
+        solves have cost as much as another march.
+        """
+        first, most = NEWTON.renewal
+        self._products.append(products)
+        usual = float(np.mean(self._products[:first]))
+        if sum(self._products) - usual * len(self._products) > most and isinstance(self._factor, PeriodFactor):
+            self._factor = None
 
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
         """Solution (n_rel, m) in the rows of the active pairs, with the kept factorisation while products are few."""
@@ -169,14 +183,17 @@ class JacobianSolver:
             if isinstance(self._factor, SlipFactor) and self._factor.exact:
                 space = self._factor.space
                 products = worthwhile_products(space.pairs.size, right.shape[1], space.size)
-            solution, found = self._iterate(self._factor, tangent, right, rtol, products, 1)
+            solution, taken, found = self._iterate(self._factor, tangent, right, rtol, products, 1)
             if found:
+                self._note(taken)
                 return solution
         factor = self._keep(build_factor(tangent))
         if factor.exact:
             return self._solve_exactly(factor, tangent, right)
         # convergence is not required: Newton's method judges by the true residual
-        return self._iterate(factor, tangent, right, rtol, NEWTON.products, np.inf)[0]
+        solution, taken, _ = self._iterate(factor, tangent, right, rtol, NEWTON.products, np.inf)
+        self._note(taken)
+        return solution
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, right: FloatArray) -> FloatArray:
         """Solution by a factorisation of this Jacobian; a second solve corrects for the shift of neutral directions."""
@@ -193,9 +210,9 @@ class JacobianSolver:
 
     def _iterate(
         self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, products: int, cycles: float
-    ) -> tuple[FloatArray, bool]:
-        """Solution (n_rel, m) by GMRES in the rows of the active pairs, and whether it was found."""
-        rest = _passive_rows(tangent)
+    ) -> tuple[FloatArray, int, bool]:
+        """Solution (n_rel, m) by GMRES in the rows of the active pairs, products it took, and whether it was found."""
+        rest, taken = _passive_rows(tangent), 0
 
         def precondition(vector: FloatArray) -> FloatArray:
             solved = factor.solve(vector.reshape(right.shape))
@@ -203,6 +220,8 @@ class JacobianSolver:
             return solved
 
         def product(vector: FloatArray) -> FloatArray:
+            nonlocal taken
+            taken += 1
             image = tangent.apply_roughly(precondition(vector))
             image[rest] = 0.0
             return image.ravel()
@@ -216,7 +235,7 @@ class JacobianSolver:
         wanted[rest] = 0.0
         # preconditioned from the right: the residual of GMRES is the true one
         solution, found = solve_gmres(product, wanted.ravel(), rtol, products, cycles, exact, self._recycled)
-        return precondition(solution), found
+        return precondition(solution), taken, found
 
 
 def _passive_rows(tangent: Linearisation) -> IntArray:

@@ -42,6 +42,12 @@ class NewtonOptions:
     """Most products of a GMRES cycle, and of Arnoldi's method for a determinant or for Floquet multipliers. GMRES finds
     resonances one by one. At 160 pairs, eigenvalues at 0.01 converge with 32."""
 
+    renewal: tuple[int, int] = (10, 30)
+    """First solves with a march through the period, whose mean products are the usual ones; and products beyond the
+    usual ones after which the march is built anew. Building one takes as long as 20 products with 48 pairs, as 34 with
+    336. Histories of the dovetail (48 pairs) take 0.7 of the products with 15 to 40; of 336 pairs, whose products do
+    not grow, as many as without."""
+
     # choice of the factorisation (`cost`), in operations of a factorisation: 22e9 to 27e9 in a second of one core
     vector_cost: float = 7.0
     """Cost of an operation of a product with a vector: 3.5e9 to 3.8e9 such operations in a second."""

@@ -57,9 +57,23 @@ def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> s
 
 def _remarks(history: WearHistory, count: float, slower: float) -> list[str]:
     """Further sentences about a history up to a count of its own."""
+    said = []
     if math.inf > history.held_from <= count:
-        return [describe_hold(history.held_from / slower)]
-    return []
+        said.append(describe_hold(history.held_from / slower))
+    first, last = history.other_peaks
+    if math.isfinite(first):
+        said.append(_describe_other_peak("in the beginning", first, float(history.excitation_frequency[0])))
+    elif math.isfinite(last) and count >= history.last_cycle:
+        said.append(_describe_other_peak("in the end", last, float(history.excitation_frequency[-1])))
+    return said
+
+
+def _describe_other_peak(when: str, other: float, followed: float) -> str:
+    """Sentence about another peak, Hz, in the range of a followed frequency, Hz."""
+    return (
+        f"{when} the response has another peak in the range, near {other:.5g} Hz; the history follows the one at"
+        f" {followed:.6g} Hz"
+    )
 
 
 def describe_hold(cycle: float) -> str:

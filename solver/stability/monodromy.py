@@ -88,21 +88,41 @@ class Monodromy:
             inverse[n] = np.linalg.inv(system.reshape(3 * n_pairs, 3 * n_pairs))
         return spread, inverse
 
+    @cached_property
+    def _response(self) -> FloatArray:
+        """Motion (n, 2n) without contact forces from the known parts of acceleration and velocity, m per sample."""
+        return -self.compliance @ np.hstack([self.inertia, self.drag])
+
+    @cached_property
+    def _law_of_past(self) -> FloatArray:
+        """Right-hand side of the law (N, p, 3, 12) from `du` without contact forces, `du'`, known velocity, `dv'`."""
+        law = self.law
+        parts = (-law.by_motion - 1.5 * law.by_speed, law.by_last_motion, -law.by_speed, law.by_last_speed)
+        return np.concatenate(parts, axis=3)
+
+    @cached_property
+    def _places(self) -> IntArray:
+        """Places (12p,) of what `_law_of_past` takes in four motions of n rows, and 4n for what does not exist."""
+        n, n_rows = len(self.inertia), self.select.shape[0]
+        place = np.full(n_rows, -1)
+        place[np.repeat(np.arange(n_rows), np.diff(self.select.indptr))] = self.select.indices
+        places = place.reshape(-1, 1, 3) + n * np.arange(4)[:, None]
+        return np.where(place.reshape(-1, 1, 3) < 0, 4 * n, places).ravel()
+
     def apply(self, disturbance: FloatArray) -> FloatArray:
         """Disturbances (size, j) a period later: displacements now and at the sample before, velocities likewise."""
+        n_columns = disturbance.shape[1]
         now, before, speed, speed_before = np.split(disturbance, 4)
-        law, shape = self.law, (-1, 3, disturbance.shape[1])
         spread, inverse = self._contact
+        nothing = np.zeros((1, n_columns))
         for n, solve in enumerate(inverse):
             # BDF2: v = 3/2 y + known; acceleration from v in the same way
             known = 0.5 * before - 2.0 * now
-            push = self.inertia @ (1.5 * known + 0.5 * speed_before - 2.0 * speed) + self.drag @ known
-            after = -(self.compliance @ push)
+            after = self._response @ np.concatenate([1.5 * known + 0.5 * speed_before - 2.0 * speed, known])
             if solve.size:
-                free, last, given, swift = ((self.select @ part).reshape(shape) for part in (after, now, known, speed))
-                right = law.by_last_motion[n] @ last + law.by_last_speed[n] @ swift
-                right -= law.by_motion[n] @ free + law.by_speed[n] @ (1.5 * free + given)
-                after -= spread @ (solve @ right.reshape(-1, disturbance.shape[1]))
+                past = np.concatenate([after, now, known, speed, nothing])[self._places]
+                right = self._law_of_past[n] @ past.reshape(-1, 12, n_columns)
+                after -= spread @ (solve @ right.reshape(-1, n_columns))
             now, before, speed, speed_before = after, now, 1.5 * after + known, speed
         return np.concatenate([now, before, speed, speed_before])
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq
 
 from solver.model import FloatArray
 
@@ -64,4 +63,6 @@ def fraction_where(value: float, volume: Callable[[float], float]) -> float:
     """
     if volume(0.0) >= value or volume(1.0) <= value:
         return 0.0 if volume(0.0) >= value else 1.0
+    from scipy.optimize import brentq  # where it is used: it takes a while to load
+
     return float(brentq(lambda fraction: volume(fraction) - value, 0.0, 1.0, xtol=1e-12))

@@ -197,7 +197,9 @@ def prepare_model(
         return PreparedModel(still, load, None, model.rotation)
     progress("static state of the glued structure under the centrifugal load")
     try:
-        displacements = still.solve_static(_centrifugal_load(mass, model.coordinates, model.rotation))
+        # by a reduction of its own: the factors of a large model are not to be kept beside those that follow
+        centrifugal = _centrifugal_load(mass, model.coordinates, model.rotation)
+        displacements = Reduction(ordered, still.forms).solve_static(centrifugal)
     except GluedStructureError as error:
         raise _refused(error, 0, model.rotation) from error
     progress("assembly of the prestressed stiffness")

@@ -1,6 +1,8 @@
 """Writes the records of wear histories to one NetCDF file, under a temporary name that is changed at the end.
 
 The file is written in slabs from the file of a run. Only one slab is in memory, whatever the number of points.
+
+By hand: `to_netcdf` of xarray has the whole result in memory, or needs dask.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Software of a result: address of publication and commit, where they are known.
 
 A result does not need these attributes: what is missing, damaged or slow is left out.
+
+By hand: `setuptools-scm` knows the commit of the installation, not of the checkout that runs.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 A changed study uses the results with unchanged hashes. A start state depends on its own frequency and on its sweep, not
 on the other frequencies of the study, as the steps of a sweep follow from the joint. A wear history depends on its
 start state.
+
+By hand: `joblib.hash` hashes pickled bytes, which change with the versions of Python and numpy.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Lines of equal value over maps, at levels that the maps of a figure and their colour bar share."""
+"""Lines of equal value over maps, at levels that the maps of a figure and their colour bar share.
+
+By hand: `clabel` of matplotlib puts labels over the border of a map and over other lines.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Designs of samples in the unit cube: Sobol' sequence, Latin hypercube, random, Saltelli."""
+"""Designs of samples in the unit cube: Sobol' sequence, Latin hypercube, random, Saltelli.
+
+By hand: a column of `scipy.stats.qmc` depends on the number of columns; its plain Sobol' sequence is used.
+"""
 
 from __future__ import annotations
 

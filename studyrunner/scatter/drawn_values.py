@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cholesky
-from scipy.special import ndtri
 
 from studyrunner.scatter.design import unit_design
 from studyrunner.scatter.section import Distribution, Kind, Of, Scattered, ScatterSection
@@ -67,6 +66,8 @@ def drawn(section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: S
     Raises WrongValueError, with its key, where a draw is none that physics allows, positions are missing, or a relative
     width is one of 0.
     """
+    from scipy.special import ndtri  # where it is used: it takes a while to load
+
     inputs = section.inputs
     groups = [_n_columns(each, pairs) for each in inputs.values()]
     design = unit_design(section.method, section.seed, section.samples, sum(groups), groups)

@@ -8,7 +8,6 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_serializer, model_validator
-from scipy.special import ndtr
 
 from studyrunner.user_error import WrongValueError
 
@@ -118,6 +117,8 @@ class Uniform(_Table):
 
     def draw(self, score: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values or offsets of standard normal scores, shape of the scores."""
+        from scipy.special import ndtr  # where it is used: it takes a while to load
+
         share = ndtr(score)
         if self.low is not None and self.high is not None:
             return np.asarray(self.low + (self.high - self.low) * share)

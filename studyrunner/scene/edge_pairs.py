@@ -2,6 +2,8 @@
 
 A pair is inside where its neighbours surround it. Neighbours are those of a Delaunay triangulation in the plane of the
 surface, which a structured mesh of any side ratio and an unstructured one have alike.
+
+By hand: libraries of alpha shapes ask for a length, which cells that are long and thin do not have.
 """
 
 from __future__ import annotations
@@ -45,8 +47,6 @@ def edge_pairs(contact: ContactInterface) -> NDArray[np.bool_]:
 
 def _edge(position: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Of one surface, positions (n, 3), m; all of them where it cannot be told."""
-    from scipy.spatial import Delaunay, QhullError  # where it is used: it takes a while to load
-
     unknown = np.ones(len(position), np.bool_)
     if not np.isfinite(position).all():
         return unknown
@@ -59,6 +59,8 @@ def _edge(position: NDArray[np.float64]) -> NDArray[np.bool_]:
     if extent[1] <= _SAME_PLACE * extent[0]:
         ends = np.abs(along[:, 0, None] - [along[:, 0].min(), along[:, 0].max()])
         return np.asarray((ends <= _SAME_PLACE * extent[0]).any(axis=1))
+    from scipy.spatial import Delaunay, QhullError  # where it is used: it takes a while to load
+
     plane = along[:, :2]
     try:
         mesh = Delaunay(plane)

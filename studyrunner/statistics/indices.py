@@ -1,4 +1,7 @@
-"""First and total Sobol' indices: which share of the variance an input decides, alone and with the others."""
+"""First and total Sobol' indices: which share of the variance an input decides, alone and with the others.
+
+By hand: `scipy.stats.sobol_indices`, which is used, has no bands and takes neither other designs nor gaps.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 The intervals are of independent samples. Samples of a Sobol' sequence or a Latin hypercube fill the distribution more
 evenly: their intervals are wider than need be.
+
+By hand: intervals of `scipy.stats` are of one set of samples a call, each with a value.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Whether samples fall into two groups, as where a pair slips or locks; the density, and the pair that decides."""
+"""Whether samples fall into two groups, as where a pair slips or locks; the density, and the pair that decides.
+
+By hand: the mixtures of scikit-learn take a skewed density with one peak for two groups.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The key that was meant by one that is not known."""
+"""The key that was meant by one that is not known.
+
+By hand are the other names: `difflib` finds spelling mistakes.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Reads a study: finds the file, applies the overrides, checks all of it; and writes the effective study as TOML."""
+"""Reads a study: finds the file, applies the overrides, checks all of it; and writes the effective study as TOML.
+
+By hand: `tomli_w` gives each value of a list a line of its own, and axes have up to 100 000 values.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Text of a study file -> table, also where the text was made to do harm."""
+"""Text of a study file -> table, also where the text was made to do harm.
+
+By hand: `tomllib` has no limits for text that was made to take its time.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Types of the values in a study file: what pydantic accepts, and the sentence that a user reads where it does not."""
+"""Types of the values in a study file: what pydantic accepts, and the sentence that a user reads where it does not.
+
+By hand: `linspace` of numpy rounds more than once, and values of `geomspace` differ between machines.
+"""
 
 from __future__ import annotations
 

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from solver.outcome import COMPLETE
 from studyrunner.percent import show_percent
@@ -130,6 +129,8 @@ def extrapolate(volumes: list[tuple[float, tuple[float, float]]]) -> tuple[float
 
     if excess(_ORDERS[0]) > 0.0 or excess(_ORDERS[1]) < 0.0:
         return None
+    from scipy.optimize import brentq  # where it is used: it takes a while to load
+
     order = float(brentq(excess, *_ORDERS))
     limit = fine - steps[1] * third**-order / (second**-order - third**-order)
     return (limit, order) if limit >= 0.0 else None

@@ -1,4 +1,7 @@
-"""Which outcomes came where wear, step and load go to their extremes, and how many of each are known to `rtol`."""
+"""Which outcomes came where wear, step and load go to their extremes, and how many of each are known to `rtol`.
+
+By hand: `rich.table` wraps at the width of the terminal, in logs as well.
+"""
 
 from __future__ import annotations
 

@@ -10,10 +10,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 FIRST_LINE = 2.0
 """Seconds to the first plain line."""
@@ -64,12 +64,8 @@ class ProgressDisplay:
         self._next_line = FIRST_LINE
         self._next_picture = 0.0
         self._fraction = 0.0
-        console = Console(stderr=True)
-        self._bar: Progress | None = None
-        if console.is_terminal:
-            # the text comes last: it is cut where the terminal is narrow
-            columns = (SpinnerColumn(), BarColumn(20), TaskProgressColumn(), TextColumn("{task.description}"))
-            self._bar = Progress(*columns, console=console, transient=True)
+        self._bar = _new_bar() if sys.stderr.isatty() else None
+        if self._bar is not None:
             self._bar_task = self._bar.add_task("", total=1.0)
 
     def __enter__(self) -> Self:
@@ -146,6 +142,17 @@ class SilentProgress(ProgressDisplay):
 
     def tick(self, look: Callable[[], Standing]) -> None:
         """Nothing."""
+
+
+def _new_bar() -> Progress | None:
+    """A bar on stderr; None where it is no terminal that shows one."""
+    from rich.console import Console  # where it is used: it takes a while to load
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TaskProgressColumn, TextColumn
+
+    console = Console(stderr=True)
+    # the text comes last: it is cut where the terminal is narrow
+    columns = (SpinnerColumn(), BarColumn(20), TaskProgressColumn(), TextColumn("{task.description}"))
+    return Progress(*columns, console=console, transient=True) if console.is_terminal else None
 
 
 _YEAR = 8766.0 * 3600.0  # s

@@ -1,10 +1,10 @@
 """What a Newton iteration, a slow-time step, a whole history and a larger joint cost, as ratios in one process.
 
-    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.speed [steps] [adaptive] [slider] [pairs] [sizes] [ranks] [start]
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.speed [steps] [adaptive] [slider] [pairs] [sizes] [real] ...
 
-Without arguments all rows of the table. The bundled dovetail sector near its resonance: 48 pairs, 5 harmonics, 128
-samples, 1584 unknowns; the unit is one `numpy.linalg.solve` of as many. Medians over repeats that take turns. How busy
-simulated ranks are says `tests.benchmarks.scheduling`.
+Without arguments all rows of the table (`ROWS`). The bundled dovetail sector near its resonance: 48 pairs, 5 harmonics,
+128 samples, 1584 unknowns; the unit is one `numpy.linalg.solve` of as many. Medians over repeats that take turns. How
+busy simulated ranks are says `tests.benchmarks.scheduling`.
 """
 
 import subprocess
@@ -65,7 +65,6 @@ def start_at(model: ReducedModel, frequencies: list[float], amplitude: float, se
 def iteration_at(model: ReducedModel, start: StartState, settings: SolverSettings, kept: bool) -> Callable[[], object]:
     """One Newton iteration at a state, with a kept factorisation or with one of its own."""
     state = start.state
-    assert state is not None
     case = build_case(model, FRICTION, start.penalty_omega, settings)
     joint = case.joint(state.omega, state.excitation_amplitude)
     balance = Balance.frozen(joint, state.start_history, state.wear_depth)
@@ -126,13 +125,15 @@ def adaptive() -> None:
     exact = 0.5 * (implicit + explicit)
     step = next(h for h in EULER_STEPS if abs(march(model, start, h, "implicit", CYCLES)[0] / exact - 1.0) <= 0.01)
     volume, iterations = march(model, start, 0.0, "adaptive", CYCLES)
-    euler, own = in_turns(
+    euler, own, unit = in_turns(
         lambda: march(model, start, step, "implicit", CYCLES),
         lambda: march(model, start, 0.0, "adaptive", CYCLES),
+        dense_solve(11 * 3 * model.contact.n_contact),
         repeats=3,
     )
     print(f"adaptive at rtol 0.01: error {abs(volume / exact - 1.0):.2%}, {iterations:.0f} iterations")
     print(f"adaptive over implicit Euler with h = {step:g}, just short enough for 1 %: {own / euler:.2f} (0.5)")
+    print(f"adaptive, with errors and the reference solution: {own / unit:.0f} units (30)")
 
 
 def slider() -> None:
@@ -188,6 +189,34 @@ def sizes() -> None:
     print(f"exponent of a step {np.polyfit(np.log(list(spent)), np.log(list(spent.values())), 1)[0]:.2f} (1.7)")
 
 
+def real() -> None:
+    """Joints of real size with all settings by default: a start state and an adaptive history to 1e5 cycles."""
+    for mesh, frequency in ((2, 211.75), (4, 210.75), (6, 210.0)):
+        model, settings = dovetail(mesh), SolverSettings()
+        began = time.thread_time()
+        start = start_at(model, [frequency], AMPLITUDE, settings)
+        first = time.thread_time() - began
+        began = time.thread_time()
+        history = march_wear(model, FRICTION, start, WEAR, 0.0, "adaptive", np.array([0.0, CYCLES]), settings)
+        print(
+            f"{model.contact.n_contact} pairs, {frequency} Hz: start {first:.0f} s, history "
+            f"{time.thread_time() - began:.0f} s, {1e9 * history.worn_volume[-1]:.3f} mm3 known to "
+            f"{history.error_estimate:.1%}, {history.newton_iterations - start.newton_iterations} iterations",
+            flush=True,
+        )
+
+
+def scenes() -> None:
+    """Finite elements to the reduced model, each mesh in a process of its own: CPU time and largest memory."""
+    build = (
+        "import resource, time; from tests.benchmarks.speed import dovetail; began = time.process_time();"
+        "n = dovetail({mesh}).contact.n_contact; memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20;"
+        "print(f'{{n}} pairs: {{time.process_time() - began:.1f}} CPU s, {{memory:.2f}} GiB')"
+    )
+    for mesh in (2, 4, 6, 8):
+        subprocess.run([sys.executable, "-c", build.format(mesh=mesh)], check=True)
+
+
 def two_ranks() -> None:
     """Row 5."""
     with tempfile.TemporaryDirectory() as name:
@@ -215,6 +244,8 @@ ROWS: dict[str, Callable[[], None]] = {
     "slider": slider,
     "pairs": pairs,
     "sizes": sizes,
+    "real": real,
+    "scenes": scenes,
     "ranks": two_ranks,
     "start": start,
 }

@@ -1,13 +1,10 @@
 """Springs in series with the pairs: condensed compliance, closed forms, other unknowns, the rigid limit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from solver import build_model, frequency_response, march_wear, with_contact_stiffness
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, TANGENTIAL_RATIO
-from solver.model import ReducedModel
 from solver.structure.condensation import build_structure, relative_indices
 from studies import build_scene
 from tests.references import den_hartog_amplitude, slider_wear_depth
@@ -19,7 +16,7 @@ SOFT = 2e11  # N/m3; with the areas of the models about their stiffness
 
 @pytest.mark.parametrize("contact_stiffness", [1e-3 * SOFT, SOFT, 1e4 * SOFT, LARGEST_CONTACT_STIFFNESS])
 @pytest.mark.parametrize("wave", [False, True])
-def test_contact_forces_move_the_contact_by_the_springs_more(wave: bool, contact_stiffness: float) -> None:
+def test_contact_forces_move_the_contact_by_the_springs_more(wave, contact_stiffness):
     rigid = cyclic_model(9, KINDS, 6, 2, 5) if wave else random_model(1, KINDS, 4)
     soft = with_contact_stiffness(rigid, contact_stiffness)
     relative, components = relative_indices(rigid.contact)
@@ -39,7 +36,7 @@ def test_contact_forces_move_the_contact_by_the_springs_more(wave: bool, contact
     assert joint.input_work(contact) == pytest.approx(body.input_work(moved), rel=1e-8)
 
 
-def test_a_stuck_block_on_its_foundation_is_a_mass_on_two_springs() -> None:
+def test_a_stuck_block_on_its_foundation_is_a_mass_on_two_springs():
     contact_stiffness = 5e9
     block = build_scene("sdof_slider", normal_load=1e6, normal_stiffness=0.0, contact_stiffness=contact_stiffness)
     spring = 1.6e5 + TANGENTIAL_RATIO * contact_stiffness * 1e-4
@@ -49,7 +46,7 @@ def test_a_stuck_block_on_its_foundation_is_a_mass_on_two_springs() -> None:
 
 
 @pytest.mark.slow
-def test_a_wall_and_its_contact_are_two_springs_in_series() -> None:
+def test_a_wall_and_its_contact_are_two_springs_in_series():
     """The same bilinear spring: a wall of 100 N/m, and one of 200 N/m behind a contact of 200 N/m."""
     one = build_scene("vibro_impact")
     both = build_scene("vibro_impact", wall_stiffness=200.0, contact_stiffness=200.0 / 1e-4)
@@ -61,7 +58,7 @@ def test_a_wall_and_its_contact_are_two_springs_in_series() -> None:
 
 
 @pytest.mark.slow
-def test_wear_relaxes_the_spring_that_presses_and_the_contact_in_series() -> None:
+def test_wear_relaxes_the_spring_that_presses_and_the_contact_in_series():
     """Den Hartog's slider: along the support the contact is rigid beside the mount, across it twice as stiff."""
     springs = {"normal_stiffness": 5e10, "contact_stiffness": 1e15}
     cycles = np.array([0.0, 100.0, 250.0])
@@ -80,7 +77,7 @@ def test_wear_relaxes_the_spring_that_presses_and_the_contact_in_series() -> Non
     assert history.wear_depth[:, 0] == pytest.approx(expected, rel=5e-3)
 
 
-def _with_bodies_as_unknowns(model: ReducedModel, contact_stiffness: float) -> ReducedModel:
+def _with_bodies_as_unknowns(model, contact_stiffness):
     """The same joint in [u | v | inner displacements]: springs between contact and bodies, the mass on the bodies."""
     linear, contact = model.linear[0], model.contact
     relative, components = relative_indices(contact)
@@ -112,7 +109,7 @@ def _with_bodies_as_unknowns(model: ReducedModel, contact_stiffness: float) -> R
 
 
 @pytest.mark.slow
-def test_a_joint_is_the_same_whichever_displacements_are_its_unknowns() -> None:
+def test_a_joint_is_the_same_whichever_displacements_are_its_unknowns():
     rigid = random_model(3, ("3d", "3d", "one_tangent"), 3)
     soft, bodies = with_contact_stiffness(rigid, SOFT), _with_bodies_as_unknowns(rigid, SOFT)
     frequency = OMEGA / (2.0 * np.pi)
@@ -129,7 +126,7 @@ def test_a_joint_is_the_same_whichever_displacements_are_its_unknowns() -> None:
     assert soft_wear.wear_depth == pytest.approx(expected_wear.wear_depth, rel=1e-5)
 
 
-def test_a_rigid_contact_is_the_limit() -> None:
+def test_a_rigid_contact_is_the_limit():
     rigid = build_scene("sdof_slider")
     stiff = build_scene("sdof_slider", contact_stiffness=LARGEST_CONTACT_STIFFNESS)
     found, expected = (
@@ -141,6 +138,6 @@ def test_a_rigid_contact_is_the_limit() -> None:
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, np.inf, 1e23])
-def test_a_contact_stiffness_that_cannot_be_is_said(wrong: float) -> None:
+def test_a_contact_stiffness_that_cannot_be_is_said(wrong):
     with pytest.raises(ValueError, match="give a positive number, at most 1e"):
         with_contact_stiffness(random_model(1, KINDS, 4), wrong)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from solver import march_wear
+from solver import build_model, march_wear
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
@@ -162,11 +162,9 @@ def test_an_interrupted_search_finds_the_same_start_to_the_last_bit():
     given: list[Packed | str] = []
     ((_, whole),) = follow_branch(model, 0.5, 10.0, follow, "up", SolverSettings(), given.append)
     kept = [progress for progress in given if not isinstance(progress, str)]
-    assert whole.state is not None
     assert len(kept) > 2
     for progress in (kept[0], kept[len(kept) // 2], kept[-1]):
         ((_, again),) = follow_branch(model, 0.5, 10.0, follow, "up", SolverSettings(), resume=progress)
-        assert again.state is not None
         assert again.state.omega == whole.state.omega
         np.testing.assert_array_equal(again.state.displacement_h, whole.state.displacement_h)
 
@@ -218,6 +216,33 @@ def test_a_resonance_that_the_sweep_jumps_over_is_none_of_its_states():
     assert history.outcome is Outcome.RESONANCE_LOST
     assert "the sweep down jumps over the resonance at 0.17" in history.message
     assert 'give sweep = "up"' in history.message
+
+
+@lru_cache
+def two_resonances(word, sweep, high):
+    """Unworn state of two masses on a weak spring, one of them on a slider."""
+    spring, tie = 0.1 * (2.0 * math.pi * 215.0) ** 2, 2e3
+    stiffness = [[1.6e5 + tie, -tie], [-tie, spring + tie]]
+    parts = np.diag([0.1, 0.1]), np.diag([4.0, 4.0]), stiffness, [[-1, 0, -1]], 1e-4
+    model = build_model(*parts, load_harmonic=[1.0, 1.0], normal_load=10.0, response=[[1.0, 1.0]])
+    settings = SolverSettings(harmonics=3, samples=64)
+    return march_wear(model, word, 20.0, 0.5, 0.0, 0.0, sweep=sweep, between=(180.0, high), settings=settings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("word", ["resonance", "peak"])
+def test_a_second_peak_in_the_range_is_told_and_the_first_one_followed(word):
+    up, down = (two_resonances(word, sweep, 230.0) for sweep in ("up", "down"))
+    first, second = (float(history.excitation_frequency[0]) for history in (up, down))
+    assert first < 204.0
+    assert second > 214.0
+    assert up.outcome is Outcome.CONVERGED
+    assert "in the beginning the response has another peak in the range, near 21" in up.message
+    assert f"the history follows the one at {first:.6g} Hz" in up.message
+    assert up.other_peaks[0] == pytest.approx(second, abs=0.2)
+    alone = two_resonances(word, "up", 210.0)
+    assert (alone.message, float(alone.excitation_frequency[0])) == ("", first)
+    assert np.isnan(alone.other_peaks).all()
 
 
 @pytest.mark.parametrize(

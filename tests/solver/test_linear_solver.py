@@ -5,6 +5,7 @@ import pytest
 
 from solver.newton.cost import is_dense_cheapest
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.period_preconditioner import build_period_factor
 from solver.settings import SolverSettings
 from tests.solver.models import PRELOAD, random_balance, random_model
 
@@ -76,3 +77,21 @@ def test_pairs_that_stay_stuck_are_left_out_and_found_again():
         if held == 14:
             # everything is stuck: the unknown moves nothing and the Jacobian is the identity
             assert error(step, right) < 1e-12
+
+
+def test_a_march_is_dropped_where_its_products_have_grown():
+    balance, predicted = large(6, wear=False)
+    march = build_period_factor(balance.linearise(balance.evaluate(predicted)))
+    assert march is not None
+
+    def keeps(products):
+        solver = JacobianSolver()
+        solver._keep(march)
+        for taken in products:
+            solver._note(taken)
+        return solver._factor is march
+
+    # solves differ; what counts is their mean
+    assert keeps([20, 5, 12] * 60)
+    assert keeps([6] * 10 + [9] * 10)
+    assert not keeps([6] * 10 + [9] * 11)

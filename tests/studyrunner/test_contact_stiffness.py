@@ -1,7 +1,5 @@
 """`contact_stiffness` in studies: of bundled scenes, scene files and decks, as an axis, and run again from a result."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 
@@ -24,12 +22,12 @@ pytestmark = pytest.mark.usefixtures("folder")
 SOFT = (1e11, 1e13)
 
 
-def digest(study: str, *overrides: str) -> str:
+def digest(study, *overrides):
     return describe_scene(build_study_scene(read_study(study, overrides))).digest
 
 
 @pytest.mark.slow
-def test_an_axis_of_stiffnesses_is_studies_with_each() -> None:
+def test_an_axis_of_stiffnesses_is_studies_with_each():
     axis = f"axes.contact_stiffness={list(SOFT)}"
     whole = compute("sdof_slider", "whole.nc", *CHEAP, axis, "outputs.variables=['default', 'natural_frequency']")
     assert whole.contact_stiffness.attrs["units"] == "N/m3"
@@ -44,7 +42,7 @@ def test_an_axis_of_stiffnesses_is_studies_with_each() -> None:
 
 
 @pytest.mark.slow
-def test_a_scene_file_holds_the_springs_or_gets_them_from_the_study(folder: Path) -> None:
+def test_a_scene_file_holds_the_springs_or_gets_them_from_the_study(folder):
     rigid, soft = build_scene("sdof_slider"), build_scene("sdof_slider", contact_stiffness=SOFT[0])
     assert main(["sdof_slider", "--set", f"scene.contact_stiffness={SOFT[0]}", "--write-scene", "soft.h5"]) == 0
     assert main(["sdof_slider", "--write-scene", "rigid.h5"]) == 0
@@ -68,7 +66,7 @@ def test_a_scene_file_holds_the_springs_or_gets_them_from_the_study(folder: Path
     same_values(one_value.squeeze("contact_stiffness"), first)
 
 
-def test_a_deck_is_reduced_once_for_all_contact_stiffnesses(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_deck_is_reduced_once_for_all_contact_stiffnesses(folder, monkeypatch):
     shutil.copy(SECTOR, folder / "sector.inp")
     (folder / "wear.toml").write_text(SECTOR_STUDY)
     reduced, reduce = [], scene_of_files.reduce_model
@@ -87,6 +85,6 @@ def test_a_deck_is_reduced_once_for_all_contact_stiffnesses(folder: Path, monkey
 
 
 @pytest.mark.parametrize("value", ["0", "-1e12", "1e23", "'soft'"])
-def test_a_wrong_contact_stiffness_is_named(value: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_contact_stiffness_is_named(value, capsys):
     assert main(arguments("dovetail", "x.nc", f"scene.contact_stiffness={value}")) == 2
     assert "scene.contact_stiffness" in capsys.readouterr().err

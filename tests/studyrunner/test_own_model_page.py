@@ -24,7 +24,7 @@ COMMANDS = [text for language, text in BLOCKS if language == "bash"]
 PRINTED = [text for language, text in BLOCKS if not language]
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
-SMALL = {"harmonics": "1", "samples": "32", "cycles": "10_000", "outputs": "2", "excitation_amplitude": "2.0"}
+SMALL = {"harmonics": "1", "samples": "32", "cycles": "100", "outputs": "2", "excitation_amplitude": "2.0"}
 NEXT_TO_NOTHING = [
     word
     for each in ("axes.excitation_amplitude=1e-3", "slow_time.cycles=0", "slow_time.outputs=1")

@@ -2,6 +2,10 @@
 
 A front `e` with boundary `f` is factorised, `A_ee = L L^H`, `W = A_fe L^-H`, and what it leaves on its boundary,
 `A_ff - W W^H`, is added to the fronts that follow (multifrontal method, Duff and Reid 1983).
+
+Why not a library: for 144 000 displacements (bundled dovetail, 336 pairs, one core) PARDISO of MKL takes 6.0 CPU s to
+order and factorise and 0.31 s to solve for 8 right-hand sides; this elimination takes 6.0 and 0.40 s, and leaves fronts
+from which forms are condensed (`projection`). CHOLMOD has no wheels.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ from scipy.linalg import blas, eigvalsh, lapack
 
 from solver.model import BoolArray, IntArray
 from studies.finite_element.condensation.dissection import Dissection, dofs_of
+from studies.finite_element.condensation.extend_add import add_lower
 from studies.finite_element.condensation.ordered_form import OrderedForm
 
 Dense = NDArray[Any]
@@ -105,7 +110,7 @@ def factorise(
             own, below = np.asfortranarray(rows[:, :e].T), np.asfortranarray(rows[:, e:].T)
             waits = np.zeros((f, f), dtype=kind, order="F")
             for child in front.children:
-                add_lower(own, below, waits, waiting.pop(child), dissection, child, number)
+                add_lower(own, below, waits, waiting.pop(child), places_in_parent(dissection, child, number))
             factor = eliminate(own, below, waits)
         factors.append(factor)
         if waits is not None:
@@ -136,34 +141,12 @@ def mirrored(lower: Dense) -> Dense:
     return np.asarray(below + below.conj().T + np.diag(np.diag(lower).real))
 
 
-def add_lower(
-    own: Dense, below: Dense, update: Dense, part: Dense, dissection: Dissection, child: int, parent: int
-) -> None:
-    """Adds what a child leaves (lower triangle) to the parts of its parent's front."""
+def places_in_parent(dissection: Dissection, child: int, parent: int) -> IntArray:
+    """Places of the nodes of a child's boundary among the nodes of its parent's front, then those of its boundary."""
     front, boundary = dissection.fronts[parent], dissection.fronts[child].boundary
     n = int(np.searchsorted(boundary, front.stop))
-    here = _runs(boundary[:n] - front.first, 0)
-    there = _runs(np.searchsorted(front.boundary, boundary[n:]), n)
-    _add_runs(own, part, here, here)
-    _add_runs(below, part, there, here)
-    _add_runs(update, part, there, there)
-
-
-def _runs(places: IntArray, offset: int) -> list[tuple[int, int, int]]:
-    """Ascending places in runs: first and stop among all (plus the offset), and the first place; all in dofs."""
-    starts = np.flatnonzero(np.diff(places, prepend=-2) != 1)
-    stops = np.append(starts[1:], len(places))[: len(starts)]
-    return [tuple(run) for run in (3 * np.stack([starts + offset, stops + offset, places[starts]], axis=1)).tolist()]
-
-
-def _add_runs(
-    target: Dense, part: Dense, rows: list[tuple[int, int, int]], columns: list[tuple[int, int, int]]
-) -> None:
-    """Adds the lower triangle of `part`, run by run."""
-    for first, stop, place in columns:
-        for start, end, row in rows:
-            if end > first:
-                target[row : row + end - start, place : place + stop - first] += part[start:end, first:stop]
+    behind = front.stop - front.first + np.searchsorted(front.boundary, boundary[n:])
+    return np.concatenate([boundary[:n] - front.first, behind])
 
 
 def eliminate(own: Dense, below: Dense, update: Dense) -> FrontFactor:

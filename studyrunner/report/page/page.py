@@ -2,6 +2,8 @@
 
 Templates put it together and escape all texts; only pictures, scripts, the style sheet and the numbers are taken as
 they are. The page runs only its own scripts, named by their hashes in its security policy.
+
+By hand: ids in the SVG files of matplotlib are alike, and no library makes one page of several.
 """
 
 from __future__ import annotations

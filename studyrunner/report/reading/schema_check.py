@@ -2,6 +2,8 @@
 
 Names and sentences of the file are cleaned: they contain no markup, no control characters and no line breaks, and have
 at most the length of a label. Variables that the report does not draw are left out.
+
+By hand: `xarray-schema` has no limits for what is read, and leaves texts as they are.
 """
 
 from __future__ import annotations

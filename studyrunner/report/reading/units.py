@@ -1,4 +1,7 @@
-"""Numbers with units as a reader wants them: a prefix that fits the largest value, few digits."""
+"""Numbers with units as a reader wants them: a prefix that fits the largest value, few digits.
+
+By hand: `EngFormatter` of matplotlib and `to_compact` of pint choose a prefix for each number.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Faces in space on paper: seen from afar, those nearer to the eye over those behind."""
+"""Faces in space on paper: seen from afar, those nearer to the eye over those behind.
+
+By hand: `mplot3d` leaves a wide margin, and draws both sides of a face alike.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""A mesh with fewer faces, for the page: nodes that are near each other become one, but for those in contact."""
+"""A mesh with fewer faces, for the page: nodes that are near each other become one, but for those in contact.
+
+By hand: libraries that simplify a mesh cannot keep chosen nodes, as those in contact.
+"""
 
 from __future__ import annotations
 

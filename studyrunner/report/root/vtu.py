@@ -1,4 +1,7 @@
-"""The root as files for ParaView: one VTU file a cycle count, and a PVD file that makes a time series of them."""
+"""The root as files for ParaView: one VTU file a cycle count, and a PVD file that makes a time series of them.
+
+By hand is the PVD file alone: `meshio` writes none.
+"""
 
 from __future__ import annotations
 

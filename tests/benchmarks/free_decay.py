@@ -1,0 +1,74 @@
+"""Nonlinear modes of the dovetail root against its free decay in time.
+
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.free_decay
+
+The root is let go in the shape of its first glued mode and decays (`tests.benchmarks.time_integration`, nothing of
+`solver/` but the model). For each amplitude: frequency and damping ratio of the decay, as means over 13 half cycles,
+and those of the mode, with the amplitude lowered from twice this value, as in a decay, and raised from zero. Half a CPU
+minute.
+"""
+
+import numpy as np
+
+from solver import backbone
+from studies import build_scene
+from tests.benchmarks.time_integration import advance, at_rest, build, push_mode
+
+AMPLITUDES = (5e-4, 6e-4, 8e-4, 1e-3)  # m sqrt(kg)
+LET_GO, PERIODS, STEPS = 1.3e-3, 120, 400
+HALF_WINDOW = 6  # half cycles
+
+
+def free_decay(structure, motion, gap, periods):
+    """Displacements (n_times, n), m, without excitation from a motion on, in the steps of the structure."""
+    n_steps = round(2.0 * np.pi / (structure.omega * structure.step))
+    loads = np.repeat(structure.static[None], n_steps, axis=0)
+    seen = []
+    for _ in range(periods):
+        motion = advance(structure, motion, gap, loads)
+        seen.append(motion.responses)
+    return np.concatenate(seen)
+
+
+def decay_of(signal, step):
+    """Amplitude, frequency, Hz, and damping ratio of each cycle of a decaying signal (n_times,).
+
+    From its peaks up and down, each by a parabola through three samples: amplitude over half a cycle to both sides.
+    """
+    middle = signal[1:-1]
+    turns = 1 + np.flatnonzero((middle - signal[:-2]) * (signal[2:] - middle) < 0.0)
+    left, here, right = signal[turns - 1], signal[turns], signal[turns + 1]
+    offset = 0.5 * (left - right) / (left - 2.0 * here + right)
+    times, peaks = step * (turns + offset), here - 0.25 * (left - right) * offset
+    heights = 0.5 * np.abs(np.diff(peaks))
+    middles = 0.5 * (times[1:] + times[:-1])
+    span = middles[2:] - middles[:-2]
+    rate = np.log(heights[:-2] / heights[2:])
+    return heights[1:-1], 1.0 / span, rate / np.hypot(2.0 * np.pi, rate)
+
+
+def main():
+    """Print the table."""
+    model = build_scene("dovetail_sector", mesh=1)
+    structure = build(model, 0.5, 212.7, 0.0, STEPS)
+    rest = at_rest(model, structure, model.contact.gap)
+    begun = push_mode(structure, rest, LET_GO + 0j)
+    row = np.real(model.linear[0].response)[0]
+    signal = free_decay(structure, begun, model.contact.gap, PERIODS) @ row
+    height, frequency, damping = decay_of(signal, structure.step)
+    modes = {way: backbone(model, AMPLITUDES, 0.5, direction=way) for way in ("down", "up")}
+    for place, amplitude in enumerate(AMPLITUDES):
+        tip = abs(modes["down"].response[place, 0])
+        nearest = int(np.argmin(abs(height - tip)))
+        window = slice(nearest - HALF_WINDOW, nearest + HALF_WINDOW + 1)
+        said = f"decay {frequency[window].mean():.4f} Hz, {100 * damping[window].mean():.4f} %"
+        for way, mode in modes.items():
+            said += (
+                f"; {way} {mode.frequency[place]:.4f} +- {mode.frequency_error[place]:.4f} Hz,"
+                f" {100 * mode.damping_ratio[place]:.4f} +- {100 * mode.damping_error[place]:.4f} %"
+            )
+        print(f"{amplitude:.0e} m sqrt(kg), tip {1e3 * tip:.3f} mm: {said}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
