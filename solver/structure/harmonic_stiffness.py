@@ -68,7 +68,7 @@ class SharedStiffness:
     - columns (3, n, n_rel): columns r of K, M, C, with rows r before rows i.
     - back (3, n_rel, n_i): K_ri, M_ri, C_ri.
     - held_compliance (H, n_i, n_i): `A_ii^-1`, m/N.
-    - few: rough form with few motions; None where this form leaves out too much.
+    - linear, relative (n_rel,), internal (n_i,): the structure, and its displacements of the pairs and all others.
     """
 
     n_rel: int
@@ -76,7 +76,9 @@ class SharedStiffness:
     columns: FloatArray
     back: FloatArray
     held_compliance: ComplexArray
-    few: RoughStiffness | None
+    linear: LinearModel
+    relative: IntArray
+    internal: IntArray
 
     @property
     def dense(self) -> ComplexArray:
@@ -100,7 +102,8 @@ class SharedStiffness:
     @cached_property
     def rough(self) -> RoughStiffness:
         """As in HarmonicStiffness."""
-        return rough_of_each(self.dense) if self.few is None else self.few
+        few = rough_of_shared(self.linear, self.relative, self.internal, self.rates, self.held_compliance)
+        return rough_of_each(self.dense) if few is None else few
 
     def _behind(self, forces: ComplexArray) -> FloatArray:
         """`A_ii^-1 f` as harmonics cosine, sine, ... (n_i, 2H) from the complex f (n_i, H)."""
@@ -136,5 +139,7 @@ def share_matrices(
         np.stack([part[every[:, None], relative] for part in parts]),
         np.stack([part[relative[:, None], internal] for part in parts]),
         held_compliance,
-        rough_of_shared(linear, relative, internal, rates, held_compliance),
+        linear,
+        relative,
+        internal,
     )

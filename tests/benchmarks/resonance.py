@@ -87,7 +87,6 @@ def print_cost(joint: Measured, scheme: Scheme) -> None:
     """CPU time of a history with followed frequency, and of a step, over those at the first frequency."""
     settings, resonance = SolverSettings(), FollowedFrequency("resonance", *joint.between)
     ((_, followed),) = follow_branch(joint.model, FRICTION, joint.load, resonance, "up", settings)
-    assert followed.state is not None
     at = np.array([followed.state.omega / (2.0 * np.pi)])
     ((_, fixed),) = follow_branch(joint.model, FRICTION, joint.load, at, "up", settings)
     given: list[tuple[str, StartState, FollowedFrequency | None]] = [("fixed", fixed, None)]

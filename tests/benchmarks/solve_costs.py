@@ -50,7 +50,6 @@ def measure(name: str, model: ReducedModel, omega: float, amplitude: float, harm
     pairs = tangent.active()
     n_rel = joint.rows_of(pairs).size
     space = find_slip_space(tangent, 10**9)
-    assert space is not None
     every, factor, march = space, build_slip_factor(tangent, space), build_period_factor(tangent)
     d, k = len(resonances(joint)[0]), space.size
     ways: list[tuple[str, Callable[[], object], float]] = [

@@ -65,7 +65,6 @@ def start_at(model: ReducedModel, frequencies: list[float], amplitude: float, se
 def iteration_at(model: ReducedModel, start: StartState, settings: SolverSettings, kept: bool) -> Callable[[], object]:
     """One Newton iteration at a state, with a kept factorisation or with one of its own."""
     state = start.state
-    assert state is not None
     case = build_case(model, FRICTION, start.penalty_omega, settings)
     joint = case.joint(state.omega, state.excitation_amplitude)
     balance = Balance.frozen(joint, state.start_history, state.wear_depth)

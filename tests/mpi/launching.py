@@ -18,6 +18,7 @@ from typing import IO
 import pytest
 import xarray as xr
 
+from studyrunner import task_runs
 from studyrunner.cli import main
 
 FAKED = str(Path(__file__).with_name("run_faked.py"))
@@ -172,6 +173,18 @@ def run_here(arguments: Sequence[str], folder: Path) -> xr.Dataset:
     with contextlib.chdir(folder):
         assert main([*arguments, "-o", "out.nc"]) in (0, 3)
         return results()
+
+
+def fake_here(arguments: Sequence[str], folder: Path, environment: dict[str, str] | None = None) -> int:
+    """Exit status of a run with the stand-in for the solver, in this process. arguments: FAKED first, as elsewhere."""
+    from tests.mpi.run_faked import build_fake
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setattr(task_runs, "build_evaluator", build_fake)
+        for name, value in (environment or {}).items():
+            patch.setenv(name, value)
+        return main(arguments[1:])
 
 
 def results(path: Path | str = "out.nc") -> xr.Dataset:

@@ -14,7 +14,7 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from studyrunner.mpi.schedule import SECONDS_TO_PROGRESS
-from tests.mpi.launching import CHEAP, FAKED, SOON, results, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, SOON, fake_here, results, run_to_end
 from tests.mpi.losses import PROMISED, ages_of_losses, note
 
 AT_ONCE = 4  # runs side by side: they sleep as long as they compute
@@ -144,7 +144,7 @@ def kill_and_go_on(study, folder, seed):
 
 def test_a_run_that_is_killed_goes_on_to_the_same_result(tmp_path):
     study = SHORT_STUDY
-    assert run_to_end(0, [*study.arguments, "-o", "whole.nc"], tmp_path, study.environment).status == 0
+    assert fake_here([*study.arguments, "-o", "whole.nc"], tmp_path, study.environment) == 0
     assert count_steps(tmp_path) == study.n_steps
     expected = results(tmp_path / "whole.nc")
     # alone and on two and three ranks, most of them killed in the midst of a task
@@ -165,7 +165,7 @@ def whole(tmp_path_factory):
     """The result of the stand-in where it is not disturbed."""
     folder = tmp_path_factory.mktemp("whole")
     arguments = [*FAKED_STUDY.arguments, "-o", "whole.nc"]
-    assert run_to_end(0, arguments, folder, FAKED_STUDY.environment).status == 0
+    assert fake_here(arguments, folder, FAKED_STUDY.environment) == 0
     return results(folder / "whole.nc")
 
 
@@ -185,7 +185,7 @@ def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks, number, whole,
     assert ended.said.count("run-study: interrupted: out.nc holds ") == 1
     assert "Traceback" not in ended.said
     left = results(tmp_path / "out.nc")
-    assert run_to_end(0, arguments, tmp_path, study.environment).status == 0
+    assert fake_here(arguments, tmp_path, study.environment) == 0
     xr.testing.assert_identical(results(tmp_path / "out.nc"), whole)
     there = left.outcome != Outcome.NOT_COMPUTED
     n_there = int(there.sum())

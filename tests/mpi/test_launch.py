@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from tests.mpi.launching import FAKED, PATIENCE, ROOT, launcher, mpiexec, results
+from tests.mpi.launching import FAKED, PATIENCE, ROOT, fake_here, launcher, mpiexec, results
 
 STUDY = ["sdof_slider", "-o", "out.nc", "--set", "axes.frequency={start = 100, stop = 160, num = 5}"]
 OTHER_VERSION = """\
@@ -87,8 +87,7 @@ def test_only_rank_0_sees_study_scene_and_output(tmp_path):
     folder, elsewhere = tmp_path / "of rank 0", tmp_path / "elsewhere"
     folder.mkdir()
     elsewhere.mkdir()
-    write = [sys.executable, FAKED, "sdof_slider", "--write-scene", str(folder / "scene.h5")]
-    assert run(write, tmp_path).returncode == 0
+    assert fake_here([FAKED, "sdof_slider", "--write-scene", str(folder / "scene.h5")], tmp_path) == 0
     text = (ROOT / "studies" / "sdof_slider.toml").read_text(encoding="utf-8")
     head, _, rest = text.partition("[scene]")
     rest = rest[rest.index("\n[") :]
@@ -99,7 +98,7 @@ def test_only_rank_0_sees_study_scene_and_output(tmp_path):
     done = run([*launcher(1), sys.executable, *study, ":", *blind], tmp_path, {"HIDDEN": str(folder)})
     assert done.returncode == 0, done.stderr
     assert list(elsewhere.iterdir()) == []
-    assert run([sys.executable, *study[:-1], str(folder / "alone.nc")], tmp_path).returncode == 0
+    assert fake_here([*study[:-1], str(folder / "alone.nc")], tmp_path) == 0
     xr.testing.assert_identical(results(folder / "out.nc"), results(folder / "alone.nc"))
 
 
@@ -186,5 +185,5 @@ def test_two_hosts_and_one_shared_folder(hosts, tmp_path):
         assert int(sent) > 20_000
     loads = {path.name for path in tmp_path.glob("rank*.txt")}
     assert len(loads) == 4
-    assert run([sys.executable, FAKED, *STUDY, "-o", "alone.nc"], tmp_path).returncode == 0
+    assert fake_here([FAKED, *STUDY, "-o", "alone.nc"], tmp_path) == 0
     xr.testing.assert_identical(results(tmp_path / "out.nc"), results(tmp_path / "alone.nc"))

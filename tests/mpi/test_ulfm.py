@@ -16,8 +16,8 @@ from tests.mpi.launching import (
     ROOT,
     SOON,
     count_rows,
+    fake_here,
     results,
-    run_to_end,
     watch_to_end,
 )
 
@@ -63,7 +63,7 @@ def count_noted(folder):
 def whole(tmp_path_factory):
     """The result of one process without a launcher, and the number of its histories."""
     folder = tmp_path_factory.mktemp("whole")
-    assert run_to_end(0, [FAKED, *STUDY], folder, {"FAKE_SECONDS": "0.001"}).status == 0
+    assert fake_here([FAKED, *STUDY], folder, {"FAKE_SECONDS": "0.001"}) == 0
     return results(folder / "out.nc"), count_noted(folder)
 
 
@@ -106,7 +106,7 @@ def test_a_run_that_is_ended_from_outside_leaves_what_there_is(open_mpi, whole, 
     assert done.seconds < SOON
     left = results(tmp_path / "out.nc").outcome
     assert 0 < int((left == Outcome.NOT_COMPUTED).sum()) < left.size
-    assert run_to_end(0, [FAKED, *STUDY], tmp_path).status == 0
+    assert fake_here([FAKED, *STUDY], tmp_path) == 0
     xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)
 
 

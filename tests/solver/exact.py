@@ -107,7 +107,6 @@ def first_found(exact: ExactState, case: Case, budget: Budget) -> PathPoint:
     idle = np.zeros(exact.model.contact.n_contact)
     outcome, point = solve_first_state(case, begin, exact.amplitude, idle, JacobianSolver(), budget)
     assert outcome is Outcome.CONVERGED
-    assert point is not None
     if exact.begin is None:
         return point
 

@@ -22,7 +22,6 @@ KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", 
 def on_branch(model, friction, amplitude, omega, settings, sweep="up"):
     """The state of a sweep, evaluated from what is stored of it."""
     (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
-    assert start.state is not None
     joint = build_case(model, friction, start.penalty_omega, settings).joint(omega, amplitude)
     balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
     predicted = balance.predict(start.state.displacement_h, start.state.contact_force_h)
@@ -50,7 +49,6 @@ def vibro_impact(omega, n_harmonics, sweep="up"):
         return on_branch(model, 0.0, 0.02, omega, settings, sweep)
     omegas = [*np.arange(0.9, omega, 0.1), omega]
     start = branch_states(model, 0.0, 0.02, omegas, settings)[-1]
-    assert start.state is not None
     joint = build_case(model, 0.0, start.penalty_omega, settings).joint(omega, 0.02)
     balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
     return joint, balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))

@@ -71,7 +71,6 @@ def test_with_more_friction_the_vibration_comes_to_that_of_the_glued_structure()
         case = build_case(model, friction, OMEGA, SETTINGS)
         outcome, point = solve_first_state(case, OMEGA, 0.5, np.zeros(PAIRS), JacobianSolver(), Budget())
         assert outcome is Outcome.CONVERGED, f"friction {friction}"
-        assert point is not None
         joint = case.joint(OMEGA, 0.5)
         glued = complex(joint.structure.harmonic_offset[0])
         cosine, sine = joint.structure.response_h(joint.to_relative(point.evaluation.displacement_h))[0, 1:3]

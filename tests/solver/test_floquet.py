@@ -37,7 +37,6 @@ def state_at(model, friction, excitation, frequency, settings=None):
     """The state that a sweep up comes to."""
     settings = settings or SolverSettings()
     start = start_of(model, friction, excitation, frequency, settings)
-    assert start.state is not None
     case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
     joint = case.joint(2.0 * np.pi * frequency, excitation)
     balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)

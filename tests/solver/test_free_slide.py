@@ -30,7 +30,6 @@ def joint_and_state(retainer, status):
 def test_a_hold_moves_no_state_and_takes_up_what_drives_it():
     case, joint, at = joint_and_state(0.0, SLIP)
     hold = free_slide(joint, at)
-    assert hold is not None
     axial = hold.direction.reshape(-1, 3)
     np.testing.assert_allclose(np.abs(axial[:, 1]), 0.25, rtol=1e-6)
     held = case.held(hold).joint(joint.omega, joint.excitation_amplitude).structure

@@ -48,12 +48,10 @@ def test_the_homotopy_ends_at_the_state_that_a_warm_start_finds(which):
     case, omega, amplitude, point = states()[which]
     case = replace(case, settings=SolverSettings())
     found = ResolvedState(case, case.joint(omega, amplitude), point).by_homotopy(RICH, Budget())
-    assert found is not None
     best = solved_at(case, omega, amplitude, point, RICH)
     ours = response(found.case, omega, amplitude, found.point)
     assert ours == pytest.approx(response(case.at(RICH), omega, amplitude, best), rel=1e-6)
     along = add_harmonics(case, case.joint(omega, amplitude), point.evaluation, RICH, Budget())
-    assert along is not None
     assert along.scaled_residual() <= case.settings.tolerance
 
 

@@ -46,7 +46,6 @@ def test_a_state_at_its_own_lag_has_its_own_frequency(gain):
     lag = phase_lag(state.balance.joint, state.at)
     other = replace(state.balance, joint=case.joint(0.99 * OMEGA, 10.0))
     found = solve_at_lag(case, other, state.at.predicted_h, lag, JacobianSolver(), Budget())
-    assert found is not None
     assert found.omega == pytest.approx(OMEGA, rel=1e-9)
     np.testing.assert_allclose(found.at.wear_depth, state.at.wear_depth, rtol=1e-8)
 
@@ -65,7 +64,6 @@ def test_the_change_of_the_lag_with_the_frequency_is_that_of_finite_differences(
     # a single step of Newton's method, whose derivative is that of the start
     loose = replace(case, settings=replace(TIGHT, tolerance=1e-9))
     near = solve_at_lag(loose, state.balance, state.at.predicted_h, lag + 1e-6, JacobianSolver(), Budget(), most=1)
-    assert near is not None
     assert near.turn == pytest.approx(expected, rel=1e-4)
 
 
@@ -97,7 +95,6 @@ def test_a_linear_oscillator_has_its_natural_frequency_and_its_peak_below():
     case, state = slider_state(damping=damping, friction=0.0)
     solver = JacobianSolver()
     found = solve_at_lag(case, state.balance, state.at.predicted_h, 0.5 * math.pi, solver, Budget())
-    assert found is not None
     assert found.omega == pytest.approx(natural, rel=1e-10)
     rise, turn = rise_of_response(found, solver, 1e-2)
     # at the natural frequency the amplitude falls as 1 / omega, and the lag rises by 1 / (zeta omega)

@@ -61,7 +61,6 @@ def history(seed, scheme, factor=1.0):
     """A march of three steps; wear coefficient times `factor`, cycles and step over it."""
     scene, joint, _ = state(seed)
     result = found(seed)
-    assert result is not None
     start = start_state(joint, result[2])
     step = scene.step / factor
     cycles = np.linspace(0.0, 3.0 * step, 4)

@@ -49,8 +49,6 @@ def followed():
 
 def assert_same_state(one, other):
     """To the last bit."""
-    assert one.state is not None
-    assert other.state is not None
     assert np.array_equal(one.state.displacement_h, other.state.displacement_h)
     assert np.array_equal(one.state.start_history, other.state.start_history)
     assert (one.response_error, one.branch) == (other.response_error, other.branch)
@@ -58,7 +56,6 @@ def assert_same_state(one, other):
 
 def slip_work(start):
     """Work of the mean friction forces on the vibration: what differs first where the history does."""
-    assert start.state is not None
     motion, force = start.state.displacement_h[:, 1:], start.state.contact_force_h[:, 1:]
     return float(np.pi * (motion[..., 2::2] * force[..., 1::2] - motion[..., 1::2] * force[..., 2::2])[..., 0].sum())
 
@@ -81,8 +78,6 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch):
         found[change] = starts([213.25], settings=settings)[213.25]
     coarse, fine = found[0.3], found[0.02]
     assert coarse.reference is not None
-    assert fine.state is not None
-    assert coarse.state is not None
     wrong, seen = (
         np.linalg.norm((coarse.state.displacement_h - other.displacement_h)[:, :, 1:])
         for other in (fine.state, coarse.reference)

@@ -36,7 +36,6 @@ def from_rest(model, friction, amplitude, omega, settings):
     idle = np.zeros(model.contact.n_contact)
     quiet = case.joint(omega, 0.0)
     static = solve_static_state(quiet, idle, settings.tolerance, Budget())
-    assert static is not None
     still = Balance.frozen(quiet, static.history, idle)
     at = static.evaluation
     orders = case.resolution.orders
@@ -45,7 +44,6 @@ def from_rest(model, friction, amplitude, omega, settings):
     assert rest.converged
     joint = case.joint(omega, amplitude)
     _, point = relax_to_periodic(case, joint, idle, rest.evaluation, quiet, static.history, JacobianSolver(), Budget())
-    assert point is not None
     assert point.evaluation.scaled_residual() <= settings.tolerance
     return np.abs(full_motion(model, periodic_state(joint, point)).displacement[1])
 
@@ -104,7 +102,6 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
     start, solver = first(0.03), JacobianSolver()
     middle = follow_arc(Arc(balance_at, start, 0.03, solver, 1e-9, Budget()), 0.03, grows, 1.0).point
-    assert middle is not None
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
     outcome, found = relax_to_periodic(

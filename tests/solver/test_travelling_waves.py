@@ -46,7 +46,6 @@ def state(nodal_diameter):
     case = build_case(dovetail(3, nodal_diameter), FRICTION, omega, SETTINGS)
     outcome, point = solve_first_state(case, omega, 0.5, np.zeros(16), JacobianSolver(), Budget())
     assert outcome is Outcome.CONVERGED
-    assert point is not None
     assert point.evaluation.slip_work.sum() > 1e-9
     return case, PathPoint(omega, point.evaluation, point.history)
 
@@ -81,12 +80,10 @@ def test_the_structure_settles_to_the_state_that_the_balance_has():
     joint, quiet = case.joint(omega, 0.5), case.joint(omega, 0.0)
     outcome, rest = solve_first_state(case, omega, 1e-6, np.zeros(16), JacobianSolver(), Budget())
     assert outcome is Outcome.CONVERGED
-    assert rest is not None
     outcome, settled = relax_to_periodic(
         case, joint, np.zeros(16), rest.evaluation, quiet, rest.history, JacobianSolver(), Budget()
     )
     assert outcome is Outcome.CONVERGED
-    assert settled is not None
     one, other = (
         joint.structure.response_h(joint.to_relative(at.evaluation.displacement_h))[0, 1:3] for at in (point, settled)
     )

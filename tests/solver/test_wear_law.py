@@ -49,8 +49,6 @@ def random_work(seed, n_contact, n_pressures=4, n_depths=5):
 def test_a_table_is_bilinear_and_constant_beyond_its_ends():
     law, random = replace(random_work(0, 200), factor=None, least=None), np.random.default_rng(1)
     force, depth = random.uniform(0.0, 400.0, 200), random.uniform(-1e-6, 6e-6, 200)
-    assert law.pressure is not None
-    assert law.depth is not None
     assert law.area is not None
     reference = RegularGridInterpolator((law.pressure, law.depth), law.table)
     inside = np.clip(force / law.area, law.pressure[0], law.pressure[-1]), np.clip(depth, law.depth[0], law.depth[-1])

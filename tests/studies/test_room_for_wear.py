@@ -137,7 +137,6 @@ def test_a_few_pairs_hold_what_partial_slip_wears(name, key, fewest):
             if key == "strips":
                 stuck = model.contact.position[:, 0] < contact * math.sqrt(1.0 - share)
             edge = model.contact.edge
-            assert edge is not None
             assert edge.any()
             assert not pressed(model, whole)[0][edge].any()
             assert not limit_depth(model, stuck)[edge].any(), (share, number)

@@ -57,7 +57,6 @@ def fake_branch(task: BranchTask) -> Iterator[StartResult]:
 
 def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> MarchResult:
     """A history whose values tell which of the task it is."""
-    assert task.start is not None
     scaled = task.histories[place]
     fingerprint = float(np.dot(task.start.arrays[0], [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0, 1.0]))
     fingerprint += scaled.wear_coefficient * 1e9 + scaled.step * 1e-4 + 0.5 * (task.scheme == "implicit")

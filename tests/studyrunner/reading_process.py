@@ -37,7 +37,6 @@ class ReadingProcess:
     def read(self, arguments: Sequence[str]) -> tuple[int, str]:
         """Exit status of the process that reads a file, and what it says."""
         assert self._process.stdin is not None
-        assert self._process.stdout is not None
         print(json.dumps(arguments), file=self._process.stdin, flush=True)
         status, said, waited = json.loads(self._process.stdout.readline())
         self.waited += waited

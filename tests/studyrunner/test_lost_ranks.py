@@ -59,7 +59,6 @@ def test_a_branch_goes_on_behind_what_it_has_given(completion):
     (again,) = progress.take_back([(branch, 3)], {})
     assert isinstance(again, BranchTask)
     assert again.order_left == branch.order[2:]
-    assert again.resume is not None
     assert again.resume.text == "progress"
     assert again.cost == pytest.approx(3 * branch.cost_of(first=False))
     finish(progress, [again, *marches])

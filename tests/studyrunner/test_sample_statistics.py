@@ -202,7 +202,6 @@ def test_the_jump_of_the_dovetail_is_found():
     below = np.interp(force, [0.49, 0.495], [1.542, 1.621])
     volume = np.where(force < 0.496, below, np.interp(force, [0.4975, 0.51], [2.251, 2.257]))
     groups = two_groups(known(volume, error=0.007))
-    assert groups is not None
     assert (groups.n_lower, groups.n_upper) == (np.count_nonzero(force < 0.496), np.count_nonzero(force >= 0.496))
     assert groups.lower_end < 1.65
     assert groups.upper_end == 2.251
@@ -212,7 +211,6 @@ def test_the_jump_of_the_dovetail_is_found():
 def test_samples_without_a_value_are_placed_where_their_bounds_say():
     values = np.r_[np.linspace(1.5, 1.6, 60), np.linspace(2.2, 2.3, 60)]
     groups = two_groups(without(values, np.array([3, 100]), np.where(np.arange(120) == 100, 2.0, 1.0)))
-    assert groups is not None
     assert (groups.n_lower, groups.n_upper) == (59, 60)
 
 
@@ -231,7 +229,6 @@ def test_a_sample_that_may_lie_on_either_side_is_in_no_group():
     assert two_groups(values) is not None
     error = np.where(np.arange(41) == 20, 0.41, 0.01)  # of a range of 0.8
     groups = two_groups(SampleValues(values.low, values.high, error))
-    assert groups is not None
     assert (groups.n_lower, groups.n_upper) == (20, 20)
     assert (groups.lower_end, groups.upper_end) == (1.6, 2.2)
     # one that is known better closes the gap
@@ -243,12 +240,10 @@ def test_the_pair_whose_depth_separates_both_groups_decides(sign):
     rng = np.random.default_rng(1)
     values = known(np.r_[rng.normal(1.55, 0.03, 40), rng.normal(2.25, 0.01, 40)])
     groups = two_groups(values)
-    assert groups is not None
     depths = rng.normal(5e-6, 1e-7, (80, 4))
     depths[:, 1] += 3e-7 * groups.is_upper  # overlaps
     depths[:, 2] += sign * 2e-6 * groups.is_upper
     found = deciding_pair(depths, groups)
-    assert found is not None
     assert (found.contact, found.deeper_above) == (2, sign > 0)
     assert found.threshold == pytest.approx(5e-6 + sign * 1e-6, abs=3e-7)
     assert deciding_pair(depths[:, :2], groups) is None

@@ -80,8 +80,6 @@ def test_the_memory_stays_with_those_who_have_it_when_its_owner_is_killed():
         reader = READER.format(root=str(ROOT), length=len(address))
         command = [sys.executable, "-c", reader]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
-            assert other.stdin is not None
-            assert other.stdout is not None
             other.stdin.write(address)
             other.stdin.flush()
             assert other.stdout.readline() == b"there\n"

@@ -50,7 +50,6 @@ def entries_of(store):
 
 
 def assert_same(found, expected):
-    assert found is not None
     assert found.text == expected.text
     for one, other in zip(found.arrays, expected.arrays, strict=True):
         np.testing.assert_array_equal(one, other, strict=True)
@@ -461,7 +460,6 @@ time.sleep(float(sys.argv[2]))
 def another_run(path, seconds):
     command = [sys.executable, "-c", HOLDER, str(path), str(seconds)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
-        assert holder.stdout is not None
         assert holder.stdout.readline() == "locked\n"
         yield holder
         holder.kill()

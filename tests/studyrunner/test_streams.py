@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.mpi.launching import PATIENCE, launcher, results
+from tests.mpi.launching import FAKED, PATIENCE, fake_here, launcher, results
 
 pytestmark = pytest.mark.processes
 
@@ -29,7 +29,7 @@ def shell(command, folder):
 
 def faked(arguments, where):
     """A run with the stand-in for the solver."""
-    return f"{sys.executable} {ROOT / 'tests' / 'mpi' / 'run_faked.py'} {arguments} {where}"
+    return f"{sys.executable} {FAKED} {arguments} {where}"
 
 
 @pytest.mark.slow
@@ -65,7 +65,7 @@ def test_a_plan_that_does_not_arrive(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["closed"])
 def test_a_report_that_nobody_hears_of(case, tmp_path):
-    assert shell(faked(STUDY, ""), tmp_path)[0] == 0
+    assert fake_here([FAKED, *STUDY.split()], tmp_path) == 0
     status, _, _ = shell(f"{sys.executable} -m studyrunner.report.cli out.nc {DEAF[case]}", tmp_path)
     assert status == 0
     assert (tmp_path / "out-report" / "index.html").exists()

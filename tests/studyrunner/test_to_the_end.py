@@ -114,7 +114,6 @@ def test_the_report_shows_a_final_state_as_one(tmp_path):
     panels = draw_map(both, course, "worn_volume", scale).figure.axes
     assert [panel.get_title() for panel in panels if panel.get_title()] == ["adaptive scheme"]
     content = build_page_data(both, 1e6).content
-    assert content is not None
     decoded = np.frombuffer(base64.b64decode(str(content["counts"])), "<f4").reshape(*both.held.shape, 6)
     assert np.array_equal(np.isinf(decoded).any(axis=-1), both.dataset["final_method"] == 1)
     both.close()
@@ -129,7 +128,6 @@ def test_the_report_shows_a_final_state_as_one(tmp_path):
     assert "10 mm³ ± 1e-06 % at " in history.sentence
     assert "worn volume at the end" in final.figure.axes[0].get_ylabel()  # type: ignore[union-attr]
     content = build_page_data(alone, 1e6).content
-    assert content is not None
     assert content["cycles"] == [0.0, 5.0]
     alone.close()
 

@@ -63,7 +63,6 @@ def test_the_effective_study_holds_the_depths(whole, tmp_path):
 
 def test_depths_may_be_given(tmp_path):
     study = read_study("sdof_slider", {**SLIDER, "scene.worn": {"depth": 5e-6}})
-    assert study.scene.worn is not None
     assert study.scene.worn.depths(3) == (5e-6,) * 3
     assert "worn_cycle" not in study.dimensions
     two = read_study("sdof_slider", {**SLIDER, "scene.worn": {"depth": [5e-6, 1e-6]}})

@@ -99,7 +99,6 @@ def test_table_of_folds_and_jumps():
     fold[1, ..., 1] = 201.5
     jumps[0, 0, 0, 0, 1, 0] = 4000.0
     table = find_table(with_variables(result, fold_frequency=fold, jump_cycle=jumps), "folds_and_jumps")
-    assert table is not None
     # Both schemes share one sweep and its fold.
     assert table.rows == (
         ("fold", "201.5 Hz", "sweep down jumps to another branch"),
@@ -117,7 +116,6 @@ def test_table_of_stability():
     oscillates[2, 0, 0, 0, 0, 0] = 1
     limit[3] = 900.0  # of a point that failed, perhaps for this
     table = find_table(with_variables(result, step_limit=limit, oscillates=oscillates), "stability")
-    assert table is not None
     assert table.rows == (
         ("200 Hz, explicit scheme", "1000", "800", "yes", "yes", ""),
         ("201 Hz, explicit scheme", "1000", "800", "yes", "", ""),

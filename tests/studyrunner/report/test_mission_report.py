@@ -78,7 +78,6 @@ def test_page_and_files_for_paraview_are_written(results, tmp_path, name, capsys
 
 def test_missing_variables_are_named(results):
     result = open_for_report(results / "one.nc")
-    assert result.blocks is not None
     blocks = result.blocks.drop_vars(["block_share", "response_amplitude"])
     found = items(Result(result.path, result.dataset, blocks=blocks))
     assert "block_shares" not in found

@@ -65,7 +65,6 @@ def test_the_root_is_there_with_a_quarter_of_the_room_at_most():
     dataset = dovetail_file(density=4)
     result = Result(Path("some.nc"), dataset)
     surface = read_root(result)
-    assert surface is not None
     data = build_page_data(result, PLENTY)
     root = content_of(data)["root"]
     np.testing.assert_array_equal(decode({"data": root["nodes"]}, -1, 3), surface.nodes.astype("f4"))

@@ -71,7 +71,6 @@ def test_meshes_that_do_not_match_are_in_contact_on_both_sides(kinds, tmp_path):
     dataset = with_mesh(build_file(positions=pairs.position), describe_fe_mesh(sector.mesh))
     dataset = dataset.assign_coords(contact_surface=("contact", ["root"] * pairs.n_contact))
     surface = read_root(as_result(dataset, tmp_path / "fe.nc"))
-    assert surface is not None
     assert surface.is_mesh
     names = np.array(surface.bodies)[surface.body[surface.contact.flank >= 0]]
     areas = np.linalg.norm(face_normals(surface.nodes, surface.faces), axis=1)[surface.contact.flank >= 0]
@@ -101,7 +100,6 @@ def test_pairs_without_a_mesh_are_patches_that_do_not_overlap(tmp_path):
     positions = flank_positions(n_along=9, n_across=4)
     result = as_result(build_file(positions=positions), tmp_path / "patches.nc")
     surface = read_root(result)
-    assert surface is not None
     assert not surface.is_mesh
     np.testing.assert_allclose(surface.nodes[surface.faces].mean(axis=1), positions, atol=1e-12)
     sides = np.linalg.norm(np.diff(surface.nodes[surface.faces], axis=1), axis=2)
@@ -125,7 +123,6 @@ def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path, wrong):
     else:
         dataset["mesh_x"] = dataset["mesh_x"] + 1.0
     surface = read_root(as_result(dataset, tmp_path / "file.nc"))
-    assert surface is not None
     assert not surface.is_mesh
     assert len(surface.faces) == 16
 
@@ -133,7 +130,6 @@ def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path, wrong):
 @pytest.mark.slow
 def test_fewer_faces_keep_those_in_contact_and_the_shape(tmp_path):
     surface = read_root(as_result(dovetail_file(density=4), tmp_path / "fine.nc"))
-    assert surface is not None
     in_contact = int((surface.contact.flank >= 0).sum())
     fewer = simplify(surface, 3000)
     assert 2500 < len(fewer.faces) - in_contact <= 3000 < len(surface.faces) - in_contact
@@ -151,7 +147,6 @@ def test_the_figures_of_the_dovetail(dovetail):
     assert [worn.name, numbers.name, disk.name] == ["worn_root", "pair_numbers", "whole_disk"]
     depth = dovetail.at("wear_depth", dovetail.shown_point(), -1).values
     root = read_root(dovetail)
-    assert root is not None
     assert f"at pair {int(np.argmax(depth))}." in worn.caption
     assert f"{root.exaggeration(float(depth.max())):g} times exaggerated" in worn.caption.replace("\u00a0", "")
     panels = numbers.figure.axes
@@ -164,6 +159,5 @@ def test_the_figures_of_the_dovetail(dovetail):
 def test_pairs_on_a_line_are_strips_beside_each_other(tmp_path):
     positions = np.column_stack([np.linspace(-2e-4, 2e-4, 9), np.zeros(9), np.zeros(9)])
     surface = read_root(as_result(build_file(positions=positions, surfaces=["line"] * 9), tmp_path / "line.nc"))
-    assert surface is not None
     assert np.ptp(surface.nodes[:, 0]) == pytest.approx(9 * 5e-5)
     np.testing.assert_allclose(surface.nodes[:, 2], 0.0, atol=1e-15)

@@ -48,7 +48,6 @@ def test_the_scar_is_symmetric_and_that_of_the_pairs(model):
 
 def test_every_patch_of_a_sphere_stands_at_four_places():
     scar = find_scar(half_space("sphere_on_flat"))
-    assert scar is not None
     assert np.bincount(scar.pairs).tolist() == [4] * 12
     assert len(set(zip(scar.x.tolist(), scar.y.tolist(), strict=True))) == 48
     np.testing.assert_array_equal(np.abs(scar.x), X[scar.pairs])

@@ -49,7 +49,6 @@ def test_bands_over_the_frequency_ascend(dataset):
     panel = drawn(turned)["worn_volume_bands_course"].figure.axes[0]
     (median,) = [line for line in panel.get_lines() if line.get_label() == "median"]
     course = find_course(result_of(turned))
-    assert course is not None
     np.testing.assert_array_equal(median.get_xdata(), course.values)
     assert median.get_ydata()[1] == pytest.approx(3.0 * median.get_ydata()[0])
 
@@ -102,7 +101,6 @@ def test_a_single_sample_has_no_statistics():
 @pytest.mark.parametrize("study", ["", "no TOML", "[scatter]\nsamples = 64\nother = {normal = {std = 1}}\n"])
 def test_drawn_values_are_enough(dataset, study):
     result = result_of(dataset.assign_attrs(study=study))
-    assert result.statistics is not None
     assert set(result.statistics["input"].values) == {"friction_coefficient", "wear_coefficient", "gap"}
 
 
@@ -111,7 +109,6 @@ def test_counts_are_thinned_out_where_there_are_many(dataset, monkeypatch):
 
     monkeypatch.setattr(sample_statistics, "_MOST_VALUES", 1)
     statistics = result_of(dataset).statistics
-    assert statistics is not None
     np.testing.assert_array_equal(statistics["cycle"], [0.0, 200.0])
     monkeypatch.setattr(sample_statistics, "_MOST_OF_ALL", 1)
     (item,) = drawn(dataset).values()

@@ -69,7 +69,6 @@ def test_figures_show_the_pairs_of_the_shown_scene(meshes):
 
 def test_panels_of_each_scene_name_places_in_the_file(meshes):
     content = build_page_data(meshes, 4e6).content
-    assert content is not None
     maps: Any = content["maps"]
     assert maps["scenes"] == [meshes.axes.index("mesh")]
     for panels, n_pairs in zip(maps["panels"], (FEW, MANY), strict=True):
@@ -103,7 +102,6 @@ def test_the_page_holds_what_samples_draw(samples, page):
 
 def test_little_room_takes_the_shown_combination(samples):
     data = build_page_data(samples, 3e4)
-    assert data.content is not None
     scatter: Any = data.content["scatter"]
     assert scatter["held"] == [samples.shown_point()["frequency"]]
     assert "The scatter is on this page for one of 2 combinations of the other axes." in data.notes
