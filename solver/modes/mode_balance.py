@@ -24,6 +24,7 @@ from solver.modes.modal_model import FirstHarmonic, LinearMode, first_harmonic, 
 from solver.modes.options import MODES
 from solver.newton.iteration import solve_newton
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget
 from solver.options import COMMON
 from solver.settings import Resolution
@@ -180,13 +181,14 @@ class ModeProblem:
         tangent, joint = here.balance.linearise(here.at), here.balance.joint
         values = here.values
         lengths = COMMON.difference * np.array([values[0], 1.0, amplitude])
-        steps, errors = [solver.solve(tangent, -here.at.residual)], [np.zeros(3)]
+        rights, errors = [-here.at.residual], [np.zeros(3)]
         for place, length in enumerate(lengths):
             moved = values.copy()
             moved[place] += length
             ahead = self.evaluate(here.at.predicted_h, moved, amplitude, history)
-            steps.append(solver.solve(tangent, (here.at.residual - ahead.at.residual) / length))
+            rights.append((here.at.residual - ahead.at.residual) / length)
             errors.append((ahead.errors - here.errors) / length)
+        steps = [solver.solve(tangent, right) for right in rights]
         changes = []
         for step, own in zip(steps, errors, strict=True):
             motion = joint.to_relative(tangent.transmit(step)[0])
@@ -197,7 +199,12 @@ class ModeProblem:
         matrix = np.stack(changes[1:], axis=1)
         change = np.linalg.lstsq(matrix, -here.errors - changes[0])[0]
         largest = max(abs(change[0]) / values[0], abs(change[1]))
-        predicted = steps[0] + sum(float(part) * step for part, step in zip(change, steps[1:], strict=True))
+        weights = np.append(1.0, change)
+        predicted, right = (np.tensordot(weights, np.array(parts), 1) for parts in (steps, rights))
+        # the steps may cancel each other, not so their errors
+        left = right - tangent.apply(predicted)
+        if np.linalg.norm(left) > NEWTON.forcing * np.linalg.norm(here.at.residual):
+            predicted = predicted + solver.solve(tangent, left)
         step = np.concatenate([predicted.ravel(), change])
         return np.asarray(step * min(1.0, MODES.largest_change / max(largest, 1e-300)))
 
