@@ -25,7 +25,9 @@ def test_version_and_licence_are_those_of_the_package():
 
 @pytest.mark.slow
 def test_every_benchmark_finds_what_it_imports() -> None:
-    """The tests run none of them."""
+    """The tests run none of them. `peer_...` run in the environments of other programs."""
     for found in pkgutil.iter_modules(tests.benchmarks.__path__):
+        if found.name.startswith("peer_"):
+            continue
         module = importlib.import_module(f"tests.benchmarks.{found.name}")
         assert module.__doc__, found.name
