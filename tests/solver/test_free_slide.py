@@ -53,7 +53,7 @@ def test_nothing_is_held_where_a_pair_sticks_or_a_retainer_holds():
 @pytest.mark.slow
 def test_a_root_that_begins_to_slide_all_over_wears_on():
     model = build_scene("dovetail_sector", mesh=1)
-    history = march_wear(model, 212.0, 1.0, 0.3, 1.1e-11, 20_000.0, settings=SolverSettings(rtol=5e-2))
+    history = march_wear(model, 212.0, 1.0, 0.3, 1.1e-11, 20_000.0)
     assert history.outcome in (Outcome.CONVERGED, Outcome.INACCURATE)
     # with a retainer of 1e6 N/m 8.7007, of 1e7 N/m 8.7015
     assert abs(1e9 * history.worn_volume[-1] - 8.701) < 1e-2 * 8.701
