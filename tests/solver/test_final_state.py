@@ -1,5 +1,6 @@
 """The final state without slow time: where an active set has it, and where only the march does."""
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -129,7 +130,8 @@ def test_beside_a_resonance_the_march_is_taken_and_the_reason_is_told():
     assert direct.final_method == "march"
     assert np.array_equal(direct.wear_depth, march.wear_depth)
     assert np.array_equal(direct.cycles, march.cycles)
-    # the search finds another final state, or none: which of both depends on the last bits of the structure
+    # The search finds another final state, with 1.2 mm of depth, or none: round-off of 3e-16 in the condensed structure
+    # decides. At 212.85, 212.9 and 213 Hz two BLAS kernels give different answers.
     other = f"the march {1e9 * march.worn_volume[-1]:.4g} mm3, depths differ by"
     assert other in direct.message or direct.message.startswith("no active set: without the pairs that slip")
 
@@ -140,6 +142,11 @@ def test_where_residual_shear_matters_the_march_is_taken():
     direct = found("some slip")
     assert direct.final_method == "march"
     assert "residual shear makes the depths depend on the way" in direct.message
+    volume = 1e9 * direct.worn_volume[-1]
+    told = re.search(r"it has ([0-9.]+) mm3, the march ([0-9.]+) mm3, depths differ by ([0-9.e-]+) m", direct.message)
+    assert told is not None
+    assert float(told[2]) == pytest.approx(volume, rel=1e-3)
+    assert 1e-3 < abs(float(told[1]) / volume - 1.0) < 5e-2
     final = worn_off(*begun("some slip"))
     worn = direct.wear_depth[-1]
     assert np.array_equal(final.off, worn > 1e-2 * worn.max())
