@@ -22,9 +22,9 @@ class MissionOptions:
     frequency_error: float = 0.25
     """Allowed error of the wear of a passage by its frequencies, as a fraction of rtol."""
     largest_sweep_rate: float = 0.3
-    """|df/dt| / (zeta f)^2 above which a message says that a passage is too fast for steady states. Wear over that of the
-    steady states, integrated in time: slider 0.9986 to 1.0001 at 0.3, 0.991 at 1; dovetail (mesh 1) 0.95 at 0.1, 0.91 at
-    0.3, 0.95 at 1, 1.11 at 3."""
+    """|df/dt| / (zeta f)^2 above which a message says that a passage is too fast for steady states. Wear over that of
+    the steady states, integrated in time: slider 0.9986 to 1.0001 at 0.3 and 0.991 at 1; dovetail (mesh 1) 0.95 at 0.1,
+    0.91 at 0.3, 0.95 at 1, 1.11 at 3."""
 
 
 MISSIONS = MissionOptions()
