@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.options import ACCURACY
-from solver.model import FloatArray
+from solver.model import ComplexArray, FloatArray
 from solver.settings import Scheme
 
 
@@ -115,7 +115,35 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
             ("wear_rate_error", np.fmax(safety * _rate_change(outputs), crossing(_rate_change(steps)))),
         )
     )
+    response = np.fmax(response, _change_within(volume, error, steps, area))
     return HistoryError(relative, of_pairs, response, rate)
+
+
+def _change_within(volume: FloatArray, error: FloatArray, steps: Both, area: FloatArray) -> FloatArray:
+    """Relative change (n,) of the response while the worn volume passes the values within its error.
+
+    A state is not known better than the depths with which it vibrates.
+
+    volume, error (n,): worn volume and its error, m3. steps: the history at the ends of its steps.
+    """
+    worn, response = steps.fine["wear_depth"] @ area, steps.fine["response"]
+    known = np.isfinite(worn)
+    worn, response = worn[known], response[known]
+    if worn.size < 2:
+        return np.zeros_like(volume)
+
+    def at(value: FloatArray) -> ComplexArray:
+        return np.array([np.interp(value, worn, each) for each in response.T])
+
+    found = np.zeros_like(volume)
+    for place in np.flatnonzero(np.isfinite(error)):
+        low, high = volume[place] - error[place], volume[place] + error[place]
+        passed = response[(worn > low) & (worn < high)].T
+        moved = np.hstack([at(np.array([low, high])), passed]) - at(volume[place : place + 1])
+        size = np.linalg.norm(at(volume[place : place + 1]))
+        if size > 0.0:
+            found[place] = np.linalg.norm(moved, axis=0).max() / size
+    return found
 
 
 def _start_error(fine: Mapping[str, Any], reference: Mapping[str, Any], area: FloatArray) -> float:

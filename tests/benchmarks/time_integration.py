@@ -280,6 +280,8 @@ def settle(
     motion = one_period(structure, motion, gap)
     period = 2.0 * np.pi / structure.omega
     growth = np.exp((structure.rate - 1j * structure.omega) * period) - 1.0 if structure.rate else -1.0 + 0.0j
+    # far from the resonance of the mode its beat would grow: there the joint sticks, and the end is known at once
+    ahead = _AHEAD if abs(1.0 + _AHEAD * growth) < 1.0 else -1.0 / growth
     calm = 0
     for periods in range(2, _MOST_PERIODS):
         here, work = amplitude_of_mode(structure, motion), motion.work
@@ -291,7 +293,7 @@ def settle(
         calm = calm + 1 if still and abs(change / growth) <= _SETTLED * size else 0
         if calm >= 2:
             return moved, periods
-        motion = push_mode(structure, moved, (_AHEAD - 1.0) * change)
+        motion = push_mode(structure, moved, (ahead - 1.0) * change)
     raise RuntimeError(f"the motion does not settle in {_MOST_PERIODS} periods")
 
 

@@ -221,3 +221,15 @@ def test_what_nothing_confirms_is_not_known():
     still = error_of(read(np.zeros((3, 2))), read(np.full((3, 2), np.nan)), "explicit")
     assert not still.worn_volume.any()
     assert not still.wear_depth.any()
+
+
+def test_a_response_is_not_known_better_than_the_worn_volume():
+    # both solutions vibrate alike at each count, with other volumes; the response rises by 0.5 from 3 to 6 m3
+    along = [[1.0], [1.0], [1.5]]
+    fine, other = read(DEPTH, response=along), read([[0.0, 0.0], [0.8, 0.9], [1.6, 1.8]], response=along)
+    found = error_of(fine, other, "adaptive", Both(COUNTS, fine, other))
+    volume = np.array([0.0, 3.0, 6.0])
+    wrong = found.worn_volume * volume
+    assert wrong[1] > 0.0
+    assert found.response[1] == pytest.approx(wrong[1] * 0.5 / 3.0)
+    assert found.response[2] == pytest.approx(wrong[2] * 0.5 / 3.0 / 1.5)
