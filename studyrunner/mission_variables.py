@@ -86,8 +86,8 @@ OF_MISSIONS = {
     "sweep_rate": Variable(
         ("block",),
         "1",
-        "sweep rate of a passage over the square of its half-power half-width zeta f",
-        comment="A passage far below 1 wears as its steady states do; 0 for steady vibration and off resonance.",
+        "sweep rate of a passage over (zeta f)^2, of the damping ratio zeta of the joint at rest",
+        comment="A passage far below 1 wears as its steady states do; 0 for steady vibration and where nothing wears.",
     ),
     "worn_volume_error": replace(
         _by_mission("worn_volume_error"),

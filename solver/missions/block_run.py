@@ -45,7 +45,7 @@ class BlockRun:
     like: what the reference solution takes over.
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
     iterations: Newton iterations, start state included.
-    sweep_rate: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.passage`; 0 for steady vibration.
+    sweep_rate: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.delay`; 0 for steady vibration.
     frequencies: with which a passage of the next mission begins, ascending, Hz.
     """
 

@@ -184,8 +184,10 @@ def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> F
             f"from mission {fine.held:.0f} on only friction holds the joint in one direction: it is held there"
         )
     for place in np.flatnonzero(fine.sweep_rate > MISSIONS.largest_sweep_rate):
-        too_fast = "too fast for the steady states that it is computed from: its sweep rate over (zeta f)^2 is"
-        remarks.append(f"{mission.called(int(place))} is {too_fast} {fine.sweep_rate[place]:.2g}")
+        rate = f"passes at {fine.sweep_rate[place]:.2g} (zeta f)^2"
+        remarks.append(
+            f"{mission.called(int(place))} {rate}: it may wear otherwise than its steady states (see the error)"
+        )
     if fine.cut_off < math.inf:
         return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(fine.cut_off).replace("cycle", "mission"))
     if error > SENSITIVE_ERROR:

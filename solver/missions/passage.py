@@ -14,8 +14,8 @@ later ones. So the depth y since the start of the passage follows from the linea
 with the implicit trapezoidal rule in the order of the passage. The square of this correction, relative to the wear, is
 a part of the error, and falls with the wear of one passage.
 
-A slow passage finds the steady states: it has to be slow against the decay of the vibration within the half-power width
-2 zeta f. The number |df/dt| / (zeta f)^2 says how slow it is.
+A slow passage finds the steady states. What a faster one may wear more or less is a part of its error, see
+`solver.missions.delay`.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from solver.harmonic_balance.response_peak import largest_responses
 from solver.loading_history.start_states import follow_branch
 from solver.missions.block_run import BlockCase, BlockRun, not_flown
 from solver.missions.blocks import Passage, worn
+from solver.missions.delay import Delay, delay_of
 from solver.missions.options import MISSIONS
 from solver.model import ComplexArray, FloatArray
 from solver.options import COMMON
@@ -97,6 +98,8 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
     )
     growth, slope = in_order(states, (_slope(case, passage, state) for state in states))
     by_depth = float(np.abs(growth - first.wear) @ area) ** 2 / volume if volume > 0.0 else 0.0
+    delay = _delay(case, passage, first.states)
+    by_rate = min(delay.lag * max(float(state.density @ area) for state in states), volume)
     ends = states[0], states[-1]
     found = BlockRun(
         failure=Failure(Outcome.CONVERGED),
@@ -105,7 +108,7 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
         response=np.array([state.response for state in ends]),
         peak=np.array([state.peak for state in ends]),
         response_error=max(state.start.response_error for state in ends),
-        growth_error=float(by_states + first.error + by_depth) / volume if volume > 0.0 else 0.0,
+        growth_error=float(by_states + first.error + by_depth + by_rate) / volume if volume > 0.0 else 0.0,
         inaccurate=max(
             (max(state.start.response_error, state.start.wear_rate_error) for state in states if _inaccurate(state)),
             default=0.0,
@@ -113,10 +116,17 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
         like=Like((), float("nan"), first.iterations),
         last=states[-1].start if case.mission.continued_by(case.place) else None,
         iterations=first.iterations,
-        sweep_rate=sweep_rate(passage, first.states),
+        sweep_rate=delay.sweep_rate if volume > 0.0 else 0.0,
         frequencies=first.needed,
     )
     return in_rows(found)
+
+
+def _delay(case: BlockCase, passage: Passage, states: tuple[SweptState, ...]) -> Delay:
+    """The delay of a passage with these states."""
+    frequencies, responses = np.array([state.frequency for state in states]), [state.response for state in states]
+    periodic = [state.start.state for state in states if state.start.state is not None]
+    return delay_of(case.block, passage, frequencies, np.array(responses), periodic)
 
 
 def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -270,24 +280,3 @@ def _states(case: BlockCase, passage: Passage, frequencies: FloatArray) -> list[
         response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
         found.append(SweptState(frequency, start, density, response, largest_responses(joint, at)))
     return found
-
-
-def sweep_rate(passage: Passage, states: tuple[SweptState, ...]) -> float:
-    """|df/dt| / (zeta f)^2 at the largest response, with the half-power width 2 zeta f; 0 where no peak is passed."""
-    at = np.array([state.frequency for state in states])
-    size = np.array([np.abs(state.response).max() for state in states])
-    top = int(np.argmax(size))
-    if top in (0, len(states) - 1):
-        return 0.0
-    sides = []
-    for way in (-1, 1):
-        places = np.arange(top, len(states)) if way > 0 else np.arange(top, -1, -1)
-        below = np.flatnonzero(size[places] < size[top] / np.sqrt(2.0))
-        if below.size:
-            one, other = places[below[0] - 1], places[below[0]]
-            share = (size[one] - size[top] / np.sqrt(2.0)) / (size[one] - size[other])
-            sides.append(abs(at[one] + share * (at[other] - at[one]) - at[top]))
-    if not sides:
-        return 0.0
-    # of a bent peak the steeper side is a jump: the width is that of the wider side
-    return float(abs(passage.rate) / max(sides) ** 2)

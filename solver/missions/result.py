@@ -25,8 +25,8 @@ class MissionHistory:
     - response_error (n_output, n_block): estimated relative error of these responses.
     - excitation_frequency (n_block, 2): Hz, at begin and end of each block.
     - reference_volume (n_output,): m3, worn volume of the reference solution.
-    - sweep_rate (n_block,): `|df/dt| / (zeta f)^2` of each passage, with its half-power width 2 zeta f; 0 where none is
-      passed and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.passage`).
+    - sweep_rate (n_block,): `|df/dt| / (zeta f)^2` of each passage, of the damping ratio of the joint at rest; 0 where
+      nothing wears and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.delay`).
     - error_estimate: `worn_volume_error` at the last number that was reached.
     - last_mission: number of missions up to which the history was computed.
     - steps (n_step,): missions flown in each step.

@@ -79,13 +79,30 @@ def linear_mode(model: ReducedModel, number: int, closed: BoolArray, friction: F
     friction : array (n_contact,)
         Friction coefficients: closed pairs with a positive one are held in the tangential directions as well.
     """
+    omegas, shapes = _modes(model, closed, friction)
+    return None if len(omegas) < number else _mode(model, float(omegas[number - 1]), shapes[:, number - 1])
+
+
+def nearest_mode(model: ReducedModel, omega: float, closed: BoolArray, friction: FloatArray) -> LinearMode | None:
+    """As `linear_mode`, the mode nearest to a frequency, rad/s; None where the structure has no mode."""
+    omegas, shapes = _modes(model, closed, friction)
+    if not len(omegas):
+        return None
+    nearest = int(np.argmin(np.abs(omegas - omega)))
+    return _mode(model, float(omegas[nearest]), shapes[:, nearest])
+
+
+def _modes(model: ReducedModel, closed: BoolArray, friction: FloatArray) -> tuple[FloatArray, Matrix]:
+    """Natural frequencies, rad/s, and modes of harmonic 1 with closed pairs held."""
     linear, _ = model.harmonic_structure(1)
     dofs = model.contact.dofs
     held = np.concatenate([dofs[closed, 0], dofs[closed & (friction > 0.0), 1:].ravel()])
-    omegas, shapes = natural_frequencies(linear, held[held >= 0])
-    if len(omegas) < number:
-        return None
-    omega, shape = float(omegas[number - 1]), shapes[:, number - 1]
+    return natural_frequencies(linear, held[held >= 0])
+
+
+def _mode(model: ReducedModel, omega: float, shape: Matrix) -> LinearMode:
+    """The mode with a real largest component."""
+    linear, _ = model.harmonic_structure(1)
     largest = shape[np.argmax(np.abs(shape))]
     shape = cast("Matrix", shape * (np.conj(largest) / np.abs(largest)))
     return LinearMode(omega, shape, float(np.real(np.vdot(shape, linear.damping @ shape))) / (2.0 * omega))

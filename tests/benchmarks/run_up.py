@@ -1,22 +1,21 @@
 """Wear of a passage through a resonance, by time integration, over the wear of its steady states.
 
 `python -m tests.benchmarks.run_up [--scene sdof_slider] [--rates 0.1 0.3 1 3]` prints both for some sweep rates, each
-as |df/dt| / (zeta f)^2. The time integration is that of `time_integration`: the phase of the excitation runs with the
-frequency, up or down, and the slip work is summed at constant depth.
+as |df/dt| / (zeta f)^2, with the error that the passage tells. The time integration is that of `time_integration`: the
+phase of the excitation runs with the frequency, up or down, and the slip work is summed at constant depth.
 """
 
 import argparse
 import time
-from dataclasses import replace
 
 import numpy as np
 
-from solver import Block, Passage, SolverSettings, integrate_mission
+from solver import Block, MissionHistory, Passage, SolverSettings, integrate_mission
 from solver.model import FloatArray, ReducedModel
 from studies import build_scene
 from tests.benchmarks.time_integration import advance, at_rest, build, settle
 
-FRICTION, WEAR = 0.5, 1.1e-11
+FRICTION, WEAR_PER_WORK = 0.5, 1e-30
 CASES = {
     "sdof_slider": ({"damping": 6.0, "normal_stiffness": 0.0}, (180.0, 220.0), 10.0),
     "dovetail_sector": ({"mesh": 1}, (209.0, 214.0), 0.5),
@@ -55,21 +54,24 @@ def main() -> None:
     model = build_scene(given.scene, **changes)
     for way in given.ways:
         start, stop = ends if way == "up" else ends[::-1]
-        slow = Passage(start, stop, 1.0)
-        block = Block(model, slow, amplitude, FRICTION, begin=slow.sweep)
-        history = integrate_mission((replace(block, cycles=None),), 1e-30, 1, settings=SolverSettings())
-        volume, unit = float(history.worn_volume[-1]) / 1e-30, float(history.sweep_rate[0])
-        print(
-            f"{slow.sweep}: steady states known to {history.error_estimate:.2%}, 1 Hz/s = {unit:.3g} (zeta f)^2",
-            flush=True,
-        )
         for rate in given.rates:
             began = time.process_time()
-            passage = replace(slow, rate=rate / unit)
-            work = time_integrated(model, passage, amplitude, given.steps)
-            ratio = float(work.sum()) / (volume / passage.rate)
-            spent = time.process_time() - began
-            print(f"  {rate:.3g} (zeta f)^2, {passage.rate:.3g} Hz/s: {ratio:.4f}, {spent:.0f} CPU s", flush=True)
+            slow = _mission(model, Passage(start, stop, 1.0), amplitude)
+            passage = Passage(start, stop, rate / float(slow.sweep_rate[0]))
+            history = _mission(model, passage, amplitude)
+            volume = float(history.worn_volume[-1]) / WEAR_PER_WORK
+            work = float(time_integrated(model, passage, amplitude, given.steps).sum())
+            print(
+                f"{way}, {rate:.3g} (zeta f)^2, {passage.rate:.3g} Hz/s: {work / volume:.4f}, told "
+                f"{history.error_estimate:.2%}, {time.process_time() - began:.0f} CPU s",
+                flush=True,
+            )
+
+
+def _mission(model: ReducedModel, passage: Passage, amplitude: float) -> MissionHistory:
+    """One passage that wears next to nothing, through steady states."""
+    block = Block(model, passage, amplitude, FRICTION, begin=passage.sweep)
+    return integrate_mission((block,), WEAR_PER_WORK, 1, settings=SolverSettings())
 
 
 if __name__ == "__main__":

@@ -15,9 +15,10 @@ from solver.missions import solutions
 from solver.missions.block_run import BlockCase, BlockRun
 from solver.missions.blocks import Begin, Mission
 from solver.missions.course import MissionCourse
+from solver.missions.delay import half_width
 from solver.missions.history import integrate_missions
 from solver.missions.options import MISSIONS
-from solver.missions.passage import Swept, SweptState, _states, _swept, in_order, interval_errors, sweep_rate
+from solver.missions.passage import Swept, SweptState, _states, _swept, in_order, interval_errors, run_passage
 from solver.missions.step import Step, take_step
 from solver.packing import Packed
 from solver.results.history import StartState
@@ -353,13 +354,32 @@ def test_frequencies_of_a_passage_wear_one_after_the_other(order):
     np.testing.assert_allclose(slope @ [0.1, 0.0], end(np.array([0.1, 0.0])) - end(np.zeros(2)) - [0.1, 0.0], rtol=1e-3)
 
 
-def test_the_sweep_rate_is_that_of_the_half_power_width():
+def test_the_half_power_width_is_that_of_the_damping():
     """A linear oscillator of 100 Hz and damping ratio 0.01, and no peak at the edge of the range."""
     at = np.linspace(90.0, 110.0, 401)
     peak = 1.0 / np.abs(1.0 - (at / 100.0) ** 2 + 0.02j * at / 100.0)
-    states = tuple(state(*of) for of in zip(at, at, np.zeros(401, int), peak, strict=True))
-    assert sweep_rate(Passage(90.0, 110.0, 0.5), states) == pytest.approx(0.5 / (0.01 * 100.0) ** 2, rel=0.05)
-    assert sweep_rate(Passage(90.0, 110.0, 0.5), states[:150]) == 0.0
+    assert half_width(at, peak) == pytest.approx(0.01 * 100.0, rel=0.03)
+    assert half_width(at[:150], peak[:150]) == 0.0
+
+
+@pytest.mark.slow
+def test_a_vibration_is_late_by_its_decay_time():
+    """The free slider with 6 N s/m and 0.1 kg decays by exp(-30 t): at 7 Hz/s it is late by 7/30 Hz."""
+
+    def case(rate):
+        block = Block(scene("sdof_slider", damping=6.0), Passage(180.0, 220.0, rate), 10.0, FRICTION, begin="up")
+        # too little wear to change the pressures on the way
+        mission = Mission((block,), 1e-6 * WEAR, (0, 1), SETTINGS)
+        return BlockCase(mission, 0, np.zeros(1), None, with_slope=False, settings=SETTINGS)
+
+    fast, slow = run_passage(case(7.0)), run_passage(case(0.07))
+    assert fast.sweep_rate == pytest.approx(7.0 / (30.0 / (2.0 * np.pi)) ** 2)
+    assert slow.sweep_rate == pytest.approx(0.01 * fast.sweep_rate)
+    # as if the largest wear over frequency were missed, or added, over the lag
+    states = _states(case(7.0), Passage(180.0, 220.0, 7.0), np.linspace(190.0, 210.0, 41))
+    assert isinstance(states, list)
+    most = max(float(each.density[0]) for each in states)
+    assert fast.growth_error - slow.growth_error == pytest.approx(6.93 / 30.0 * most / fast.growth[0], rel=0.02)
 
 
 @pytest.mark.slow
