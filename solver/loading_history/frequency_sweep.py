@@ -73,6 +73,7 @@ class FrequencySweep:
 
     budget: of the state at the current frequency, without the sweep to this frequency.
     save: called at each save point of the sweep and of the state.
+    every: for which states stability is tested, as in `find_instability`.
     """
 
     def __init__(
@@ -88,6 +89,7 @@ class FrequencySweep:
         self.excitation_amplitude = excitation_amplitude
         self.sweep = sweep
         self.settings = settings
+        self.every = True
         self.save: Callable[[], None] = lambda: None
         self.journal = Journal(lambda: self.save())
         self.budget = Budget(journal=self.journal)
@@ -244,7 +246,7 @@ class FrequencySweep:
                 found.estimate = found.estimate + state_difference(refined.case, joint, refined.point, moved)
         if not certify(joint, refined.point.evaluation).holds(self.settings.tolerance):
             found.outcome, found.state, found.reference = Outcome.CERTIFICATE_FAILED, None, None
-        elif unstable := find_instability(refined.case, joint, refined.point.evaluation, self.budget):
+        elif unstable := find_instability(refined.case, joint, refined.point.evaluation, self.budget, self.every):
             found.outcome, found.state, found.reference = unstable.outcome, None, None
             found.message = unstable.sentence
         elif not refined.accurate:

@@ -29,7 +29,7 @@ from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.reference import RTOL_RATIO
 from solver.clock import computing_time
 from solver.harmonic_balance.response_peak import largest_responses
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import follow_line
 from solver.missions.block_run import BlockCase, BlockRun, not_flown
 from solver.missions.blocks import Passage, worn
 from solver.missions.options import MISSIONS
@@ -251,13 +251,8 @@ def interval_errors(states: list[SweptState], area: FloatArray) -> FloatArray:
 
 def _states(case: BlockCase, passage: Passage, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    began, block = computing_time(), case.block
-    model, sweep = worn(block.model, case.depth), passage.sweep
-    found = []
-    branch = follow_branch(
-        model, block.friction_coefficient, block.excitation_amplitude, frequencies, sweep, case.settings
-    )
-    for index, start in branch:
+    began, found = computing_time(), []
+    for index, start in follow_line(case.line(passage.sweep), frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)
         if computing_time() - began > case.settings.time_limit:
