@@ -10,7 +10,7 @@ from typing import TypedDict
 import numpy as np
 
 from solver.accuracy.certificate import certify
-from solver.accuracy.error_estimate import UNKNOWN
+from solver.accuracy.error_estimate import NOTHING, UNKNOWN
 from solver.accuracy.refinement import Refined, refine, state_difference
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.options import CONTINUATION
@@ -73,6 +73,9 @@ class FrequencySweep:
 
     budget: of the state at the current frequency, without the sweep to this frequency.
     save: called at each save point of the sweep and of the state.
+    every: for which states stability is tested, as in `find_instability`.
+    known: frequencies, Hz, and the resolutions that states need there. Each state then takes that of the nearest one;
+        its error is not estimated, and no reference sweep runs beside. Empty: errors are estimated.
     """
 
     def __init__(
@@ -88,6 +91,8 @@ class FrequencySweep:
         self.excitation_amplitude = excitation_amplitude
         self.sweep = sweep
         self.settings = settings
+        self.every = True
+        self.known: tuple[tuple[float, Resolution], ...] = ()
         self.save: Callable[[], None] = lambda: None
         self.journal = Journal(lambda: self.save())
         self.budget = Budget(journal=self.journal)
@@ -181,6 +186,7 @@ class FrequencySweep:
         nodes = NodeSweep(case, self.excitation_amplitude, -1.0 if self.sweep == "down" else 1.0, omega)
         nodes.budget.deadline, nodes.budget.tell = self.budget.deadline, self.budget.tell
         nodes.journal.save = lambda: self.save()
+        nodes.alone = bool(self.known)
         return nodes
 
     def advance(self, frequency: float) -> Found:
@@ -204,7 +210,9 @@ class FrequencySweep:
                 lost = Found(self.why_lost(nodes))
                 lost.message = self._where_lost(nodes)
                 return lost
-            refined = refine(case, omega, self.excitation_amplitude, reached.point, self.budget)
+            refined = self._at_known(case, omega, reached.point)
+            if refined is None:
+                refined = refine(case, omega, self.excitation_amplitude, reached.point, self.budget)
             # with impacts a small joint has many other states
             small = nodes.case.joint(omega, 0.0).component_index.size <= NEWTON.small_joint_displacements
             if not refined.accurate and small:
@@ -215,6 +223,17 @@ class FrequencySweep:
         fold = float("nan") if ramp else (nodes.state.fold, *reached.folds)[-1]
         found = Found(Outcome.CONVERGED, nodes.state.branch + len(reached.folds), fold)
         return self._judge(refined, omega, found, nodes.reference_path.case, reference)
+
+    def _at_known(self, case: Case, omega: float, point: PathPoint) -> Refined | None:
+        """The state with the known resolution; None where none is known, or where the state is not found with it."""
+        if not self.known:
+            return None
+        _, resolution = min(self.known, key=lambda each: abs(each[0] - self.frequency))
+        if resolution == case.resolution:
+            return Refined(case, point, NOTHING, accurate=True)
+        wanted = case.at(resolution)
+        moved = move_point(case, wanted, wanted.joint(omega, self.excitation_amplitude), point, self.budget)
+        return None if moved is None else Refined(wanted, moved, NOTHING, accurate=True)
 
     def sweep_in_cell(self, frequency: float) -> NodeSweep:
         """The sweep that passes all frequencies in the quarter octave of a frequency, Hz, at its present node."""
@@ -244,7 +263,7 @@ class FrequencySweep:
                 found.estimate = found.estimate + state_difference(refined.case, joint, refined.point, moved)
         if not certify(joint, refined.point.evaluation).holds(self.settings.tolerance):
             found.outcome, found.state, found.reference = Outcome.CERTIFICATE_FAILED, None, None
-        elif unstable := find_instability(refined.case, joint, refined.point.evaluation, self.budget):
+        elif unstable := find_instability(refined.case, joint, refined.point.evaluation, self.budget, self.every):
             found.outcome, found.state, found.reference = unstable.outcome, None, None
             found.message = unstable.sentence
         elif not refined.accurate:

@@ -62,14 +62,24 @@ def follow_branch(
         Progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there to
         frequencies not yet passed. The states are equal to the last bit, except `run_time`.
 
-    Yields
-    ------
-    tuple of int and StartState
+    Returns
+    -------
+    iterator of tuple of int and StartState
         Index of the frequency, in the order of the sweep, and the state or the reason why there is none.
     """
-    n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
-    order = np.arange(n_states)[:: -1 if sweep == "down" else 1]
     line = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
+    return follow_line(line, frequencies, keep, resume)
+
+
+def follow_line(
+    line: FrequencySweep,
+    frequencies: FloatArray | FollowedFrequency,
+    keep: Callable[[Packed | str], None] | None = None,
+    resume: Packed | None = None,
+) -> Iterator[tuple[int, StartState]]:
+    """The states of `follow_branch` from a sweep before its first state."""
+    n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
+    order = np.arange(n_states)[:: -1 if line.sweep == "down" else 1]
     line.budget.tell = keep or line.budget.tell
     if resume is not None:
         line.load_state(unpack(resume))
@@ -81,7 +91,7 @@ def follow_branch(
     line.save = save
     started = computing_time()
     for index in order:
-        line.set_deadline(started + settings.time_limit)
+        line.set_deadline(started + line.settings.time_limit)
         message = ""
         try:
             if isinstance(frequencies, FollowedFrequency):

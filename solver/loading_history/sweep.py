@@ -105,6 +105,8 @@ class NodeSweep:
         The next node, where it is known.
     budget : Budget
         Counts and limits the Newton iterations, those of all attempts to begin included.
+    alone : bool
+        Whether no reference sweep runs beside.
     """
 
     def __init__(self, case: Case, excitation_amplitude: float, direction: float, omega: float | None = None) -> None:
@@ -117,6 +119,7 @@ class NodeSweep:
         self.state = SweepState(case.resolution, case.resolution)
         self.saved: SweepState | None = None
         self.ahead: Step | None = None
+        self.alone = False
 
     def load_state(self, state: SweepState | None, results: Results) -> None:
         """Go on from the `saved` state and the journal of another sweep; all nodes are equal to the last bit."""
@@ -294,9 +297,11 @@ class NodeSweep:
             self.state = replace(self.state, reference=(last[-1], step.point))
 
     def _begin_reference(self) -> None:
-        """Begin the reference sweep at the current node of the sweep."""
+        """Begin the reference sweep, where there is one, at the current node of the sweep."""
         here = self.here
         assert here is not None
+        if self.alone:
+            return
         case = self.case.at(fewer(self.case.resolution, self.case.settings))
         moved = None
         if case.resolution != self.case.resolution:

@@ -11,8 +11,10 @@ import scipy.linalg
 
 from solver.clock import computing_time
 from solver.contact.wear_law import WearLaw
+from solver.loading_history.frequency_sweep import FrequencySweep
+from solver.loading_history.start_states import follow_line
 from solver.loading_history.sweep_start import Sweep
-from solver.missions.block_start import begin_block
+from solver.missions.block_start import continue_block
 from solver.missions.blocks import Block, Mission, worn
 from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
@@ -81,6 +83,7 @@ class BlockCase:
     with_slope: whether the slope of the growth is asked for.
     settings: with the time that is left.
     frequencies: with which a passage begins, ascending, Hz; none for the first one.
+    every: for which states stability is tested, as in `find_instability`.
     """
 
     mission: Mission
@@ -90,6 +93,7 @@ class BlockCase:
     with_slope: bool
     settings: SolverSettings
     frequencies: tuple[float, ...] = ()
+    every: bool = True
 
     @property
     def block(self) -> Block:
@@ -101,6 +105,14 @@ class BlockCase:
         """The wear law, whose table counts depths from the unworn joint."""
         return self.mission.law.begun_at(self.depth)
 
+    def line(self, sweep: Sweep) -> FrequencySweep:
+        """The sweep to the states of the block, at the depth before."""
+        block = self.block
+        model = worn(block.model, self.depth)
+        line = FrequencySweep(model, block.friction_coefficient, block.excitation_amplitude, sweep, self.settings)
+        line.every = self.every
+        return line
+
 
 def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
     """Fly a block, or its reference solution.
@@ -109,7 +121,10 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
     """
     began, block = computing_time(), case.block
     sweep: Sweep = case.mission.first if block.begin == "continue" else block.begin
-    start = begin_block(block, case.depth, sweep, case.carried, case.settings)
+    if case.carried is None:
+        _, start = next(follow_line(case.line(sweep), np.array([block.steady[0]])))
+    else:
+        start = continue_block(block, case.depth, case.carried, case.settings)
     if start.state is None:
         return not_flown(case, Failure(start.outcome, start.message), start.newton_iterations)
     left = replace(case.settings, time_limit=case.settings.time_limit - (computing_time() - began))

@@ -1,4 +1,4 @@
-"""The state with which a block begins: from the static state, or from the state at the end of the block before."""
+"""The state with which a block begins that continues the block before."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from solver.clock import computing_time
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
-from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import Sweep
 from solver.missions.blocks import Block, worn
 from solver.model import FloatArray
@@ -26,10 +25,8 @@ from solver.structure.joint import build_case
 _NO_RESOLUTION = Resolution((1,), 4)
 
 
-def begin_block(
-    block: Block, depth: FloatArray, sweep: Sweep, carried: StartState | None, settings: SolverSettings
-) -> StartState:
-    """The state at the start of a block, or the reason why there is none.
+def continue_block(block: Block, depth: FloatArray, carried: StartState, settings: SolverSettings) -> StartState:
+    """The state of a block that keeps the tangential history of the block before, or the reason why there is none.
 
     Parameters
     ----------
@@ -37,22 +34,11 @@ def begin_block(
         The block.
     depth
         (n_contact,), m, worn before the block.
-    sweep
-        Way to the state, where nothing is carried on.
     carried
-        State at the end of the block before, which this block continues; None for a block that begins anew.
+        State at the end of the block before.
     settings
         Numerical settings, with the time that is left.
     """
-    if carried is not None:
-        return _continued(block, depth, carried, settings)
-    model, frequency = worn(block.model, depth), np.array([block.steady[0]])
-    branch = follow_branch(model, block.friction_coefficient, block.excitation_amplitude, frequency, sweep, settings)
-    return next(branch)[1]
-
-
-def _continued(block: Block, depth: FloatArray, carried: StartState, settings: SolverSettings) -> StartState:
-    """The state of a block that keeps the tangential history of the block before."""
     began, lost = computing_time(), replace(carried, state=None, reference=None, newton_iterations=0)
     try:
         found = _Continuation(block, depth, settings, carried).state()

@@ -29,7 +29,7 @@ from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.reference import RTOL_RATIO
 from solver.clock import computing_time
 from solver.harmonic_balance.response_peak import largest_responses
-from solver.loading_history.start_states import follow_branch
+from solver.loading_history.start_states import follow_line
 from solver.missions.block_run import BlockCase, BlockRun, not_flown
 from solver.missions.blocks import Passage, worn
 from solver.missions.delay import Delay, delay_of
@@ -87,7 +87,7 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
     """Fly a passage, or its reference solution, as `block_run.run_block`."""
     passage = case.block.frequency
     assert isinstance(passage, Passage)
-    first = _swept(case, passage, MISSIONS.frequency_error * (1.0 if like is None else RTOL_RATIO))
+    first = _swept(case, passage, like)
     if isinstance(first, Failure):
         return not_flown(case, first, 0)
     order = 1 if passage.stop > passage.start else -1
@@ -113,7 +113,9 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
             (max(state.start.response_error, state.start.wear_rate_error) for state in states if _inaccurate(state)),
             default=0.0,
         ),
-        like=Like((), float("nan"), first.iterations),
+        like=Like(
+            tuple((state.frequency, state.start.resolution) for state in first.states), float("nan"), first.iterations
+        ),
         last=states[-1].start if case.mission.continued_by(case.place) else None,
         iterations=first.iterations,
         sweep_rate=delay.sweep_rate if volume > 0.0 else 0.0,
@@ -179,8 +181,9 @@ def _part(states: tuple[SweptState, ...], place: int) -> FloatArray:
     return 0.5 * (high - low) * states[place].density
 
 
-def _swept(case: BlockCase, passage: Passage, aim: float) -> Swept | Failure:
-    """The wear of one passage at the depth before it; aim: error by the frequencies over the volume, over rtol."""
+def _swept(case: BlockCase, passage: Passage, like: Like | None) -> Swept | Failure:
+    """The wear of one passage at the depth before it; like: of the history, for its reference solution."""
+    aim = MISSIONS.frequency_error * (1.0 if like is None else RTOL_RATIO)
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, MISSIONS.first_frequencies).tolist()
     # the mission before has found the frequencies that count: a second sweep is then seldom needed
@@ -188,7 +191,7 @@ def _swept(case: BlockCase, passage: Passage, aim: float) -> Swept | Failure:
     states: list[SweptState] = []
     iterations, error, area = 0, np.inf, case.mission.area
     while wanted:
-        found = _states(case, passage, np.array(sorted(wanted)))
+        found = _states(case, passage, np.array(sorted(wanted)), like)
         if isinstance(found, Failure):
             return found
         iterations += max((state.start.newton_iterations for state in found), default=0)
@@ -259,15 +262,16 @@ def interval_errors(states: list[SweptState], area: FloatArray) -> FloatArray:
     return np.asarray(errors @ area)
 
 
-def _states(case: BlockCase, passage: Passage, frequencies: FloatArray) -> list[SweptState] | Failure:
+def _states(
+    case: BlockCase, passage: Passage, frequencies: FloatArray, like: Like | None
+) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    began, block = computing_time(), case.block
-    model, sweep = worn(block.model, case.depth), passage.sweep
-    found = []
-    branch = follow_branch(
-        model, block.friction_coefficient, block.excitation_amplitude, frequencies, sweep, case.settings
-    )
-    for index, start in branch:
+    line = case.line(passage.sweep)
+    if like is not None:
+        # errors of a reference solution are not used
+        line.known = like.resolutions
+    began, found = computing_time(), []
+    for index, start in follow_line(line, frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)
         if computing_time() - began > case.settings.time_limit:

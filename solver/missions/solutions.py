@@ -145,6 +145,8 @@ class MissionSolutions:
         """
         known = iter(self.progress.runs)
         frequencies = self.progress.course.nodes[-1].frequencies
+        # as in a wear history: stability is tested at the begin and the end
+        every = fine is None and mission in (1, self.mission.missions[-1])
         likes = () if fine is None else fine.nodes[int(np.searchsorted(fine.ends, mission))].likes
 
         def run(place: int, depth: FloatArray, carried: StartState | None, with_slope: bool) -> BlockRun:
@@ -154,7 +156,7 @@ class MissionSolutions:
             settings = self.mission.settings
             left = replace(settings, time_limit=settings.time_limit - self.spent)
             near = frequencies[place] if frequencies else ()
-            case = BlockCase(self.mission, place, depth, carried, with_slope, left, near)
+            case = BlockCase(self.mission, place, depth, carried, with_slope, left, near, every)
             through = run_passage if isinstance(case.block.frequency, Passage) else run_block
             flown = guarded(lambda: through(case, likes[place] if likes else None))
             found = not_flown(case, flown, 0) if isinstance(flown, Failure) else flown

@@ -89,7 +89,7 @@ class Ended:
 class Like:
     """What a reference solution takes from its history.
 
-    resolutions: cycle count from which on a resolution holds, and this resolution.
+    resolutions: cycle count from which on a resolution holds, and this resolution; of a passage the frequency, Hz.
     step_limit: largest stable explicit step of the history, cycles.
     iterations: Newton iterations of the history.
     """

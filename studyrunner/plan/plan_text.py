@@ -59,6 +59,7 @@ def format_plan(
         *([("frequency", _followed(study))] if study.follow is not None else []),
         *_slow_time(study),
         ("tasks", f"{n_tasks}: {_ways(study, plan)}"),
+        *([("serial", _SERIAL)] if study.has_missions else []),
         ("solver", _solver(study, facts)),
         ("unknowns", f"{plan.n_unknowns} at most in one task" + _if_automatic(study)),
         *zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True),
@@ -68,6 +69,12 @@ def format_plan(
         ("memory", f"about {memory:.1f} GB a rank; result {size:.1f} MB before compression"),
     ]
     return "\n".join(f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows)
+
+
+_SERIAL = (
+    "one rank computes all of a history, one part after the other: its missions, their blocks, the frequencies of a"
+    " passage, then the reference solution"
+)
 
 
 def _followed(study: Study) -> str:
@@ -81,8 +88,9 @@ def _ways(study: Study, plan: TaskPlan) -> str:
     if study.has_modes:
         return f"{count(len(plan.branches), 'nonlinear mode')} over the amplitude"
     if study.has_missions:
-        histories = count(len(plan.marches[0]), "mission history", "mission histories")
-        return f"{histories}, side by side; the blocks of one are flown one after the other"
+        n_histories = len(plan.marches[0])
+        beside = ", side by side on the ranks" if n_histories > 1 else ""
+        return count(n_histories, "mission history", "mission histories") + beside
     n_ramps = sum(branch.sweep == "ramp" for branch in plan.branches)
     n_along = len(plan.branches) - n_ramps
     ways = [f"{count(n_along, 'branch', 'branches')} along the frequency"] if n_along else []
@@ -184,13 +192,14 @@ def _about(plan: TaskPlan, prepared_in: float) -> str:
 
 def _ranks(plan: TaskPlan, n_tasks: int) -> str:
     """What limits the use of many ranks."""
+    least = f"no number takes less than {format_seconds(plan.longest)}"
+    if plan.marches[0][0].blocks:
+        return (
+            f"{count(n_tasks, 'rank has', 'ranks have')} work at most, one for each history; {least}, the longest one"
+        )
     busy = n_tasks // _TASKS_A_RANK
     many = f"up to about {busy} stay" if busy > 1 else "one stays"
-    of = "the missions of a history are serial" if plan.marches[0][0].blocks else "a history follows its start state"
-    return (
-        f"{many} busy to the end, with {_TASKS_A_RANK} tasks each; no number takes less"
-        f" than {format_seconds(plan.longest)}, as " + of
-    )
+    return f"{many} busy to the end, with {_TASKS_A_RANK} tasks each; {least}, as a history follows its start state"
 
 
 def _result_values(study: Study, facts: SceneFacts, n_points: int) -> int:

@@ -390,7 +390,7 @@ def test_a_passage_wears_as_a_fixed_grid_of_frequencies():
     mission = Mission((block,), WEAR, (0, 1), SETTINGS)
     case = BlockCase(mission, 0, np.zeros(1), None, with_slope=False, settings=SETTINGS)
     grid = np.linspace(185.0, 215.0, 33)
-    fixed = _states(case, passage, grid)
+    fixed = _states(case, passage, grid, None)
     assert isinstance(fixed, list)
     volume = trapezoid([float(of.density @ mission.area) for of in fixed], grid)
     bar = float(interval_errors(fixed, mission.area).sum()) + history.error_estimate * history.worn_volume[-1]
@@ -400,16 +400,46 @@ def test_a_passage_wears_as_a_fixed_grid_of_frequencies():
     assert 0.0 < history.sweep_rate[0] < MISSIONS.largest_sweep_rate
 
 
+@pytest.mark.slow
+def test_the_reference_of_a_passage_takes_its_resolutions_and_estimates_no_errors():
+    block = Block(scene("sdof_slider", damping=6.0), Passage(185.0, 215.0, 5.0), 10.0, FRICTION, begin="up")
+    settings = SolverSettings(rtol=2e-3)
+    case = BlockCase(Mission((block,), WEAR, (0, 1), settings), 0, np.zeros(1), None, False, settings)
+    fine = run_passage(case)
+    assert fine.like is not None
+    assert len({resolution for _, resolution in fine.like.resolutions}) > 1
+    reference = run_passage(case, fine.like)
+    assert reference.iterations < 0.8 * fine.iterations
+    assert reference.growth == pytest.approx(fine.growth, rel=settings.rtol)
+    # at the ends both solve the same state
+    np.testing.assert_allclose(reference.response, fine.response, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_stability_is_tested_in_the_first_mission_and_in_the_last(monkeypatch):
+    tested = []
+
+    def unstable(_case, _joint, _at, _budget, every=True):
+        tested.append(every)
+
+    monkeypatch.setattr("solver.loading_history.frequency_sweep.find_instability", unstable)
+    blocks = (Block(scene("sdof_slider"), 161.0, 10.0, FRICTION, 500.0),)
+    history = integrate(blocks, 3, largest_step=1)
+    assert history.outcome is Outcome.CONVERGED
+    # three missions, and three of the reference solution
+    assert tested == [True, False, True, False, False, False]
+
+
 def swept_with(monkeypatch, density, depth, near=()):
     """A passage from 1 to 2 Hz with given wear, m/Hz, of the frequency, at a depth before, m."""
 
-    def states(_case, _passage, frequencies):
+    def states(_case, _passage, frequencies, _like):
         return [state(at, density(at), response=1e-3) for at in frequencies]
 
     monkeypatch.setattr("solver.missions.passage._states", states)
     block = Block(scene("sdof_slider"), Passage(1.0, 2.0, 1.0), 10.0, FRICTION, begin="up")
     case = BlockCase(Mission((block,), WEAR, (0, 1), SETTINGS), 0, np.array([depth]), None, False, SETTINGS, near)
-    swept = _swept(case, Passage(1.0, 2.0, 1.0), 0.25)
+    swept = _swept(case, Passage(1.0, 2.0, 1.0), None)
     assert isinstance(swept, Swept)
     return swept
 

@@ -105,8 +105,8 @@ def test_marches_cost_little_and_go_last_where_nothing_moves():
     assert {task.cost_keys[0] for task in moving} != {task.cost_keys[0] for task in resting}
 
 
-def printed_plan(overrides, capsys):
-    arguments = ["sdof_slider", "--plan"]
+def printed_plan(overrides, capsys, study="sdof_slider"):
+    arguments = [study, "--plan"]
     for override in overrides:
         arguments += ["--set", override]
     assert main(arguments) == 0
@@ -127,6 +127,16 @@ def test_plan_is_printed(capsys):
     )
     assert "ms or less a step" in lines["assumed"]
     assert "GB a rank" in lines["memory"]
+
+
+def test_the_plan_of_missions_says_what_is_serial(capsys):
+    lines = printed_plan([], capsys, "mission")
+    assert lines["tasks"] == "1: 1 mission history"
+    assert lines["serial"].startswith("one rank computes all of a history, one part after the other: its missions")
+    assert lines["ranks"].startswith("1 rank has work at most, one for each history; no number takes less than")
+    lines = printed_plan(["axes.wear_coefficient=[1e-14, 2e-14]"], capsys, "mission")
+    assert lines["tasks"] == "2: 2 mission histories, side by side on the ranks"
+    assert lines["ranks"].startswith("2 ranks have work at most")
 
 
 @pytest.mark.parametrize(

@@ -20,10 +20,11 @@ from studyrunner.report.drawing import (
     set_from_zero,
 )
 from studyrunner.report.reading.result import NO_VOLUME, Result, as_sentences
-from studyrunner.report.reading.units import Scale, scale_for, show_number
+from studyrunner.report.reading.units import scale_for, show_number
 
 _MOST_BLOCKS = 12
 _TO_ASK = ("block_worn_volume", "block_share", "response_amplitude")
+_ENDS = {"response_amplitude_begin": "begin", "response_amplitude": "end"}
 
 
 def draw_missions(result: Result) -> Iterator[Drawing | Missing | Table]:
@@ -100,7 +101,11 @@ def _draw_shares(result: Result, blocks: xr.Dataset) -> Drawing:
     above.set_ylabel("share in a mission (%)")
     above.set_ylim(0.0, 100.0)
     above.set_xlim(0.0, missions[-1])
-    highest = max(_draw_volume(below, blocks, missions, scale, place, name) for place, name in enumerate(names))
+    errors = blocks["block_worn_volume_error"].values.T if "block_worn_volume_error" in blocks else [None] * len(names)
+    highest = max(
+        _draw_line(below, missions, scale(blocks["block_worn_volume"].values[:, place]), errors[place], place, name)
+        for place, name in enumerate(names)
+    )
     below.set_ylabel(scale.label("worn volume"))
     below.set_xlabel("flown missions")
     set_from_zero(below, highest)
@@ -122,42 +127,43 @@ def _draw_shares(result: Result, blocks: xr.Dataset) -> Drawing:
     return Drawing("block_shares", "Wear by block", caption, figure)
 
 
-def _draw_volume(panel: Axes, blocks: xr.Dataset, missions: np.ndarray, scale: Scale, place: int, name: str) -> float:
-    """Worn volume of a block with the band of its error; its highest value in the unit of the panel."""
-    values = scale(blocks["block_worn_volume"].values[:, place])
+def _draw_line(
+    panel: Axes, missions: np.ndarray, values: np.ndarray, error: np.ndarray | None, place: int, name: str
+) -> float:
+    """Values of a block, in the unit of the panel, with the band of their relative error; the highest of them."""
     style = line_style(place, values.size)
     panel.plot(missions, values, label=name, **style)
-    if "block_worn_volume_error" in blocks:
-        error = np.nan_to_num(blocks["block_worn_volume_error"].values[:, place], posinf=0.0)
+    if error is not None:
+        error = np.nan_to_num(error, posinf=0.0)
         panel.fill_between(missions, values * (1 - error), values * (1 + error), color=style["color"], alpha=0.2)
     return float(np.nanmax(values, initial=0.0))
 
 
 def _draw_responses(result: Result, blocks: xr.Dataset) -> Drawing:
-    """Amplitude of the first response at begin and end of each block over the missions."""
-    figure, panels = new_panels(1, 1, 3.6)
-    panel: Axes = panels[0, 0]
+    """Amplitude of the first response over the missions, at the begin of each block and at its end."""
+    ends = [name for name in _ENDS if name in blocks]
+    figure, panels = new_panels(1, len(ends), 3.6, sharey=True)
     missions = np.asarray(result.cycles, dtype=float)
-    ends = blocks["response_amplitude"].isel(response=0).values
-    begins = (
-        blocks["response_amplitude_begin"].isel(response=0).values if "response_amplitude_begin" in blocks else None
-    )
-    scale = scale_for("m", ends)
-    for place, name in enumerate(blocks["block"].values):
-        style = line_style(place, missions.size)
-        panel.plot(missions, scale(ends[:, place]), label=str(name), **style)
-        if begins is not None:
-            panel.plot(missions, scale(begins[:, place]), color=style["color"], linestyle=":", linewidth=1.0)
-    panel.set_xlim(0.0, missions[-1])
-    panel.set_xlabel("flown missions")
+    amplitudes = [blocks[name].isel(response=0).values for name in ends]
+    scale = scale_for("m", *amplitudes)
     name = f" of {result.responses[0]}" if result.responses else ""
-    panel.set_ylabel(scale.label(f"amplitude{name}"))
-    highest = max(np.nanmax(scale(each), initial=0.0) for each in (ends, ends if begins is None else begins))
-    set_from_zero(panel, float(highest))
+    highest = 0.0
+    for panel, amplitude, end in zip(panels[0], amplitudes, ends, strict=True):
+        for place, block in enumerate(blocks["block"].values):
+            error = blocks["response_error"].values[:, place] if "response_error" in blocks else None
+            line = _draw_line(panel, missions, scale(amplitude[:, place]), error, place, str(block))
+            highest = max(highest, line)
+        panel.set_xlim(0.0, missions[-1])
+        panel.set_xlabel("flown missions")
+        panel.set_title(f"at the {_ENDS[end]} of the block")
+    panels[0, 0].set_ylabel(scale.label(f"amplitude{name}"))
+    set_from_zero(panels[0, 0], highest)
     add_legend(figure)
+    more = len(result.responses) - 1
     caption = as_sentences(
-        f"Amplitude of the first harmonic{name} at the end of each block, in the mission that ends at the number, at"
-        f" {result.describe(result.shown_point())}",
-        "Dotted: at its begin" if begins is not None else "",
+        f"Amplitude of the first harmonic{name} at the {' and the '.join(_ENDS[each] for each in ends)} of each block,"
+        f" in the mission that ends at the number, at {result.describe(result.shown_point())}",
+        "Bands: estimated errors" if "response_error" in blocks else "",
+        f"{more} more responses are in the file" if more > 0 else "",
     )
     return Drawing("block_responses", "Vibration of the blocks", caption, figure)

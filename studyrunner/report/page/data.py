@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.report.drawing import COLOURS
+from studyrunner.report.page.blocks import build_block_numbers, n_block_numbers
 from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.page.kept import Encoded, Kept, encode_kept, encode_values, inner_shape, thin_out
 from studyrunner.report.page.maps import build_loops, build_maps, has_maps
@@ -106,7 +107,9 @@ def build_page_data(result: Result, limit: float) -> PageData:
     if kept is None:
         return PageData(None, (f"The histories of {n_points} points do not fit into the page.",))
     courses = {name: encode_kept(result, name, kept) for name in COURSES if result.has(name)}
+    blocks = build_block_numbers(result, kept)
     floats -= sum(len(str(entry["data"])) for entry in courses.values()) / _CHARACTERS_A_FLOAT
+    floats -= len(json.dumps(blocks)) / _CHARACTERS_A_FLOAT
     root = build_root_numbers(result, limit, notes) if has_maps(result) else None
     floats -= len(json.dumps(root)) / _CHARACTERS_A_FLOAT
     loops, used = build_loops(result, kept.cycles, _FRACTION_OF_LOOPS * floats, notes)
@@ -134,6 +137,7 @@ def build_page_data(result: Result, limit: float) -> PageData:
         "endings": {str(number): ending.sentence for number, ending in result.endings.items()},
         "points": points,
         "courses": courses,
+        "blocks": blocks,
         "trends": trends,
         "scatter": scatter,
         "maps": maps,
@@ -172,7 +176,8 @@ def _fit_courses(result: Result, floats: float, notes: list[str]) -> Kept | None
         told = np.flatnonzero(result.dataset["cycle_count"].notnull().any(result.axes).values)
     n_cycles, n_points = len(told), result.held.size
     names = [name for name in COURSES if result.has(name)]
-    per_cycle = sum(math.prod(inner_shape(result.dataset[name])[1:]) for name in names) * n_points
+    of_point = sum(math.prod(inner_shape(result.dataset[name])[1:]) for name in names) + n_block_numbers(result)
+    per_cycle = of_point * n_points
     keep = n_cycles if per_cycle == 0 else min(n_cycles, int(floats // per_cycle))
     if keep < min(2, n_cycles):
         return None

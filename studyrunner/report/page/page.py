@@ -36,6 +36,7 @@ PAGE_LIMIT = 11.4e6
 _SCRIPTS = (
     "numbers.js",
     "plots.js",
+    "blocks.js",
     "root.js",
     "trends.js",
     "scatter.js",

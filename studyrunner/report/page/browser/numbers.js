@@ -3,7 +3,7 @@
 
 const data = JSON.parse(document.getElementById("page-data").textContent);
 const byId = (id) => document.getElementById(id);
-const { axes, cycles, courses, maps, loops, root } = data;
+const { axes, blocks, cycles, courses, maps, loops, root } = data;
 const sizes = axes.map((axis) => axis.values.length);
 const state = { point: data.shown, cycle: cycles.length - 1, response: 0, map: null, loop: 0, component: 0, colour: null, view: 0, exaggerated: true };
 
@@ -15,7 +15,7 @@ function decode(text) {
   return Float32Array.from({ length: bytes.length / 4 }, (_, i) => view.getFloat32(4 * i, true));
 }
 
-for (const group of [data.points, courses, maps && maps.variables, loops && loops.variables]) {
+for (const group of [data.points, courses, blocks && blocks.variables, maps && maps.variables, loops && loops.variables]) {
   for (const entry of Object.values(group || {})) entry.values = decode(entry.data);
 }
 

@@ -83,7 +83,8 @@ function pick(point) {
   const text = last > 0 && Number.isFinite(countAt(point, last)) ? `${now} of ${countText(point, last)}` : now;
   byId("cycle-count").textContent = text;
   byId("cycle").setAttribute("aria-valuetext", text);
-  drawResponse();
+  if (blocks) drawBlocks();
+  else drawResponse();
   drawCourse();
   drawMaps();
   drawLoop();
@@ -142,6 +143,10 @@ function prepare() {
     addChoice("loop-choice", "component", "direction", loops.labels.map((label) => label.replace("{}", "").trim()), state.component, (i) => { state.component = i; drawLoop(); });
   }
   byId("loop-part").hidden = !loops;
+  if (data.counted === "mission") {
+    byId("explore-told").textContent = "Choose the values of a point in the lists; the slider runs through the missions.";
+    byId("response-part").hidden = !blocks;
+  }
   byId("course-part").hidden = cycles.length < 2 || data.without.length === data.outcome.length || !(courses.worn_volume || courses.wear_rate);
   byId("course-part").classList.toggle("wide", Boolean(maps) && !loops);
   document.querySelector("label[for=cycle]").textContent = data.counted;
@@ -160,15 +165,15 @@ function prepare() {
   });
   byId("explore").hidden = false;
   turnTo(state.cycle);
-  for (const id of ["response-plot", "trend-plot", "trend-map-plot", "scatter-plot"]) {
+  for (const id of [...(blocks ? [] : ["response-plot"]), "trend-plot", "trend-map-plot", "scatter-plot"]) {
     // a plot that was never drawn hears nothing
     byId(id).on?.("plotly_click", (event) => {
       const point = event.points[0].customdata;
       if (Number.isInteger(point)) pick(point);
     });
   }
-  if (!byId("course-part").hidden) {
-    byId("course-plot").on("plotly_click", (event) => turnTo(event.points[0].pointNumber));
+  for (const id of [...(byId("course-part").hidden ? [] : ["course-plot"]), ...(blocks ? ["response-plot"] : [])]) {
+    byId(id).on("plotly_click", (event) => turnTo(event.points[0].pointNumber));
   }
 }
 
