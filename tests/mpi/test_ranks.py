@@ -1,9 +1,7 @@
 """run-study under mpiexec: the same result for any number of ranks, and an end in good order for all of them."""
 
-import os
 import re
 import signal
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
@@ -11,7 +9,7 @@ import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
-from tests.mpi.launching import CHEAP, FAKED, PATIENCE, SOON, launcher, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, SOON, launcher, run_command, run_to_end
 
 GRID = [
     *CHEAP,
@@ -24,12 +22,8 @@ GRID = [
 
 
 def start(n_ranks, arguments, folder, environment=None):
-    """Runs under mpiexec, or alone for 0 ranks; never hangs."""
-    command = [*launcher(n_ranks), sys.executable, *arguments]
-    variables = {**os.environ, **(environment or {})}
-    return subprocess.run(
-        command, cwd=folder, env=variables, capture_output=True, text=True, timeout=PATIENCE, check=False
-    )
+    """Runs under mpiexec, or alone for 0 ranks."""
+    return run_command([*launcher(n_ranks), sys.executable, *arguments], folder, environment)
 
 
 def test_result_does_not_depend_on_the_number_of_ranks(tmp_path):
