@@ -11,6 +11,7 @@ from solver.outcome import COMPLETE
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS
 from studyrunner.checkpoint.database import RESULTS, STARTS
+from studyrunner.checkpoint.records import empty_record, pack_record, record_type, values_in
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.study.study_file import read_study
@@ -230,6 +231,16 @@ def test_a_person_can_read_the_file(finished):
     with contextlib.closing(sqlite3.connect(finished)) as database:
         for query, expected in queries.items():
             assert set(database.execute(query)) == expected
+
+
+def test_a_record_of_another_study_is_none_of_this():
+    study, other = (read_study("sdof_slider", (*BASE[:-1], f"slow_time.outputs={n}")) for n in (3, 4))
+    kind = record_type(study, FACTS)
+    packed = pack_record(empty_record(kind))
+    wrong = [replace(packed, arrays=arrays) for arrays in ((), (np.zeros(3),), (np.zeros(kind.itemsize),))]
+    for odd in (pack_record(empty_record(record_type(other, FACTS))), replace(packed, text=""), *wrong, None):
+        assert values_in(odd, kind) is None
+    assert values_in(packed, kind) is not None
 
 
 def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder):

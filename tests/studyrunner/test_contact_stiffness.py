@@ -27,21 +27,6 @@ def digest(study, *overrides):
 
 
 @pytest.mark.slow
-def test_an_axis_of_stiffnesses_is_studies_with_each():
-    axis = f"axes.contact_stiffness={list(SOFT)}"
-    whole = compute("sdof_slider", "whole.nc", *CHEAP, axis, "outputs.variables=['default', 'natural_frequency']")
-    assert whole.contact_stiffness.attrs["units"] == "N/m3"
-    last = whole.worn_volume.isel(cycle=-1).squeeze()
-    assert last[0] < last[1]
-    names = ["worn_volume", "response_amplitude"]
-    alone = compute("sdof_slider", "alone.nc", *CHEAP, f"scene.contact_stiffness={SOFT[0]}")
-    same_values(whole.sel(contact_stiffness=SOFT[0])[names], alone[names])
-    # a mass on its mount and its contact
-    found = whole.natural_frequency.sel(contact_stiffness=SOFT[0]).squeeze()[0]
-    assert found == pytest.approx(np.sqrt((1.6e5 + 14.0 / 17.0 * SOFT[0] * 1e-4) / 0.1) / (2.0 * np.pi), rel=1e-9)
-
-
-@pytest.mark.slow
 def test_a_scene_file_holds_the_springs_or_gets_them_from_the_study(folder):
     rigid, soft = build_scene("sdof_slider"), build_scene("sdof_slider", contact_stiffness=SOFT[0])
     assert main(["sdof_slider", "--set", f"scene.contact_stiffness={SOFT[0]}", "--write-scene", "soft.h5"]) == 0
