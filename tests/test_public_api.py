@@ -168,18 +168,6 @@ def test_what_is_wrong_with_a_run_is_said_in_one_line(tmp_path):
         run_study("nothing")
 
 
-def test_what_is_no_result_is_said_in_one_line(tmp_path):
-    path = tmp_path / "out.nc"
-    with pytest.raises(UserError, match=r"out.nc: OUT.nc: there is no such file; give a result file"):
-        open_result(path)
-    path.write_text("no result", encoding="utf-8")
-    with pytest.raises(UserError, match=r"out.nc: the file: is no NetCDF file"):
-        open_result(path)
-    xr.Dataset({"a": ("x", [1.0])}).to_netcdf(path)
-    with pytest.raises(UserError, match=r"out.nc: OUT.nc: holds no outcome and no cycle and no contact"):
-        open_result(path)
-
-
 # --- scenes ---
 
 

@@ -18,6 +18,7 @@ from studyrunner.user_error import UserError
 from tests.studyrunner.own_time import Stopwatch
 from tests.studyrunner.report.page_cases import build_file
 from tests.studyrunner.report.scatter_cases import sample_file
+from tests.studyrunner.result_mutations import replace_variable
 
 pytestmark = pytest.mark.usefixtures("reader")
 
@@ -49,8 +50,6 @@ def attribute(name, value, variable=""):
 def study(text):
     def change(file):
         del file.attrs["study"]
-        file.create_dataset("text", data=0).attrs["x"] = 0
-        del file["text"]
         file.attrs.create("study", text, dtype=h5py.string_dtype("utf-8"))
 
     return change
@@ -88,20 +87,7 @@ def values(name, place, value):
 
 def other_kind(name, content):
     """A variable of another type, its dimensions as before."""
-
-    def change(file):
-        old = file[name]
-        scales = [dict(dimension.items()) for dimension in old.dims]
-        attributes = {key: old.attrs[key] for key in ("_Netcdf4Coordinates",) if key in old.attrs}
-        shape = old.shape
-        del file[name]
-        new = file.create_dataset(name, data=np.broadcast_to(np.asarray(content), shape))
-        new.attrs.update(attributes)
-        for number, found in enumerate(scales):
-            for scale in found.values():
-                new.dims[number].attach_scale(scale)
-
-    return change
+    return lambda file: replace_variable(file, name, np.full(file[name].shape, content), file[name].ndim)
 
 
 REFUSED = {
@@ -177,12 +163,9 @@ def test_choices_are_numbers_or_auto(text, tmp_path, monkeypatch, capsys):
 @pytest.mark.slow
 def test_numbers_that_are_damaged_where_they_are_large(folder, capsys):
     """What is not read beforehand shows its damage while it is drawn."""
-    made = build_file(
-        axes={"frequency": np.linspace(190.0, 200.0, 200), "scheme": ("implicit", "explicit")}, cycles=range(160)
-    )
-    shape = made["wear_depth"].shape
-    encoding = {"wear_depth": {"zlib": True, "chunksizes": shape}}
-    made.to_netcdf("large.nc", encoding=encoding)
+    axes = {"frequency": np.linspace(190.0, 200.0, 200), "scheme": ("implicit", "explicit")}
+    made = build_file(axes, cycles=range(160))
+    made.to_netcdf("large.nc", encoding={"wear_depth": {"zlib": True, "chunksizes": made["wear_depth"].shape}})
     with h5py.File("large.nc") as file:
         place = file["wear_depth"].id.get_chunk_info(0)
         assert file["wear_depth"].size * 8 > 2**23
