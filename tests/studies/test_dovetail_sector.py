@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from scipy import linalg
 
 from solver.model import needed_nodal_diameters
@@ -154,20 +153,9 @@ def test_parameters_that_do_not_go_together(key, value):
     assert caught.value.remedy
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [("friction_coefficient", -0.1), ("rotation_speed", float("nan")), ("mesh", 0), ("no_such_key", 1.0)],
-)
-def test_parameters_out_of_range(key, value):
-    with pytest.raises(ValidationError):
-        Parameters(**{key: value})
-
-
 def test_every_parameter_is_described_with_a_unit():
-    fields = Parameters.model_fields
-    assert next(iter(fields)) == "friction_coefficient"
     units = {"-", "m", "rpm", "Pa", "kg/m3", "degrees", "N/m", "N/m3"}
-    assert {(field.description or "").rpartition(", ")[2] for field in fields.values()} == units
+    assert {field.description.rpartition(", ")[2] for field in Parameters.model_fields.values()} == units
 
 
 def test_a_retainer_holds_the_root_along_its_slot_under_a_travelling_wave():
