@@ -16,7 +16,7 @@ from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
 from tests.studies.fe_models.decks import SECTOR
 from tests.studyrunner.test_model_studies import STUDY as SECTOR_STUDY
-from tests.studyrunner.test_scene_axes import CHEAP, arguments, compute, same_values
+from tests.studyrunner.test_scene_axes import CHEAP, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
 SOFT = (1e11, 1e13)
@@ -67,9 +67,3 @@ def test_a_deck_is_reduced_once_for_all_contact_stiffnesses(folder, monkeypatch)
     # another deck under the same name is another model
     (folder / "sector.inp").write_text((folder / "sector.inp").read_text().replace("*DENSITY\n7800", "*DENSITY\n7801"))
     assert digest("wear.toml", f"scene.contact_stiffness={SOFT[0]}") != expected
-
-
-@pytest.mark.parametrize("value", ["0", "-1e12", "1e23", "'soft'"])
-def test_a_wrong_contact_stiffness_is_named(value, capsys):
-    assert main(arguments("dovetail", "x.nc", f"scene.contact_stiffness={value}")) == 2
-    assert "scene.contact_stiffness" in capsys.readouterr().err

@@ -105,18 +105,6 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path):
         assert opened.stable.sum() == opened.stable.size - 3
 
 
-def test_attributes(opened, tmp_path):
-    attributes = opened.attrs
-    assert attributes["Conventions"] == "CF-1.11, ACDD-1.3"
-    assert attributes["title"] == read_study("sdof_slider").study.title
-    assert attributes["history"]
-    assert attributes["source"].startswith("fretwear ")
-    assert "numpy" in attributes["versions"]
-    assert attributes["scene_sha256"] == FACTS.digest
-    (tmp_path / "again.toml").write_text(attributes["study"], encoding="utf-8")
-    assert read_study(str(tmp_path / "again.toml")).model_dump() == read_study("sdof_slider", OVERRIDES).model_dump()
-
-
 @pytest.mark.parametrize(("overrides", "bytes_a_slab"), [((), 1e9), ((*SHARED, LOOP), 3000.0), ((WEAR_RATE,), 1.0)])
 def test_the_file_is_the_one_of_the_plain_twin(overrides, bytes_a_slab, tmp_path, monkeypatch):
     """Whatever is in memory at once, and in whatever order the results came: every value, attribute and encoding."""
