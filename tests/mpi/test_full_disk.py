@@ -1,13 +1,12 @@
 """A full disk: one line says so, what was finished is kept, and the run goes on when there is room."""
 
-import os
 import subprocess
 from pathlib import Path
 
 import pytest
 import xarray as xr
 
-from tests.mpi.launching import CHEAP, FAKED, count_rows, fake_here, results, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, count_rows, fake_here, mounted, results, run_to_end
 
 STUDY = [
     FAKED,
@@ -20,15 +19,8 @@ STUDY = [
 @pytest.fixture
 def small_disk(tmp_path):
     """A file system of 12 MB; a start state of the stand-in takes 0.8 MB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=12m", "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode != 0:
-        pytest.skip("a file system can be mounted by root only")
-    try:
+    with mounted(tmp_path / "disk", "size=12m") as folder:
         yield folder
-    finally:
-        subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
 def test_a_full_disk_costs_nothing_that_was_finished(small_disk, tmp_path):

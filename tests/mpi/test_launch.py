@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from tests.mpi.launching import FAKED, PATIENCE, ROOT, fake_here, launcher, mpiexec, results
+from tests.mpi.launching import FAKED, ROOT, fake_here, launcher, mounted, mpiexec, results, run_command
 
 STUDY = ["sdof_slider", "-o", "out.nc", "--set", "axes.frequency={start = 100, stop = 160, num = 5}"]
 OTHER_VERSION = """\
@@ -25,21 +25,6 @@ CANNOT_SEE = 'mount -t tmpfs none "$HIDDEN" && exec "$0" "$@"'
 """Started with a view of its own of the file system, in which the folder HIDDEN is empty."""
 
 
-def run(command, folder, environment=None):
-    """Never hangs."""
-    variables = {**os.environ, "PYTHONPATH": str(ROOT), **(environment or {})}
-    return subprocess.run(
-        command,
-        cwd=folder,
-        env=variables,
-        capture_output=True,
-        text=True,
-        errors="replace",
-        timeout=PATIENCE,
-        check=False,
-    )
-
-
 def assert_refused(done, *said):
     assert done.returncode == 2, done.stderr
     assert done.stdout == ""
@@ -50,13 +35,13 @@ def assert_refused(done, *said):
 
 
 def test_launcher_of_open_mpi_and_library_of_mpich(open_mpi, tmp_path):
-    done = run([*open_mpi.launcher(2), sys.executable, FAKED, *STUDY], tmp_path)
+    done = run_command([*open_mpi.launcher(2), sys.executable, FAKED, *STUDY], tmp_path)
     assert_refused(done, "2 processes were started that cannot talk", "the launcher is that of Open MPI")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_launcher_of_mpich_and_library_of_open_mpi(open_mpi, tmp_path):
-    done = run([mpiexec(), "-n", "2", open_mpi.python, FAKED, *STUDY], tmp_path, open_mpi.environment)
+    done = run_command([mpiexec(), "-n", "2", open_mpi.python, FAKED, *STUDY], tmp_path, open_mpi.environment)
     assert_refused(done, "2 processes were started, but MPI knows of 1 only", "mpiexec of the environment")
     assert list(tmp_path.iterdir()) == []
 
@@ -76,7 +61,7 @@ def test_ranks_with_different_software(change, said, tmp_path):
         change = "check_versions.__defaults__ = (1.0,)"
         lines = program.read_text(encoding="utf-8").replace("sys.argv =", f"version_check.{change}\nsys.argv =")
         program.write_text(lines, encoding="utf-8")
-    done = run([*launcher(2), sys.executable, str(program), *STUDY], tmp_path)
+    done = run_command([*launcher(2), sys.executable, str(program), *STUDY], tmp_path)
     assert_refused(done, *said, "install the same software for all ranks")
     assert [path.name for path in tmp_path.iterdir()] == ["other.py"]
 
@@ -95,30 +80,16 @@ def test_only_rank_0_sees_study_scene_and_output(tmp_path):
     (folder / "study.toml").write_text(head + scene + rest, encoding="utf-8")
     study = [FAKED, str(folder / "study.toml"), *STUDY[3:], "-o", str(folder / "out.nc")]
     blind = ["-n", "2", "-wdir", str(elsewhere), "unshare", "-m", "sh", "-c", CANNOT_SEE, sys.executable, *study]
-    done = run([*launcher(1), sys.executable, *study, ":", *blind], tmp_path, {"HIDDEN": str(folder)})
+    done = run_command([*launcher(1), sys.executable, *study, ":", *blind], tmp_path, {"HIDDEN": str(folder)})
     assert done.returncode == 0, done.stderr
     assert list(elsewhere.iterdir()) == []
     assert fake_here([*study[:-1], str(folder / "alone.nc")], tmp_path) == 0
     xr.testing.assert_identical(results(folder / "out.nc"), results(folder / "alone.nc"))
 
 
-@pytest.fixture
-def read_only(tmp_path):
-    """A folder that not even root can write to."""
-    folder = tmp_path / "read-only"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "ro", "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode:
-        pytest.skip("a file system can be mounted by root only")
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", "-l", str(folder)], check=True)
-
-
-def test_an_output_that_cannot_be_written(read_only, tmp_path):
-    command = [*launcher(2), sys.executable, FAKED, *STUDY, "-o", str(read_only / "out.nc")]
-    done = run(command, tmp_path)
+def test_an_output_that_cannot_be_written(tmp_path):
+    with mounted(tmp_path / "read-only", "ro") as folder:
+        done = run_command([*launcher(2), sys.executable, FAKED, *STUDY, "-o", str(folder / "out.nc")], tmp_path)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert "give a file that can be written: Read-only file system" in line
@@ -178,7 +149,7 @@ def test_two_hosts_and_one_shared_folder(hosts, tmp_path):
     faked = {"FAKE_SECONDS": "0.02", "FAKE_TOGETHER": "4"}
     # hydra starts the processes of its own host without that command: it is already there
     command = " ".join(f"'{word}'" for word in [*several, sys.executable, FAKED, *STUDY])
-    done = run([str(starter), "10.199.77.1", f"cd '{tmp_path}' && exec {command}"], tmp_path, faked)
+    done = run_command([str(starter), "10.199.77.1", f"cd '{tmp_path}' && exec {command}"], tmp_path, faked)
     assert done.returncode == 0, done.stderr
     for number in HOSTS[1:]:
         sent = Path(f"/sys/class/net/{hosts}w{number}/statistics/rx_bytes").read_text(encoding="ascii")

@@ -1,9 +1,8 @@
 """run-study under mpiexec: the same result for any number of ranks, and an end in good order for all of them."""
 
-import os
+import json
 import re
 import signal
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
@@ -11,7 +10,9 @@ import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
-from tests.mpi.launching import CHEAP, FAKED, PATIENCE, SOON, launcher, run_to_end
+from tests.benchmarks.overhead import run
+from tests.mpi.launching import CHEAP, FAKED, ROOT, SOON, launcher, processes_may_share, run_command, run_to_end
+from tests.studyrunner.test_progress import LINE
 
 GRID = [
     *CHEAP,
@@ -24,12 +25,8 @@ GRID = [
 
 
 def start(n_ranks, arguments, folder, environment=None):
-    """Runs under mpiexec, or alone for 0 ranks; never hangs."""
-    command = [*launcher(n_ranks), sys.executable, *arguments]
-    variables = {**os.environ, **(environment or {})}
-    return subprocess.run(
-        command, cwd=folder, env=variables, capture_output=True, text=True, timeout=PATIENCE, check=False
-    )
+    """Runs under mpiexec, or alone for 0 ranks."""
+    return run_command([*launcher(n_ranks), sys.executable, *arguments], folder, environment)
 
 
 def test_result_does_not_depend_on_the_number_of_ranks(tmp_path):
@@ -124,3 +121,50 @@ def test_processes_of_srun_without_mpi(tmp_path):
     assert "mpiexec" in line
     assert [done.stderr for done in ranks[1:]] == [""]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_on_two_ranks_says_how_far_it_is(tmp_path):
+    """Both ranks are seen at work, and the rank that serves them is not too busy to say so."""
+    study = (*CHEAP, "--set", "axes.scheme=['implicit', 'explicit']", "-o", "out.nc")
+    told = {"FAKE_STEPS": "4", "FAKE_SECONDS": "0.03", "FAKE_TELLING": "0.1"}
+    ended = run_to_end(2, [FAKED, *study], tmp_path, told)
+    assert ended.status == 0, ended.said
+    found = [match for line in ended.said.splitlines() if (match := LINE.fullmatch(line))]
+    assert len(found) >= 5, ended.said
+    assert all(match["left"] for match in found[:-1])
+    done = [int(match["done"]) for match in found]
+    assert done == sorted(done)
+    assert done[0] < done[-1]
+    assert int(found[0]["percent"]) < int(found[-1]["percent"])
+    assert max(len(match["running"].split(", ")) for match in found if match["running"]) == 2, ended.said
+
+
+SCRIPT = str(ROOT / "tests/mpi/share_arrays.py")
+N_BYTES = 64_000_000
+
+
+def test_ranks_of_a_machine_share_what_is_handed_out(tmp_path):
+    """But the last one, which the system does not let map the memory of others."""
+    refused = 2
+    if not processes_may_share():
+        pytest.skip("this system keeps the memory of processes apart")
+    environment = {"SHARED_BYTES": str(N_BYTES), "CANNOT_MAP": str(refused)}
+    done = start(3, [SCRIPT], tmp_path, environment)
+    assert done.returncode == 0, done.stderr
+    for rank in range(3):
+        said = json.loads((tmp_path / f"{rank}.json").read_text(encoding="utf-8"))
+        assert said["sum"] == N_BYTES // 8
+        assert said["Anonymous"] == 0
+        if rank == refused:
+            assert said["Rss"] == 0
+        else:
+            assert said["Rss"] * 1024 >= N_BYTES
+
+
+def test_rank_0_does_not_hold_results(tmp_path):
+    """Eight times as much in each result takes hardly more memory."""
+    outputs, n_points = 16_001, 200
+    # both have the slab of 16 MB and the cache of the netCDF library
+    small, large = (run(0, n_points, tmp_path, f"{n}.nc", n) for n in (2_001, outputs))
+    size = n_points * outputs * 10 * 8 / 2**20
+    assert large.memory - small.memory < 60.0 < 0.3 * size

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 
 import pytest
 import xarray as xr
@@ -12,12 +11,11 @@ from studyrunner.mpi import ranks
 from tests.mpi.launching import (
     CHEAP,
     FAKED,
-    PATIENCE,
-    ROOT,
     SOON,
     count_rows,
     fake_here,
     results,
+    run_command,
     watch_to_end,
 )
 
@@ -128,14 +126,8 @@ def test_a_rank_that_is_lost_while_it_starts_ends_all(open_mpi, tmp_path):
         "import os; from studyrunner.mpi import ranks; ranks._SECONDS_TO_START = 2.0;"
         "os.environ['OMPI_COMM_WORLD_RANK'] == '2' and os.kill(os.getpid(), 9); ranks.start_ranks()"
     )
-    done = subprocess.run(
-        [*open_mpi.launcher(N_RANKS, "--with-ft", "ulfm"), open_mpi.python, "-c", program],
-        cwd=tmp_path,
-        env={**os.environ, **open_mpi.environment, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    command = [*open_mpi.launcher(N_RANKS, "--with-ft", "ulfm"), open_mpi.python, "-c", program]
+    done = run_command(command, tmp_path, open_mpi.environment)
     assert done.returncode == 1
-    assert done.stderr.count(b"Timeout (0:00:02)!") == 1
-    assert b"in start_ranks" in done.stderr
+    assert done.stderr.count("Timeout (0:00:02)!") == 1
+    assert "in start_ranks" in done.stderr

@@ -151,26 +151,16 @@ def errors_of(exact: ExactState, settings: SolverSettings) -> Errors:
     )
 
 
-SLIDERS = (  # force, N, against 5 N of friction; frequency ratio
-    (10.0, 0.5),
-    (10.0, 0.6),
-    (10.0, 0.9),
-    (10.0, 1.1),
-    (10.0, 1.4),
-    (7.0, 0.8),
-    (7.0, 1.25),
-    (5.5, 0.6),
-    (5.5, 0.8),
-    (5.5, 1.25),
+SLIDERS = (
+    *((10.0, 0.5), (10.0, 0.6), (10.0, 0.9), (10.0, 1.1), (10.0, 1.4)),
+    *((7.0, 0.8), (7.0, 1.25), (5.5, 0.6), (5.5, 0.8), (5.5, 1.25)),
 )
+"""Force, N, against 5 N of friction; frequency ratio."""
+IMPACTS: tuple[tuple[float, float | None], ...] = ((0.95, 0.7), (1.05, 0.7), (1.2, 0.85), (1.5, 0.85), (1.2, None))
+"""rad/s; where a sweep up begins that finds the upper branch."""
+
+
 TWO_MASSES = (0.3, 0.4, 0.5, 0.6, 0.7, 1.3, 1.6, 1.8)  # rad/s
-IMPACTS: tuple[tuple[float, float | None], ...] = (
-    (0.95, 0.7),
-    (1.05, 0.7),
-    (1.2, 0.85),
-    (1.5, 0.85),
-    (1.2, None),
-)  # rad/s; where a sweep up begins that finds the upper branch
 
 
 def states() -> dict[str, Callable[[], ExactState]]:

@@ -100,19 +100,10 @@ def run_masses(
 
 
 def masses_tangent(case: MassCase, start: FloatArray) -> tuple[FloatArray, FloatArray]:
-    return mass_tangent(
-        case.predicted_t(case.predicted_h),
-        friction_of(case.predicted_h),
-        case.mass,
-        case.drag,
-        case.line,
-        case.step,
-        start,
-        case.basis.synthesis,
-        case.basis.synthesis * case.step_share[:, None],
-        case.basis.analysis / case.step_share,
-        case.has_normal,
-    )
+    basis, share = case.basis, case.step_share
+    given = case.predicted_t(case.predicted_h), friction_of(case.predicted_h), case.mass, case.drag, case.line
+    series = basis.synthesis, basis.synthesis * share[:, None], basis.analysis / share
+    return mass_tangent(*given, case.step, start, *series, case.has_normal)
 
 
 def friction_of(predicted: FloatArray) -> FloatArray:
@@ -129,16 +120,9 @@ def kernel_results() -> dict[str, FloatArray]:
     case = kernel_case(3, BASIS.n_samples, seed=20)
     friction = friction_of(case.predicted_t)
     force_t, state_t, status_t, periods, error = march_period(case.predicted_t, friction, case.start, 1e-9, 6)
+    marched = case.predicted_t, friction, case.start, state_t, periods
     force_tangent, wear_tangent = march_tangent(
-        case.predicted_t,
-        friction,
-        case.start,
-        state_t,
-        periods,
-        both_tangents(3),
-        BASIS.synthesis,
-        BASIS.analysis,
-        case.has_normal,
+        *marched, both_tangents(3), BASIS.synthesis, BASIS.analysis, case.has_normal
     )
     masses = mass_case(6, seed=21)
     mass_force_t, velocity_t, place_t, mass_status_t, slip_work, _ = run_masses(masses, masses.predicted_h)

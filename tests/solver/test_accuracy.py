@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver.settings import SolverSettings
-from tests.solver.exact import NATURAL, errors_of, slider, states, two_masses
+from tests.solver.exact import errors_of, slider, states, two_masses
 
 STATES = states()
 
@@ -36,11 +36,12 @@ def test_a_smaller_tolerance_takes_more_harmonics_or_samples():
 
 
 @pytest.mark.slow
-def test_the_slider_converges_with_the_square_of_the_harmonics_at_least():
-    harmonics = np.array([1, 3, 5, 9, 15])
-    exact = slider(10.0, 0.9)
-    assert exact.omega == pytest.approx(0.9 * NATURAL)
-    found = [errors_of(exact, SolverSettings(harmonics=int(n), samples=8192)) for n in harmonics]
+@pytest.mark.parametrize(
+    ("name", "harmonics"), [("slider 10.0 N 0.9", [1, 3, 5, 9, 15]), ("two masses 0.5", [3, 5, 9, 15])]
+)
+def test_states_converge_with_the_square_of_the_harmonics_at_least(name, harmonics):
+    exact = STATES[name]()
+    found = [errors_of(exact, SolverSettings(harmonics=n, samples=8192)) for n in harmonics]
     for errors in ([each.response for each in found], [each.wear for each in found]):
         assert np.polyfit(np.log(harmonics), np.log(errors), 1)[0] < -2.0
         assert errors == sorted(errors, reverse=True)

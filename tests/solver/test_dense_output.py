@@ -19,21 +19,13 @@ RESOLUTIONS = (Resolution((1, 2, 3), 64), Resolution((1, 2, 3, 4, 5), 128))
 
 def report(depth, value, resolution=RESOLUTIONS[0], **more):
     """All numbers of a state but its depths are `value`."""
-    pairs = np.full(2, value)
+    numbers = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction"), np.full(2, value))
+    numbers |= dict.fromkeys(("excitation_frequency", "excitation_frequency_error"), value)
+    numbers |= dict.fromkeys(("loop_displacement", "loop_force"), value * LOOP)
+    numbers |= {"response": np.full(1, value * 1j), "response_peak": np.full(1, value)}
+    certificate = Certificate(*([value] * 8), stable=value < 2.5)
     return StateReport(
-        wear_depth=np.array(depth, float),
-        mean_pressure=pairs,
-        slip_range=pairs,
-        open_fraction=pairs,
-        response=np.full(1, value * 1j),
-        response_peak=np.full(1, value),
-        excitation_frequency=value,
-        excitation_frequency_error=value,
-        loop_displacement=value * LOOP,
-        loop_force=value * LOOP,
-        certificate=Certificate(*([value] * 8), stable=value < 2.5),
-        resolution=resolution,
-        **more,
+        wear_depth=np.array(depth, float), certificate=certificate, resolution=resolution, **numbers, **more
     )
 
 

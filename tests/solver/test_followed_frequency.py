@@ -29,18 +29,9 @@ SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit", "adaptive")
 @lru_cache
 def worn(word="resonance", scheme="adaptive", wear=WEAR, rtol=1e-2):
     """History of the slider; steps of the other schemes are an eighth of the cycles."""
-    return march_wear(
-        scene("sdof_slider", damping=DAMPING),
-        word,
-        10.0,
-        0.5,
-        wear,
-        CYCLES * WEAR / wear,
-        scheme=scheme,
-        step=5e3 * WEAR / wear,
-        between=BETWEEN,
-        settings=SolverSettings(rtol=rtol),
-    )
+    slower = WEAR / wear
+    steps = {"scheme": scheme, "step": 5e3 * slower, "between": BETWEEN, "settings": SolverSettings(rtol=rtol)}
+    return march_wear(scene("sdof_slider", damping=DAMPING), word, 10.0, 0.5, wear, CYCLES * slower, **steps)
 
 
 def exact_response(frequency, depth):
@@ -132,19 +123,8 @@ def test_an_interrupted_history_is_equal_to_the_last_bit(word, monkeypatch):
     kept: list[Packed] = []
 
     def history(resume=None):
-        return march_from(
-            model,
-            0.5,
-            slider_start(word),
-            WEAR,
-            1e3,
-            "implicit",
-            CYCLES,
-            settings,
-            keep=kept.append,
-            resume=resume,
-            follow=follow,
-        )
+        asked = {"keep": kept.append, "resume": resume, "follow": follow}
+        return march_from(model, 0.5, slider_start(word), WEAR, 1e3, "implicit", CYCLES, settings, **asked)
 
     whole = history()
     n_saves = len(kept)

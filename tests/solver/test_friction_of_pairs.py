@@ -8,7 +8,6 @@ import pytest
 from solver import frequency_response
 from solver import march_wear as march_from_unworn
 from solver.accuracy.certificate import certify
-from solver.harmonic_balance.dlft import Balance
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case, friction_of_pairs
@@ -83,19 +82,6 @@ def test_elastic_pairs_with_their_own_coefficients_are_those_that_stand_alone():
             expected = getattr(alone, name)[0]
             assert getattr(both, name)[pair] == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.abs(expected).max())
     assert both.slip_work.min() > 0.0
-
-
-def test_the_jacobian_of_different_coefficients_is_that_of_central_differences():
-    balance, predicted = random_balance(random_model(4, KINDS), SETTINGS, 4, wear=True)
-    joint = replace(balance.joint, friction_coefficient=np.array([0.0, 0.3, 0.7]))
-    balance = Balance(joint, balance.history, balance.wear_depth, balance.wear_gain)
-    tangent = balance.linearise(balance.evaluate(predicted))
-    random, size = np.random.default_rng(1), np.abs(predicted).max()
-    for _ in range(5):
-        step = random.normal(size=predicted.shape)
-        ahead, behind = (balance.evaluate(predicted + sign * 1e-6 * size * step).residual for sign in (1.0, -1.0))
-        difference = (ahead - behind) / (2e-6 * size)
-        assert np.abs(tangent.apply(step) - difference).max() < 1e-5 * np.abs(difference).max()
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from solver.contact.coulomb import SLIP, STICK
+from solver.contact.coulomb import STICK
 from solver.contact.rigid_slider import step_line, step_mass, step_plane
 from solver.structure.fourier import build_basis, to_complex
 from tests.solver import mass_twin
-from tests.solver.kernel_cases import FRICTION, mass_case, masses_tangent, run_masses
+from tests.solver.kernel_cases import FRICTION, mass_case, run_masses
 
 FloatArray = np.ndarray
 GAIN, LOSS = 10.5, 9.5  # kg/s
@@ -217,63 +217,3 @@ def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero():
     for exactly_zero in (velocity_t, place_t, slip_work, error):
         assert not exactly_zero.any()
     assert force_t == pytest.approx(case.predicted_t(held), rel=1e-14)
-
-
-# ---------------------------------------------------------------------------------------------------------- derivative
-
-
-def assert_derivative(case, slack=1e-6):
-    """Compare with central differences of the whole periodic march; the number of pairs away from a switch."""
-    n_contact, m = case.predicted_h.shape[0], case.basis.synthesis.shape[0]
-    step = 1e-5
-
-    def run(predicted_h):
-        force_t, velocity_t, _, _, slip_work, _ = run_masses(case, predicted_h)
-        return (force_t @ case.basis.analysis / case.step_share)[:, 1:], slip_work, velocity_t[:, :, 0]
-
-    force, work, start = run(case.predicted_h)
-    force_tangent, wear_tangent = masses_tangent(case, start)
-    assert not force_tangent[:, :m].any()
-    force_differences = np.zeros((n_contact, 2 * m, 3 * m))
-    work_differences = np.zeros((n_contact, 3 * m))
-    kinks = np.zeros(n_contact)
-    for component in range(3):
-        exists = case.has_normal if component == 0 else (case.line < 0) | (case.line == component - 1)
-        for k in range(m):
-            sides = []
-            for sign in (1.0, -1.0):
-                moved = case.predicted_h.copy()
-                moved[exists, component, k] += sign * step
-                moved_force, moved_work, _ = run(moved)
-                sides.append(((moved_force - force) * sign / step, (moved_work - work) * sign / step))
-            column = component * m + k
-            force_differences[:, :, column] = (0.5 * (sides[0][0] + sides[1][0])).reshape(n_contact, 2 * m)
-            work_differences[:, column] = 0.5 * (sides[0][1] + sides[1][1])
-            kinks = np.maximum(kinks, np.abs(sides[0][0] - sides[1][0]).max(axis=(1, 2)))
-    away = 0
-    for pair in range(n_contact):
-        if kinks[pair] > 1e-3:
-            continue  # an event on the end of a step
-        away += 1
-        exists = np.repeat([case.has_normal[pair], *((case.line[pair] < 0) | (case.line[pair] == np.arange(2)))], m)
-        for found, expected in (
-            (force_tangent[pair, m:][:, exists], force_differences[pair][:, exists]),
-            (wear_tangent[pair][exists], work_differences[pair][exists]),
-        ):
-            assert np.abs(found - expected).max() < slack * np.abs(expected).max(), pair
-            assert np.abs(expected).max() > 1e-2
-    return away
-
-
-@pytest.mark.slow
-def test_the_derivative_goes_through_the_closure_of_the_period():
-    # masses that turn without ever stopping remember their start for many periods: of the derivative of the velocity at
-    # the start nothing may be left out
-    case = mass_case(9, 7, opens=False)
-    strong = case.predicted_h.copy()
-    strong[:, 1:] *= 6.0
-    case = replace(case, predicted_h=strong)
-    _, velocity_t, _, status_t, _, _ = run_masses(case, strong)
-    assert (status_t == SLIP).all(axis=1).sum() >= 6
-    assert np.abs(velocity_t[:, :, 0]).max(axis=1).min() > 1e-3
-    assert assert_derivative(case) >= 7

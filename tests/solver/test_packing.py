@@ -1,44 +1,27 @@
 """The progress of a history and of a sweep survives being kept, and what goes on from there ends with equal numbers."""
 
 import math
-import sys
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
-from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
-from solver.results.history import StartState
 from solver.settings import Resolution, SolverSettings
 from solver.wear import integrate
-from tests.solver.models import branch_states, dovetail, march_wear, scene
+from tests.solver.models import branch_states, dovetail, march_wear
 from tests.solver.test_branch_loss import start as impacting_start
 from tests.solver.test_branch_loss import worn_wall
-from tests.solver.test_explicit_step_limit import WEAR as SEESAW_WEAR
-from tests.solver.test_explicit_step_limit import exact_limit, seesaw
 
 AUTO = SolverSettings(rtol=3e-2)
 MOST_STOPS = 2
 
 
-@pytest.mark.parametrize(
-    "value",
-    [
-        None,
-        True,
-        3,
-        -0.0,
-        math.inf,
-        "text",
-        Outcome.ADRIFT,
-        (1, (2.5, [None, "a"])),
-        {"a": {"b": 1}},
-        Resolution((1, 3), 64),
-        np.float64(0.1),
-    ],
-)
+VALUES = (None, True, 3, -0.0, math.inf, "text", np.float64(0.1), Outcome.ADRIFT, Resolution((1, 3), 64))
+
+
+@pytest.mark.parametrize("value", [*VALUES, (1, (2.5, [None, "a"])), {"a": {"b": 1}}])
 def test_plain_values_come_back(value):
     found = unpack(pack(value))
     assert found == value
@@ -111,40 +94,3 @@ def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch):
     whole, kept = from_every_stop(worn_wall(1.0), 1e-3, impacting_start(), 1e-7, 100.0, "implicit", 1000.0, settings)
     cycles = [at.progress.state.cycle for at in kept if at.fine is None]
     assert min(cycles) < whole.jump_cycle < max(cycles)
-
-
-@pytest.mark.slow
-def test_oscillation_is_seen_across_a_stop(monkeypatch):
-    monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=1))
-    monkeypatch.setattr(sys.modules[__name__], "MOST_STOPS", 10)
-    (start,) = branch_states(seesaw(), 1e-4, 1.0, [100.0], SolverSettings(3, 128))
-    step = 1.2 * exact_limit()
-    whole, kept = from_every_stop(
-        seesaw(), 1e-4, start, SEESAW_WEAR, step, "explicit", 20.0 * step, SolverSettings(3, 128)
-    )
-    assert whole.oscillates
-    assert any(at.fine is None and at.progress.state.rates.n_alternating.max() in (1, 2) for at in kept)
-
-
-@pytest.mark.slow
-def test_a_sweep_over_a_fold_goes_on_to_the_same_numbers():
-    model, frequencies = scene("vibro_impact"), np.array([0.2, 0.255])
-    kept: list[tuple[frozenset[int], Packed]] = []
-    whole: dict[int, StartState] = {}
-
-    def keep(progress):
-        if not isinstance(progress, str):
-            kept.append((frozenset(whole), progress))
-
-    for index, start in follow_branch(model, 0.0, 0.02, frequencies, "up", SolverSettings(7, 64), keep=keep):
-        whole[index] = start
-    assert [whole[index].branch for index in (0, 1)] == [0, 1]
-    for done, progress in (kept[0], kept[-1]):
-        left = [index for index in range(frequencies.size) if index not in done]
-        for place, start in follow_branch(
-            model, 0.0, 0.02, frequencies[left], "up", SolverSettings(7, 64), resume=progress
-        ):
-            wanted = whole[left[place]]
-            assert_same(replace(start, state=None, reference=None), replace(wanted, state=None, reference=None))
-            assert_same(start.state, wanted.state)
-            assert_same(start.reference, wanted.reference)

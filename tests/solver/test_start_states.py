@@ -8,8 +8,8 @@ from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings
-from tests.references import coulomb_orbit, vibro_impact_orbit
-from tests.solver.models import branch_states, converged_state, scene
+from tests.references import vibro_impact_orbit
+from tests.solver.models import branch_states, scene
 from tests.solver.reconstruction import full_motion
 
 FINE = SolverSettings(harmonics=21, samples=256)
@@ -19,18 +19,6 @@ VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
 
 def first_harmonic(model, state, **values):
     return np.abs(full_motion(scene(model, **values), state).displacement[1])
-
-
-@pytest.mark.slow
-def test_two_masses_converge_with_the_square_of_the_harmonics_at_least():
-    orbit = coulomb_orbit(*TWO_MASSES, 0.5)
-    expected = abs(orbit.harmonic(1))
-    harmonics = np.array([3, 5, 9, 15])
-    errors = []
-    for n in harmonics:
-        state = converged_state(scene("two_masses"), 0.5, 20.0, 0.5, SolverSettings(int(n), 2048))
-        errors.append(abs(first_harmonic("two_masses", state)[1] / expected - 1))
-    assert np.polyfit(np.log(harmonics), np.log(errors), 1)[0] < -2.0
 
 
 @pytest.mark.slow

@@ -11,24 +11,30 @@ def compliances(model: ReducedModel) -> tuple[FloatArray, FloatArray]:
     return np.linalg.inv(stiffness[:n, :n]), np.linalg.inv(stiffness[n : 2 * n, n : 2 * n])
 
 
-def pressed(model: ReducedModel, load: float, among: np.ndarray | None = None) -> tuple[FloatArray, float]:
-    """Normal forces (n,), N, and approach, m, under a load, N, of pairs that take compression alone.
+def solve_pressed(
+    compliance: FloatArray, gap: FloatArray, load: float, among: np.ndarray | None = None
+) -> tuple[FloatArray, float]:
+    """Normal forces (n,), N, and approach, m, of a body pressed on pairs with these gaps, m.
 
-    among: pairs that may touch, all of them if not given.
+    Pairs come and go until none is wrong. among: those that may touch, all of them if not given.
     """
-    compliance, _ = compliances(model)
-    gap, n = model.contact.gap, model.contact.n_contact
-    touching = np.ones(n, bool) if among is None else among.copy()
+    allowed = np.ones(len(gap), bool) if among is None else among
+    touching = allowed
     while True:
         m = int(touching.sum())
         matrix = np.ones((m + 1, m + 1))
         matrix[:m, :m], matrix[m, m] = -compliance[np.ix_(touching, touching)], 0.0
-        found = np.linalg.solve(matrix, np.append(gap[touching], load))
-        force = np.zeros(n)
-        force[touching] = found[:-1]
-        if (force >= 0.0).all():
-            return force, float(found[-1])
-        touching &= force > 0.0
+        force, approach = np.zeros(len(gap)), 0.0
+        *force[touching], approach = np.linalg.solve(matrix, np.append(gap[touching], load))
+        again = allowed & np.where(touching, force > 0.0, compliance @ force + gap < approach)
+        if (again == touching).all():
+            return force, float(approach)
+        touching = again
+
+
+def pressed(model: ReducedModel, load: float, among: np.ndarray | None = None) -> tuple[FloatArray, float]:
+    """The same of the pairs of a model."""
+    return solve_pressed(compliances(model)[0], model.contact.gap, load, among)
 
 
 def limit_depth(model: ReducedModel, stuck: np.ndarray) -> FloatArray:

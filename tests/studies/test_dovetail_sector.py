@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from scipy import linalg
 
 from solver.model import needed_nodal_diameters
@@ -89,15 +88,17 @@ def test_stiffening_grows_with_the_square_of_speed_and_softening_shows():
     assert (squares[2] - squares[0]) / (squares[1] - squares[0]) == pytest.approx(4.0, rel=0.02)
 
 
-@pytest.mark.parametrize("nodal_diameter", [1, 16, 23])
-def test_travelling_wave_has_the_nodal_diameters_it_needs(nodal_diameter):
-    model = build(Parameters(mesh=1, nodal_diameter=nodal_diameter), 5)
-    assert tuple(model.linear) == needed_nodal_diameters(nodal_diameter, 47, 5)
-    assert model.n_sectors == 47
+@pytest.mark.parametrize(("nodal_diameter", "n_sectors"), [(1, 47), (16, 47), (23, 47), (23, 46)])
+def test_travelling_wave_has_the_nodal_diameters_it_needs(nodal_diameter, n_sectors):
+    """Half the number of the sectors is a real one, as 0 is."""
+    model = build(Parameters(mesh=1, nodal_diameter=nodal_diameter, n_sectors=n_sectors), 5)
+    assert tuple(model.linear) == needed_nodal_diameters(nodal_diameter, n_sectors, 5)
+    assert n_sectors == 47 or tuple(model.linear) == (0, 23)
+    assert model.n_sectors == n_sectors
     assert model.nodal_diameter == nodal_diameter
     for k, linear in model.linear.items():
         for matrix in (linear.mass, linear.damping, linear.stiffness):
-            assert np.iscomplexobj(matrix) == (k != 0)
+            assert np.iscomplexobj(matrix) == (k not in (0, n_sectors / 2))
             assert np.array_equal(matrix, matrix.conj().T)
         assert linalg.eigvalsh(linear.mass)[0] > 0.0
         damping = linalg.eigvalsh(linear.damping)
@@ -107,12 +108,6 @@ def test_travelling_wave_has_the_nodal_diameters_it_needs(nodal_diameter):
     excited = model.linear[nodal_diameter]
     # Force and response are one and the same point and direction.
     assert np.allclose(excited.load_harmonic, excited.response[0].conj())
-
-
-def test_half_the_sectors_is_a_real_nodal_diameter():
-    model = build(Parameters(mesh=1, n_sectors=46, nodal_diameter=23), 3)
-    assert tuple(model.linear) == (0, 23)
-    assert np.isrealobj(model.linear[23].stiffness)
 
 
 def test_same_parameters_give_the_same_bits():
@@ -154,20 +149,9 @@ def test_parameters_that_do_not_go_together(key, value):
     assert caught.value.remedy
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [("friction_coefficient", -0.1), ("rotation_speed", float("nan")), ("mesh", 0), ("no_such_key", 1.0)],
-)
-def test_parameters_out_of_range(key, value):
-    with pytest.raises(ValidationError):
-        Parameters(**{key: value})
-
-
 def test_every_parameter_is_described_with_a_unit():
-    fields = Parameters.model_fields
-    assert next(iter(fields)) == "friction_coefficient"
     units = {"-", "m", "rpm", "Pa", "kg/m3", "degrees", "N/m", "N/m3"}
-    assert {(field.description or "").rpartition(", ")[2] for field in fields.values()} == units
+    assert {field.description.rpartition(", ")[2] for field in Parameters.model_fields.values()} == units
 
 
 def test_a_retainer_holds_the_root_along_its_slot_under_a_travelling_wave():

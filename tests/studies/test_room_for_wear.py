@@ -16,7 +16,7 @@ from studies.scenes.closed_forms.hertz import (
 )
 from studies.scenes.half_space.influence import composite_modulus
 from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar, round_up
-from tests.studies.half_space_twin import compliances, limit_depth, pressed
+from tests.studies.half_space_twin import compliances, limit_depth, pressed, solve_pressed
 
 MODULUS = composite_modulus(200e9, 0.3)
 A_LINE = line_half_width(1.2e5, 6e-3, MODULUS)
@@ -36,27 +36,12 @@ def worn_by_uniform_slip(name, **values):
     depth, rows = np.zeros(contact.n_contact), []
     radius = np.linalg.norm(contact.position, axis=1)
     while True:
-        force = solve_pressed(compliance, contact.gap + depth, load)
+        force, _ = solve_pressed(compliance, contact.gap + depth, load)
         rows.append((radius[force > 0.0].max(), depth @ contact.area, depth.max()))
         if rows[-1][0] > 0.85 * radius.max():
             return np.array(rows)
         pressure = force / contact.area
         depth = depth + 0.03 * rows[-1][0] ** 2 / (2.0 * values["R"]) * pressure / pressure.max()
-
-
-def solve_pressed(compliance, gap, load):
-    """Normal forces (n,), N, of a body pressed on pairs with these gaps, m; pairs come and go until none is wrong."""
-    touching = np.ones(len(gap), bool)
-    while True:
-        m = int(touching.sum())
-        matrix = np.ones((m + 1, m + 1))
-        matrix[:m, :m], matrix[m, m] = -compliance[np.ix_(touching, touching)], 0.0
-        force, approach = np.zeros(len(gap)), 0.0
-        *force[touching], approach = np.linalg.solve(matrix, np.append(gap[touching], load))
-        again = np.where(touching, force > 0.0, compliance @ force + gap < approach)
-        if (again == touching).all():
-            return force
-        touching = again
 
 
 @pytest.mark.parametrize(

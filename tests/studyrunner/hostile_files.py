@@ -9,6 +9,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from tests.studies.scene_models import put
+from tests.studies.test_wrong_scene_files import attribute, circle, virtual
+
 STUDY = """
 [study]
 name = "s"
@@ -48,8 +51,8 @@ def endless_links(file: h5py.File) -> None:
     file["b"] = h5py.SoftLink("/a")
 
 
-def circle(file: h5py.File) -> None:
-    file["contact/round"] = file["contact"]
+def references(file: h5py.File) -> None:
+    put("mass", np.array([[file["contact"].ref]], dtype=h5py.ref_dtype), dtype=h5py.ref_dtype)(file)
 
 
 def many_objects(file: h5py.File) -> None:
@@ -61,13 +64,6 @@ def deep_groups(file: h5py.File) -> None:
     group = file
     for _ in range(500):
         group = group.create_group("g")
-
-
-def virtual(file: h5py.File) -> None:
-    del file["mass"]
-    layout = h5py.VirtualLayout((1, 1), "f8")
-    layout[...] = h5py.VirtualSource("/etc/passwd", "mass", (1, 1))
-    file.create_virtual_dataset("mass", layout)
 
 
 def inflating_chunk(file: h5py.File) -> None:
@@ -90,39 +86,9 @@ def stacked_filters(file: h5py.File) -> None:
     h5py.h5d.create(file.id, b"mass", h5py.h5t.IEEE_F64LE, h5py.h5s.create_simple((1, 1)), properties)
 
 
-def chunk_of_gigabytes(file: h5py.File) -> None:
-    del file["mass"]
-    file.create_dataset("mass", (1, 1), "f8", maxshape=(None, None), chunks=(20000, 20000))
-
-
-def references(file: h5py.File) -> None:
-    del file["mass"]
-    file.create_dataset("mass", data=np.array([[file["contact"].ref]], dtype=h5py.ref_dtype), dtype=h5py.ref_dtype)
-
-
-def ragged(file: h5py.File) -> None:
-    del file["mass"]
-    file.create_dataset("mass", (1, 1), dtype=h5py.vlen_dtype(np.float64))
-
-
 def named(name: str) -> Change:
     def change(file: h5py.File) -> None:
         file.create_dataset(name, data=np.ones(1))
-
-    return change
-
-
-def values(key: str, content: object) -> Change:
-    def change(file: h5py.File) -> None:
-        del file[key]
-        file.create_dataset(key, data=content)
-
-    return change
-
-
-def attribute(name: str, content: object) -> Change:
-    def change(file: h5py.File) -> None:
-        file.attrs[name] = content
 
     return change
 
@@ -135,13 +101,13 @@ def long_texts(file: h5py.File) -> None:
 
 SCENES: dict[str, Change] = {
     "bomb within the limit": replaced("stiffness", (2800, 2800), chunks=(1000, 1000), compression="gzip"),
-    "denormal area": values("contact/area", [-5e-324]),
+    "denormal area": put("contact/area", [-5e-324]),
     "huge matrix": replaced("mass", (10**7, 10**7), chunks=(100, 100)),
     "bomb of zeros": replaced("stiffness", (40000, 40000), chunks=(1000, 1000), compression="gzip"),
     "64 bit overflow": replaced("mass", (2**33, 2**33), chunks=(64, 64)),
     "inflating chunk": inflating_chunk,
     "stacked filters": stacked_filters,
-    "chunk of gigabytes": chunk_of_gigabytes,
+    "chunk of gigabytes": replaced("mass", (20000, 20000), maxshape=(None, None), chunks=(20000, 20000)),
     "external link": linked(h5py.ExternalLink("/etc/passwd", "/")),
     "endless soft links": endless_links,
     "circle of groups": circle,
@@ -150,14 +116,14 @@ SCENES: dict[str, Change] = {
     "external storage": replaced("mass", (1, 1), external=[("/dev/zero", 0, 8)]),
     "virtual dataset": virtual,
     "references": references,
-    "ragged rows": ragged,
+    "ragged rows": replaced("mass", (1, 1), h5py.vlen_dtype(np.float64)),
     "objects": replaced("mass", (1, 1), h5py.string_dtype()),
     "array type": replaced("mass", (1,), np.dtype(("f8", (10**4,)))),
     "name with an escape sequence": named("\x1b[2J\x1b]0;owned\x07"),
-    "label with an escape sequence": values("response/names", ["\x1b[31mred", "\x1b[31mred"]),
-    "not a number": values("stiffness", [[np.nan]]),
-    "next to the largest": values("stiffness", [[1.7e308]]),
-    "wrong byte order": values("contact/dofs", np.array([[-1, 0, -1]]).astype(">i4").view("<i4")),
+    "label with an escape sequence": put("response/names", ["\x1b[31mred", "\x1b[31mred"]),
+    "not a number": put("stiffness", [[np.nan]]),
+    "next to the largest": put("stiffness", [[1.7e308]]),
+    "wrong byte order": put("contact/dofs", np.array([[-1, 0, -1]]).astype(">i4").view("<i4")),
     "long texts": long_texts,
     "attribute of text": attribute("nodal_diameter", "\x1b[2J"),
     "huge number of sectors": attribute("n_sectors", 2**62),

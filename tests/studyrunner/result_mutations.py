@@ -77,7 +77,7 @@ def _new_attribute(file: h5py.File, name: str, chance: random.Random) -> None:
 def _type(file: h5py.File, name: str, chance: random.Random) -> None:
     """Another type, the dimensions as before."""
     content = chance.choice([1, 0.5, 1j, "text", b"text", True, np.uint64(2**63), np.float16(1), np.datetime64(0, "s")])
-    _replace(file, name, np.full(file[name].shape, content), file[name].ndim)
+    replace_variable(file, name, np.full(file[name].shape, content), file[name].ndim)
 
 
 def _shape(file: h5py.File, name: str, chance: random.Random) -> None:
@@ -90,7 +90,7 @@ def _shape(file: h5py.File, name: str, chance: random.Random) -> None:
         shape.append(chance.choice([0, 1, 3]))
     elif way == 2 and shape:
         shape[chance.randrange(len(shape))] = chance.choice([0, 1, 5, 100_000])
-    _replace(file, name, np.zeros(shape), chance.randrange(len(shape) + 1))
+    replace_variable(file, name, np.zeros(shape), chance.randrange(len(shape) + 1))
 
 
 def _remove(file: h5py.File, name: str, _chance: random.Random) -> None:
@@ -119,7 +119,8 @@ def _dimension(file: h5py.File, name: str, chance: random.Random) -> None:
                 dataset.attrs[key] = chance.choice(NUMBERS)
 
 
-def _replace(file: h5py.File, name: str, content: np.ndarray, n_told: int) -> None:
+def replace_variable(file: h5py.File, name: str, content: np.ndarray, n_told: int) -> None:
+    """Another content of a variable, of whose dimensions the first are told."""
     old = file[name]
     scales = [list(dimension.values()) for dimension in old.dims]
     kept = {key: old.attrs[key] for key in ("_Netcdf4Coordinates", "units", "flag_values") if key in old.attrs}

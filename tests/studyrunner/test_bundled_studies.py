@@ -11,70 +11,31 @@ from studyrunner.cli import main
 from studyrunner.study.study_file import bundled_studies
 
 SMALL = {
-    "blade_root": [
-        "axes.excitation_amplitude=2.0",
-        "slow_time.cycles=0",
-        "slow_time.outputs=1",
-        "solver.harmonics=1",
-        "solver.samples=32",
-    ],
-    "cylinder_on_flat": ["scene.strips=24", "solver.harmonics=3", "solver.samples=64"],
-    "sphere_on_flat": ["scene.patches=5", "solver.harmonics=3", "solver.samples=64"],
-    "dovetail": [
-        "scene.mesh=1",
-        "axes.frequency=[207.0, 212.5]",
-        "slow_time.cycles=3000",
-        "slow_time.outputs=4",
-        "solver.harmonics=3",
-        "solver.samples=64",
-    ],
-    "extremes": [
-        "axes.frequency=212.86",
-        "axes.wear_coefficient=[1.1e-14, 1.1e-7]",
-        "axes.step=1000",
-        "slow_time.cycles=20",
-        "slow_time.outputs=3",
-        "solver.harmonics=3",
-        "solver.samples=64",
-    ],
-    "mission": ["slow_time.missions=1", "slow_time.outputs=2", "solver.harmonics=3", "solver.samples=64"],
-    "modes": ["axes.modal_amplitude=[2e-4, 4e-4]"],
-    "scatter": [
-        "scatter.samples=2",
-        "scene.mesh=1",
-        "axes.frequency=212.45",
-        "slow_time.cycles=3000",
-        "slow_time.outputs=3",
-        "solver.harmonics=3",
-        "solver.samples=64",
-    ],
-    "sdof_slider": ["axes.frequency=160.0", "slow_time.cycles=4000", "slow_time.outputs=5"],
-    "two_masses": ["axes.frequency=0.0954929658551372"],
-    "vibro_impact": ["axes.frequency=[0.17, 0.19, 0.21, 0.22]"],
-    "work_precision": [
-        "scene.mesh=1",
-        "axes.frequency=212.86",
-        "axes.step=[1000, 2000]",
-        "axes.harmonics=5",
-        "axes.samples=64",
-        "slow_time.cycles=4000",
-        "slow_time.outputs=3",
-    ],
-    "work_precision_slider": [
-        "axes.frequency=160.0",
-        "axes.step=[2500, 10000]",
-        "axes.harmonics=[1, 5]",
-        "axes.samples=64",
-    ],
+    "blade_root": "axes.excitation_amplitude=2.0 slow_time.cycles=0 slow_time.outputs=1 solver.harmonics=1"
+    " solver.samples=32",
+    "cylinder_on_flat": "scene.strips=24 solver.harmonics=3 solver.samples=64",
+    "sphere_on_flat": "scene.patches=5 solver.harmonics=3 solver.samples=64",
+    "dovetail": "scene.mesh=1 axes.frequency=[207.0,212.5] slow_time.cycles=3000 slow_time.outputs=4"
+    " solver.harmonics=3 solver.samples=64",
+    "extremes": "axes.frequency=212.86 axes.wear_coefficient=[1.1e-14,1.1e-7] axes.step=1000 slow_time.cycles=20"
+    " slow_time.outputs=3 solver.harmonics=3 solver.samples=64",
+    "mission": "slow_time.missions=1 slow_time.outputs=2 solver.harmonics=3 solver.samples=64",
+    "modes": "axes.modal_amplitude=[2e-4,4e-4]",
+    "scatter": "scatter.samples=2 scene.mesh=1 axes.frequency=212.45 slow_time.cycles=3000 slow_time.outputs=3"
+    " solver.harmonics=3 solver.samples=64",
+    "sdof_slider": "axes.frequency=160.0 slow_time.cycles=4000 slow_time.outputs=5",
+    "two_masses": "axes.frequency=0.0954929658551372",
+    "vibro_impact": "axes.frequency=[0.17,0.19,0.21,0.22]",
+    "work_precision": "scene.mesh=1 axes.frequency=212.86 axes.step=[1000,2000] axes.harmonics=5 axes.samples=64"
+    " slow_time.cycles=4000 slow_time.outputs=3",
+    "work_precision_slider": "axes.frequency=160.0 axes.step=[2500,10000] axes.harmonics=[1,5] axes.samples=64",
 }
-
-
 MAY_FAIL = ("extremes",)
 
 
 def run_small(name, folder):
     path = folder / f"{name}.nc"
-    changes = [word for change in SMALL[name] for word in ("--set", change)]
+    changes = [word for change in SMALL[name].split() for word in ("--set", change)]
     assert main([name, *changes, "-o", str(path)]) in ((0, 3) if name in MAY_FAIL else (0,))
     with xr.open_dataset(path) as result:
         return result.load()
@@ -161,14 +122,12 @@ def test_every_point_of_the_extremes_is_whole_or_says_why_not(tmp_path):
         others = [dimension for dimension in values.dims if dimension not in held.dims]
         assert (values.notnull().all(others) == held).all(), name
         assert (values.isnull().all(others) == ~held).all(), name
-    worn = result.wear_depth
-    assert (worn.isel(cycle=0).fillna(0.0) == 0.0).all()
-    assert (worn.diff("cycle").fillna(0.0) >= 0.0).all()
+    assert (result.wear_depth.isel(cycle=0).fillna(0.0) == 0.0).all()
+    assert (result.wear_depth.diff("cycle").fillna(0.0) >= 0.0).all()
     assert (result.harmonics_used.where(~held, 0) == 0).all()
     lines = result.attrs["certificate_summary"].splitlines()
-    assert lines[0].startswith("worn volume ")
-    assert lines[1].startswith("mesh ")
-    assert lines[2].startswith("small-wear assumption ")
+    for line, begins in zip(lines, ("worn volume ", "mesh ", "small-wear assumption "), strict=False):
+        assert line.startswith(begins)
     head, *rows = [line for line in lines if " | " in line]
     assert head.split()[4:6] == ["excitation_amplitude", "5e-05"]
     assert [row.split()[1] for row in rows] == ["1.1e-14", "1.1e-07"]

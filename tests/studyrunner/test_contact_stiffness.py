@@ -16,7 +16,7 @@ from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
 from tests.studies.fe_models.decks import SECTOR
 from tests.studyrunner.test_model_studies import STUDY as SECTOR_STUDY
-from tests.studyrunner.test_scene_axes import CHEAP, arguments, compute, same_values
+from tests.studyrunner.test_scene_axes import CHEAP, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
 SOFT = (1e11, 1e13)
@@ -24,21 +24,6 @@ SOFT = (1e11, 1e13)
 
 def digest(study, *overrides):
     return describe_scene(build_study_scene(read_study(study, overrides))).digest
-
-
-@pytest.mark.slow
-def test_an_axis_of_stiffnesses_is_studies_with_each():
-    axis = f"axes.contact_stiffness={list(SOFT)}"
-    whole = compute("sdof_slider", "whole.nc", *CHEAP, axis, "outputs.variables=['default', 'natural_frequency']")
-    assert whole.contact_stiffness.attrs["units"] == "N/m3"
-    last = whole.worn_volume.isel(cycle=-1).squeeze()
-    assert last[0] < last[1]
-    names = ["worn_volume", "response_amplitude"]
-    alone = compute("sdof_slider", "alone.nc", *CHEAP, f"scene.contact_stiffness={SOFT[0]}")
-    same_values(whole.sel(contact_stiffness=SOFT[0])[names], alone[names])
-    # a mass on its mount and its contact
-    found = whole.natural_frequency.sel(contact_stiffness=SOFT[0]).squeeze()[0]
-    assert found == pytest.approx(np.sqrt((1.6e5 + 14.0 / 17.0 * SOFT[0] * 1e-4) / 0.1) / (2.0 * np.pi), rel=1e-9)
 
 
 @pytest.mark.slow
@@ -82,9 +67,3 @@ def test_a_deck_is_reduced_once_for_all_contact_stiffnesses(folder, monkeypatch)
     # another deck under the same name is another model
     (folder / "sector.inp").write_text((folder / "sector.inp").read_text().replace("*DENSITY\n7800", "*DENSITY\n7801"))
     assert digest("wear.toml", f"scene.contact_stiffness={SOFT[0]}") != expected
-
-
-@pytest.mark.parametrize("value", ["0", "-1e12", "1e23", "'soft'"])
-def test_a_wrong_contact_stiffness_is_named(value, capsys):
-    assert main(arguments("dovetail", "x.nc", f"scene.contact_stiffness={value}")) == 2
-    assert "scene.contact_stiffness" in capsys.readouterr().err

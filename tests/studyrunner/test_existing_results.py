@@ -1,5 +1,6 @@
-"""Nothing is replaced unasked: what stands where a result is to go, found before anything is computed."""
+"""Nothing is replaced unasked: results, finished or not, those of others, and files of runs that were killed."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -7,17 +8,19 @@ import xarray as xr
 
 from studyrunner import UserError, run_study
 from studyrunner.cli import main
-from tests.studyrunner.faked_runs import SMALL, Solver
+from studyrunner.netcdf.provenance import POINTS_LEFT
+from tests.studyrunner.faked_runs import SMALL
+
+pytestmark = pytest.mark.usefixtures("solver", "folder")
 
 OTHER = ["two_masses", "--set", "axes.scheme=implicit", "--set", "axes.frequency=0.05", "-o", "out.nc"]
 RENAMED = [*SMALL, "--set", "study.name=mine"]
 FINER = [*SMALL, "--set", "axes.frequency=[100, 105, 110]"]
 
 
-@pytest.fixture(autouse=True)
-def solver(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return Solver(monkeypatch)
+APART = [*SMALL, "--set", "solver.shortcuts=false"]
+VARIANT = [*APART, "--set", "axes.excitation_amplitude=11"]
+LARGER = [*APART, "--set", "axes.frequency=[100, 110, 120]"]
 
 
 def name_in(path):
@@ -25,11 +28,12 @@ def name_in(path):
         return str(result.attrs["study"]).split('"')[1]
 
 
-def end_at_once(solver):
-    """The first result of the next run is its last."""
+def end_at_result(solver, number=1):
+    """The next run is interrupted at its result of this number, counted from the last beginning on."""
 
-    def interrupt(*_):
-        raise KeyboardInterrupt
+    def interrupt(_, n_results):
+        if n_results >= number:
+            raise KeyboardInterrupt
 
     solver.disturb = interrupt
 
@@ -39,7 +43,7 @@ def finished(_):
 
 
 def unfinished(solver):
-    end_at_once(solver)
+    end_at_result(solver)
     assert main(SMALL) == 130
     assert Path("out.nc").exists()
 
@@ -149,7 +153,7 @@ def test_a_folder_of_an_older_version_is_named_and_left_alone(solver, capsys):
 @pytest.mark.slow
 def test_a_result_of_another_study_is_replaced_by_a_finished_one_only(solver):
     assert main(SMALL) == 0
-    end_at_once(solver)
+    end_at_result(solver)
     assert main([*OTHER, "--overwrite"]) == 130
     assert name_in("out.nc") == "sdof_slider"
     solver.begin_again()
@@ -173,3 +177,56 @@ def test_in_python(capsys):
         run_study("two_masses", "out.nc", overrides=overrides, progress=False)
     with run_study("two_masses", "out.nc", overrides=overrides, progress=False, overwrite=True) as result:
         assert 'name = "two_masses"' in result.attrs["study"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", [VARIANT, LARGER, [*APART, "--fresh"]], ids=["variant", "larger", "fresh"])
+def test_a_finished_result_is_not_replaced_by_less(command, solver, folder, capsys):
+    assert main(APART) == 0
+    before = Path("out.nc").read_bytes()
+    capsys.readouterr()
+    solver.begin_again()
+    end_at_result(solver, 3)
+    assert main(command) == 130
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith("run-study: interrupted: ")
+    assert said.endswith("points are kept, out.nc is the finished result that it was, the same command goes on")
+    assert Path("out.nc").read_bytes() == before
+    # a finished one takes its place
+    solver.begin_again()
+    assert main(command) == 0
+    with xr.open_dataset("out.nc") as result:
+        assert (result.outcome == 0).all()
+        assert result.attrs[POINTS_LEFT] == 0
+
+
+@pytest.mark.slow
+def test_a_variant_leaves_the_work_of_the_first_study(solver):
+    assert main(APART) == 0
+    # what starts over is its own work alone
+    assert main([*VARIANT, "--fresh"]) == 0
+    for command in (APART, VARIANT):
+        solver.begin_again()
+        assert main(command) == 0
+        assert solver.tasks == []
+    assert main([*VARIANT, "--prune"]) == 0
+    assert solver.tasks == []
+    assert main(VARIANT) == 0
+    assert solver.tasks == []
+    for command in (APART, [*APART, "--fresh"]):
+        solver.begin_again()
+        assert main(command) == 0
+        assert len(solver.tasks) > 4
+
+
+def test_what_a_killed_run_has_left_of_a_result_goes(solver, folder):
+    """Also with the number of this process, as in containers, where all have the same."""
+    for name in (f".out.nc.{os.getpid()}.partial", ".out.nc.4711.partial", ".out.nc.0123456789ab.partial"):
+        Path(name).write_bytes(b"half a result")
+    for name in (".out.nc.notes.partial", ".other.nc.4711.partial"):
+        Path(name).touch()
+    Path(".out.nc.99.partial").symlink_to(".other.nc.4711.partial")
+    assert main(APART) == 0
+    left = {path.name for path in folder.iterdir()}
+    foreign = {".out.nc.99.partial", ".out.nc.notes.partial", ".other.nc.4711.partial"}
+    assert left == {"out.nc", "out.nc.progress", *foreign}

@@ -30,11 +30,15 @@ SLIDER = {
 SAMPLES = {"scatter.frequency": {"scatter.samples": 3}}
 
 
+def words_of(**more):
+    """Overrides of a study of the slider."""
+    given = {**SLIDER, **{name.replace("__", "."): value for name, value in more.items()}}
+    return [f"{key}='{value}'" if isinstance(value, str) else f"{key}={value}" for key, value in given.items()]
+
+
 def computed(path, **more):
     """The result of a study of the slider."""
-    given = {**SLIDER, **{name.replace("__", "."): value for name, value in more.items()}}
-    words = [f"{key}='{value}'" if isinstance(value, str) else f"{key}={value}" for key, value in given.items()]
-    return compute("sdof_slider", path, *words)
+    return compute("sdof_slider", path, *words_of(**more))
 
 
 @pytest.mark.slow
@@ -56,10 +60,9 @@ def test_the_frequency_of_each_count_is_in_the_result(capsys):
 @pytest.mark.slow
 def test_every_point_without_a_resonance_says_why(capsys):
     # so little excitation that the slider sticks: its resonance is far above the range
-    given = {**SLIDER, "axes.excitation_amplitude": 1.0, "slow_time.cycles": 10.0}
-    words = [f"{key}='{value}'" if isinstance(value, str) else f"{key}={value}" for key, value in given.items()]
-    scatter = ("scatter.samples=2", "scatter.excitation_amplitude={uniform={half_width=0.1}}")
-    assert main(arguments("sdof_slider", "none.nc", *words, *scatter)) == 3
+    words = words_of(axes__excitation_amplitude=1.0, slow_time__cycles=10.0, scatter__samples=2)
+    scatter = "scatter.excitation_amplitude={uniform={half_width=0.1}}"
+    assert main(arguments("sdof_slider", "none.nc", *words, scatter)) == 3
     said = capsys.readouterr().out
     with xr.open_dataset("none.nc") as found:
         messages = {str(message) for message in found.message.values.ravel()}
@@ -98,10 +101,8 @@ def test_each_scene_and_each_sample_has_its_own_frequency():
     one, other = of_scenes.excitation_frequency.squeeze().values
     # friction hardly moves the resonance from that of the mass on its spring
     assert one / other == pytest.approx(np.sqrt(1.1), rel=5e-3)
-    drawn = {"scatter__samples": 4, "scatter__mass": "{uniform={half_width=0.01}}"}
-    words = [f"{key}='{value}'" if isinstance(value, str) else f"{key}={value}" for key, value in SLIDER.items()]
-    words += [f"{name.replace('__', '.')}={value}" for name, value in drawn.items()]
-    samples = compute("sdof_slider", "samples.nc", *words, "slow_time.cycles=0", "axes.wear_coefficient=1.1e-11")
+    words = words_of(slow_time__cycles=0, axes__wear_coefficient=1.1e-11, scatter__samples=4)
+    samples = compute("sdof_slider", "samples.nc", *words, "scatter.mass={uniform={half_width=0.01}}")
     square = samples.excitation_frequency.squeeze() ** 2 * samples.sample_mass
     np.testing.assert_allclose(square, one**2 * 0.1, rtol=1e-2)
     assert float(samples.excitation_frequency.std()) > 1.0
@@ -121,11 +122,7 @@ def test_the_effective_study_is_the_same_study():
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        (
-            "axes.frequency",
-            "resonnance",
-            'axes.frequency = "resonnance": give a number in Hz, or "resonance" or "peak"',
-        ),
+        ("axes.frequency", "resonnance", '"resonnance": give a number in Hz, or "resonance" or "peak"'),
         ("axes.frequency", ["resonance", 200.0], 'give "resonance" alone'),
         ("axes.frequency", ["resonance", "peak"], "another study for the other"),
         ("axes.frequency", 200.0, 'loading = {"between": [180.0, 230.0]}: leave it out'),

@@ -17,7 +17,7 @@ from studyrunner.plan.cost_model import CostModel
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from tests.mpi.launching import results
 from tests.studyrunner.faked_runs import SMALL
-from tests.studyrunner.test_dispatch import Job
+from tests.studyrunner.test_schedule import Job
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.processes]
 

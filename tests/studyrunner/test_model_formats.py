@@ -5,11 +5,9 @@ import importlib.util
 import numpy as np
 import pytest
 
-from studyrunner.scene.scene import build_study_scene
-from studyrunner.study.study_file import read_study
-from studyrunner.user_error import UserError
 from tests.studies.fe_models.matrix_files import write_abaqus, write_nastran
 from tests.studies.fe_models.plates import Plates
+from tests.studyrunner.test_model_studies import message, scene_of
 
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
 needs_ansys = pytest.mark.skipif(
@@ -47,14 +45,10 @@ LEAST = 1e-8
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    (tmp_path / "lap.toml").write_text(STUDY)
+    (tmp_path / "wear.toml").write_text(STUDY)
     (tmp_path / "lap.inp").write_text(Plates().deck())
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def scene_of(*overrides):
-    return build_study_scene(read_study("lap.toml", overrides))
 
 
 def check_same(found, expected, tolerance=LEAST):
@@ -68,14 +62,6 @@ def check_same(found, expected, tolerance=LEAST):
         assert np.abs(ours[part] - theirs[part]).max() <= tolerance * np.abs(theirs[part]).max()
     ours, theirs = (np.linalg.eigvalsh(each.linear[0].stiffness[n:, n:]) for each in (found, expected))
     assert ours == pytest.approx(theirs, rel=10.0 * tolerance)
-
-
-def message(*overrides):
-    with pytest.raises(UserError) as caught:
-        scene_of(*overrides)
-    text = str(caught.value)
-    assert "\n" not in text
-    return text
 
 
 @pytest.mark.slow

@@ -91,10 +91,7 @@ def test_from_deck_to_worn_volume(folder, capsys):
 @pytest.mark.parametrize(
     ("overrides", "expected"),
     [
-        (
-            ['scene.contact=[["BLADS","DISKS"]]'],
-            'scene.contact: there is no surface or set of nodes "BLADS" in sector.inp: give BLADES',
-        ),
+        (['scene.contact=[["BLADS","DISKS"]]'], 'no surface or set of nodes "BLADS" in sector.inp: give BLADES'),
         (["scene.load.set=TOP"], 'wear.toml: scene.load.set: there is no set of nodes or surface "TOP"'),
         (["scene.response.tip.set=TPI"], 'scene.response.tip.set: there is no set of nodes or surface "TPI"'),
         (["scene.model=none.inp"], "scene.model: there is no file none.inp: give a path relative to the study file"),

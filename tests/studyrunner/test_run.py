@@ -18,13 +18,9 @@ from studyrunner.variables import ASKED, USUAL
 from tests.studyrunner.fakes import changed, fake_evaluate, totals_of, without_values
 from tests.studyrunner.histories import history
 
+pytestmark = pytest.mark.usefixtures("folder")
+
 SMALL = ["sdof_slider", "--set", "axes.frequency=[100, 110, 120]", "--set", "axes.scheme=implicit", "-o", "out.nc"]
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def use_fake(monkeypatch, change):

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.stats import norm
 
 from studyrunner.netcdf.sample_coordinates import sample_coordinates
 from studyrunner.plan.planning import build_tasks
@@ -78,13 +77,9 @@ def test_scatter_of_the_wear_coefficient_alone_is_one_history():
 
 @pytest.mark.slow
 def test_a_sample_is_the_study_of_its_drawn_values():
-    scatter = (
-        "scatter.samples=3",
-        FRICTION,
-        "scatter.frequency={normal={std=0.5}}",
-        "scatter.mass={normal={std=1e-3}}",
-    )
-    samples = compute("sdof_slider", "w.nc", *CHEAP, *scatter, "outputs.variables=['worn_volume', 'exact']")
+    scatter = ("scatter.frequency={normal={std=0.5}}", "scatter.mass={normal={std=1e-3}}")
+    asked = "outputs.variables=['worn_volume', 'exact']"
+    samples = compute("sdof_slider", "w.nc", *CHEAP, "scatter.samples=3", FRICTION, *scatter, asked)
     for number in range(3):
         sample = samples.isel(sample=number)
         own = [
@@ -92,8 +87,7 @@ def test_a_sample_is_the_study_of_its_drawn_values():
             f"scene.friction_coefficient={float(sample.sample_friction_coefficient)!r}",
             f"scene.mass={float(sample.sample_mass)!r}",
         ]
-        alone = compute("sdof_slider", "a.nc", *CHEAP, *own, "outputs.variables=['worn_volume', 'exact']")
-        same_values(sample, alone)
+        same_values(sample, compute("sdof_slider", "a.nc", *CHEAP, *own, asked))
     assert samples.sample_mass.attrs["units"] == "kg"
     assert samples.sample_frequency.attrs["units"] == "Hz"
 
@@ -159,34 +153,21 @@ def test_gaps_of_samples_with_scenes_of_their_own_are_drawn_once(monkeypatch):
 @pytest.mark.parametrize(
     ("overrides", "expected"),
     [
-        (["scatter=3"], "scatter = 3: give a table"),
         (["scatter.fricton_coefficient={normal={std=0.1}}"], "unknown input, give friction_coefficient"),
-        (["scatter.friction_coefficient=0.3"], "give a table with one distribution"),
         (["scatter.step={normal={std=0.1}}"], "scatter.step: unknown input"),
         (["scatter.threshold={normal={mean=1, std=0.1}}"], "scatter.threshold: unknown input"),
         (["wear.law=threshold", "wear.threshold=1", "scatter.threshold={normal={std=1}}"], "which threshold cannot be"),
         (["scatter.mass={normal={std=1}}"], "scatter.mass = -1.76"),
-        (["scatter.wear_coefficient={normal={relative_std=3}}"], "which wear_coefficient cannot be"),
-        (
-            ["axes.frequency=[100, 101]", "scatter.frequency={normal={mean=100, std=0.1}}"],
-            "give one value of axes.frequency",
-        ),
+        (["axes.frequency=[1, 2]", "scatter.frequency={normal={mean=1, std=0.1}}"], "give one value of axes.frequency"),
         (["scatter.gap={normal={std=1e-6}, of='each pair', correlation_length=1}"], "scatter.gap.correlation_length"),
-        (
-            ["scatter.area={normal={std=1e-6}}", "outputs.variables=['exact']"],
-            "the closed form knows nothing of the area",
-        ),
+        (["scatter.area={normal={std=1e-6}}", "outputs.variables=['exact']"], "the closed form knows nothing of the"),
         (["scatter.stiffness={normal={std=1}}", "outputs.scene=true"], "the study has 8 scenes"),
-        (
-            ["scatter.samples=1000000", FRICTION, "axes.frequency=[100, 101]"],
-            "scatter.samples = 1000000: give fewer values",
-        ),
+        (["scatter.samples=1000000", FRICTION, "axes.frequency=[1, 2]"], "scatter.samples = 1000000: give fewer value"),
         (["scatter.samples=1e7", FRICTION], "scatter.samples = 10000000.0: give a whole number"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_sentence(overrides, expected, capsys):
-    first = ["scatter.samples=8"] if "scatter=3" not in overrides else []
-    assert expected in refused("sdof_slider", ["axes.frequency=160", *first, *overrides], capsys)
+    assert expected in refused("sdof_slider", ["axes.frequency=160", "scatter.samples=8", *overrides], capsys)
 
 
 # --- numbers of [wear] ---
@@ -205,7 +186,6 @@ def test_factors_of_surfaces_scatter():
 
 @pytest.mark.slow
 def test_a_factor_of_a_surface_is_a_factor_of_the_volume():
-    asked = "outputs.variables=['default']"
     asked = "outputs.variables=['worn_volume', 'wear_depth']"
     scatter = "scatter={samples = 2, surfaces = {support = {uniform = {half_width = 0.4}}}}"
     samples = compute("sdof_slider", "w.nc", *CHEAP, asked, "wear.surfaces={support=0.5}", scatter)
@@ -221,17 +201,6 @@ SLIDING = (
     *("scene.normal_stiffness=0", "axes.frequency=160", "axes.wear_coefficient=1e-11", "solver.harmonics=3"),
     *("solver.samples=32", "slow_time.cycles=2000", "slow_time.outputs=2", "outputs.variables=['worn_volume']"),
 )
-
-
-@pytest.mark.slow
-def test_quantiles_of_a_lognormal_wear_coefficient_are_lognormal():
-    study = ("axes.scheme=adaptive", "scatter.samples=1024", WEAR)
-    samples = compute("sdof_slider", "w.nc", *SLIDING, *study)
-    alone = compute("sdof_slider", "a.nc", *SLIDING, "axes.scheme=adaptive")
-    found = worn_volume_statistics(samples).worn_volume_quantile.isel(cycle=-1).squeeze(drop=True)
-    expected = float(alone.worn_volume[..., -1].item()) * 1.5 ** norm.ppf(found["quantile"])
-    np.testing.assert_allclose(found.sel(bound="lowest"), expected, rtol=0.01)
-    np.testing.assert_allclose(found.sel(bound="highest"), expected, rtol=0.01)
 
 
 @pytest.mark.slow

@@ -7,9 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from solver.model import needed_nodal_diameters
+from solver.model import ReducedModel, needed_nodal_diameters
+from studies import build_scene
 from studies.scene_file import write_scene
 from studyrunner.cli import main
+from studyrunner.mpi.shared_memory import Address, open_shared
+from studyrunner.plan.planning import build_tasks
+from studyrunner.plan.tasks import BranchTask
 from studyrunner.scene.scene import (
     AUTOMATIC_HARMONICS_OF_A_WAVE,
     build_study_scene,
@@ -17,6 +21,7 @@ from studyrunner.scene.scene import (
     largest_harmonics,
     write_study_scene,
 )
+from studyrunner.scene_models import SceneModels
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.studies.scene_models import plain, sector
@@ -121,3 +126,57 @@ def test_the_friction_coefficient_is_given_once(rough_file, capsys):
     (line,) = capsys.readouterr().err.splitlines()
     assert "s.toml: scene.friction_coefficient" in line
     assert "missing: give it, or contact/friction_coefficient in the scene file" in line
+
+
+STIFFNESSES = (1.6e5, 1.7e5, 1.8e5)
+
+
+class Sent:
+    """What ranks 0 and 1, which share memory, and rank 2 get with tasks of three scenes."""
+
+    def __init__(self):
+        study = read_study("sdof_slider", [f"axes.stiffness={list(STIFFNESSES)}"])
+        self.branches = {branch.joint.scene: branch for branch in build_tasks(study, 2).branches}
+        self.models = [build_scene("sdof_slider", stiffness=stiffness) for stiffness in STIFFNESSES]
+        self.read: list[int] = []
+        self._handed = SceneModels(self._read, {0, 1})
+
+    def _read(self, scene):
+        self.read.append(scene)
+        return self.models[scene]
+
+    def __call__(self, rank, scene):
+        task = self._handed.with_model(rank, self.branches[scene])
+        assert isinstance(task, BranchTask)
+        return task.models[0] if task.models else None
+
+
+def test_ranks_that_share_memory_get_one_copy_and_others_their_own():
+    sent = Sent()
+    first, second = sent(0, 1), sent(1, 1)
+    assert isinstance(first, Address)
+    assert first == second
+    assert sent.read == [1]
+    model = open_shared(first)
+    assert isinstance(model, ReducedModel)
+    assert describe_scene(model).digest == describe_scene(sent.models[1]).digest
+    assert sent(1, 1) is None
+    assert sent(2, 1) is sent.models[1]
+    assert sent(2, 1) is None
+
+
+def test_a_copy_is_closed_once_no_rank_of_the_machine_holds_it():
+    sent = Sent()
+    address = sent(0, 0)
+    assert isinstance(address, Address)
+    assert sent(1, 0) == address
+    for scene in (1, 2):
+        sent(0, scene)
+    assert open_shared(address) is not None, "rank 1 may not have opened it yet"
+    for scene in (1, 2):
+        assert isinstance(sent(1, scene), Address)
+    with pytest.raises(OSError, match=r"No such file|another file"):
+        open_shared(address)
+    assert sent.read == [0, 1, 2]
+    assert isinstance(sent(0, 0), Address)
+    assert sent.read == [0, 1, 2, 0]

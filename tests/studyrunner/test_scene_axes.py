@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.accessor import join_results
 from studyrunner.cli import main
 from studyrunner.plan.planning import build_tasks
 from studyrunner.scene.scene_set import find_scenes
@@ -177,16 +176,6 @@ def test_width_that_each_scene_chooses_is_chosen_again():
     ]
     assert widths[0] == widths[1]
     assert widths[0][0] < widths[0][1]
-
-
-@pytest.mark.slow
-def test_results_with_an_axis_of_the_scene_are_joined():
-    low = compute("sdof_slider", "low.nc", *CHEAP, "axes.friction_coefficient=[0.3]")
-    high = compute("sdof_slider", "high.nc", *CHEAP, "axes.friction_coefficient=[0.4, 0.5]")
-    whole = compute("sdof_slider", "whole.nc", *CHEAP, "axes.friction_coefficient=[0.3, 0.4, 0.5]")
-    joined = join_results([low, high])
-    for name in ("worn_volume", "outcome", "response_amplitude"):
-        np.testing.assert_array_equal(joined[name], whole[name])
 
 
 def test_one_scene_of_several_is_neither_written_nor_kept(capsys):

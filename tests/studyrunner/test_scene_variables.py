@@ -8,14 +8,11 @@ import pytest
 import xarray as xr
 
 from studies.finite_element.joint.reduction import GluedStructureError, Reduction
-from studies.scene_answers import NaturalFrequencies
-from studies.scenes import scene_mesh
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
 from studyrunner.netcdf.output import progress_file
 from studyrunner.plan.planning import build_tasks
 from studyrunner.scene import computed
-from studyrunner.scene import variables as scene_variables
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.scene.scene_variables import exact_answers
 from studyrunner.scene.variables import build_scene_variables
@@ -75,25 +72,6 @@ def test_exact_answers_stand_at_their_points():
             one, other = exact_answers(alone)
             assert np.array_equal(one.values.ravel(), volume[frequency, 0, amplitude].ravel())
             assert np.array_equal(other.values.ravel(), response[frequency, 0, amplitude].ravel())
-
-
-@pytest.mark.slow
-def test_mesh_and_natural_frequencies_of_the_sector(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    values = np.arange(24 * 6.0).reshape(24, 6)
-    monkeypatch.setattr(scene_variables, "scene_frequencies", lambda *_: NaturalFrequencies(tuple(range(24)), values))
-    asked = "outputs.variables=['mesh', 'natural_frequency']"
-    assert main(["dovetail", "-o", "out.nc", *(part for text in (*COARSE, asked) for part in ("--set", text))]) == 0
-    mesh = scene_mesh("dovetail_sector", read_study("dovetail", COARSE).scene.parameters)
-    with xr.open_dataset("out.nc") as result:
-        assert "worn_volume" not in result
-        assert np.array_equal(result.natural_frequency.sel(nodal_diameter=3), values[3])
-        assert result.natural_frequency.sel(mode=1, nodal_diameter=2) == values[2, 0]
-        assert result.nodal_diameter.dtype == np.int32
-        assert np.array_equal(np.stack([result.mesh_x, result.mesh_y, result.mesh_z], axis=1), mesh.nodes)
-        assert np.array_equal(result.mesh_quad, mesh.quads)
-        assert result.mesh_quad.dtype == np.int32
-        assert result.mesh_part.values.tolist() == list(mesh.parts)
 
 
 def test_a_sector_that_spins_too_fast_is_bad_input(tmp_path, monkeypatch, capsys):

@@ -13,6 +13,7 @@ from studyrunner.netcdf.software import CHANGED, commit_of, describe_software
 from tests.studyrunner.faked_runs import SMALL
 
 WHO = ("-c", "user.name=a", "-c", "user.email=b")
+URL, GIT = "https://b.example/r", {"vcs": "git", "commit_id": "a" * 40}
 
 
 def git(folder, *arguments):
@@ -54,14 +55,8 @@ def test_the_commit_is_that_of_git(checkout):
         ("no json", {}),
         ("[1]", {}),
         (json.dumps({"url": "file:///home/me", "dir_info": {"editable": True}}), {}),
-        (
-            json.dumps({"url": "https://b.example/r", "vcs_info": {"vcs": "git", "commit_id": "a" * 40}}),
-            {"software_url": "https://b.example/r", "software_commit": "a" * 40},
-        ),
-        (
-            json.dumps({"url": "file:///home/me/r", "vcs_info": {"vcs": "git", "commit_id": "a" * 40}}),
-            {"software_commit": "a" * 40},
-        ),
+        (json.dumps({"url": URL, "vcs_info": GIT}), {"software_url": URL, "software_commit": "a" * 40}),
+        (json.dumps({"url": "file:///home/me/r", "vcs_info": GIT}), {"software_commit": "a" * 40}),
         (json.dumps({"url": 3, "vcs_info": {"commit_id": 4}}), {}),
     ],
 )
@@ -80,11 +75,12 @@ def test_a_package_from_a_repository_says_its_commit(direct_url, expected, tmp_p
 @pytest.mark.usefixtures("reader", "folder")
 def test_it_stands_in_the_result_and_is_no_part_of_it(solver, monkeypatch):
     found = []
-    for known in ({}, {"software_url": "https://b.example/r", "software_commit": "b" * 40}):
+    there = {"software_url": URL, "software_commit": "b" * 40}
+    for known in ({}, there):
         monkeypatch.setattr("studyrunner.run.describe_software", lambda _, known=known: known)
         assert main(SMALL) == 0
         with netCDF4.Dataset("out.nc") as file:
             found.append({name: file.getncattr(name) for name in file.ncattrs()})
         n_results = solver.n_results
-    assert found[1] == found[0] | {"software_url": "https://b.example/r", "software_commit": "b" * 40}
+    assert found[1] == found[0] | there
     assert n_results == 6

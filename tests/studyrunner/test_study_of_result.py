@@ -62,12 +62,6 @@ def options(*overrides):
     return [part for text in overrides for part in ("--set", text)]
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A folder with a scene file and its result."""
@@ -149,19 +143,6 @@ def test_mesh_and_model_come_back_bit_by_bit(folder):
     assert main(["out.nc", "--write-scene", "again.h5"]) == 0
     assert describe_scene(read_scene("again.h5", 2)).digest == digest
     assert main(["out.nc", "--plan"]) == 0
-
-
-@pytest.mark.slow
-def test_a_result_of_a_bundled_scene_runs_again(folder, capsys):
-    """Also one that holds what is asked for by name, sweeps and axes of words."""
-    overrides = ("axes.frequency=[160, 150]", "axes.harmonics=['auto', 3]", "outputs.variables=['default', 'exact']")
-    assert main(["sdof_slider", *options(*overrides, "slow_time.outputs=3", "slow_time.cycles=2000")]) == 0
-    Path("sdof_slider.nc").rename("renamed.nc")
-    Path("sdof_slider.nc.progress").unlink()
-    capsys.readouterr()
-    assert main(["renamed.nc"]) == 0
-    assert "scene_sha256" not in capsys.readouterr().err
-    xr.testing.assert_identical(results("sdof_slider.nc"), results("renamed.nc"))
 
 
 @pytest.mark.slow

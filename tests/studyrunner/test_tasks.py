@@ -81,18 +81,6 @@ def test_points_know_their_task():
                     assert values["step"] == scaled.step or task.scheme == "adaptive"
 
 
-def test_unworn_states_are_computed_once_for_each_wear_coefficient():
-    """Their motion is the same, but not their wear rate."""
-    study, plan = plan_of(*GRID, "slow_time.cycles=0")
-    assert all(task.held and task.cycles == (0.0,) for line in plan.marches for task in line)
-    assert sum(len(line) for line in plan.marches) == 2 * 3 * 8
-    assert [item.n_points for item in plan.left_out] == [3 * 2 * 3 * 8]
-    assert_every_point_once(study, plan)
-    for line in plan.marches:
-        for task in line:
-            assert {study.axes.wear_coefficient[point[1]] for point in task.points} == {task.wear_coefficient}
-
-
 def test_marches_cost_little_and_go_last_where_nothing_moves():
     _, plan = plan_of("axes.frequency=[1, 2]", "axes.step=[100, 1000]", "axes.scheme=implicit")
     planned = plan.marches_from(0, 0)

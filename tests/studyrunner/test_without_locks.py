@@ -12,17 +12,11 @@ from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.netcdf import gather
 from tests.mpi.launching import results
+from tests.studyrunner.faked_runs import SMALL as FAKED
 from tests.studyrunner.faked_runs import Solver
 from tests.studyrunner.test_store import assert_same, entries_of, fill, kept, key, put
 
-SMALL = [
-    "sdof_slider",
-    *("--set", "axes.frequency=[100, 110]"),
-    *("--set", "axes.wear_coefficient=[5e-12, 1e-11]"),
-    *("--set", "axes.scheme=implicit"),
-    *("--set", "solver.shortcuts=false"),
-    *("-o", "out.nc"),
-]
+SMALL = [*FAKED, "--set", "solver.shortcuts=false"]
 VARIANT = [*SMALL, "--set", "axes.excitation_amplitude=11"]
 
 
@@ -85,7 +79,7 @@ def test_two_studies_with_one_result_file_do_not_mix(at, monkeypatch):
     solver = Solver(monkeypatch)
     expected = {}
     for name, command in (("first.nc", SMALL), ("second.nc", VARIANT)):
-        assert main([*command[:-1], name] if command is SMALL else [*command, "-o", name]) == 0
+        assert main([*command, "-o", name]) == 0
         expected[name] = results(name)
     status: list[int] = []
 
@@ -108,7 +102,7 @@ def test_two_studies_with_one_result_file_do_not_mix(at, monkeypatch):
 def test_a_result_that_goes_during_the_run_is_no_result(change, monkeypatch):
     """As by a fault of the disk."""
     Solver(monkeypatch)
-    assert main([*SMALL[:-1], "whole.nc"]) == 0
+    assert main([*SMALL, "-o", "whole.nc"]) == 0
     own = gather._read_through
 
     def read_through(study, facts, completion):

@@ -76,28 +76,24 @@ def plane_of_symmetry(sector):
 
 
 CASES = {
-    "not matching": lambda: (Sector("C3D8", "C3D20R", (1, 3, 2), (1, 2, 2)), {}),
-    "through the cut faces": lambda: (Sector("C3D8", "C3D8", (1, 3, 2), (1, 3, 2), blade_shape=wedge_shape), {}),
-    "through the cut faces, not matching": lambda: (
-        Sector("C3D10", "C3D8", (1, 2, 1), (1, 5, 2), blade_shape=wedge_shape),
-        {},
+    "not matching": lambda: Sector("C3D8", "C3D20R", (1, 3, 2), (1, 2, 2)),
+    "through the cut faces": lambda: Sector("C3D8", "C3D8", (1, 3, 2), (1, 3, 2), blade_shape=wedge_shape),
+    "through the cut faces, not matching": lambda: Sector(
+        "C3D10", "C3D8", (1, 2, 1), (1, 5, 2), blade_shape=wedge_shape
     ),
+    "plane of symmetry": lambda: Sector("C3D8", "C3D8", (1, 3, 2), (1, 4, 2), blade_shape=wedge_shape),
 }
 
 
-@pytest.mark.parametrize("name", [*CASES, "plane of symmetry"])
+@pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("nodal_diameter", [0, 2, N_SECTORS // 2])
 @pytest.mark.parametrize("largest_kept_cut", [0, 900])
 def test_reduction_against_dense_constraints(name, nodal_diameter, largest_kept_cut, monkeypatch):
     # cut faces are kept to the last, or eliminated with their images at each nodal diameter
     monkeypatch.setattr(ordering, "_FEWEST_REUSES", 3)
     monkeypatch.setattr(ordering, "_LARGEST_KEPT_CUT", largest_kept_cut)
-    if name == "plane of symmetry":
-        sector = Sector("C3D8", "C3D8", (1, 3, 2), (1, 4, 2), blade_shape=wedge_shape)
-        joint = sector.joint(held=plane_of_symmetry(sector))
-    else:
-        sector, changes = CASES[name]()
-        joint = sector.joint(**changes)
+    sector = CASES[name]()
+    joint = sector.joint(held=plane_of_symmetry(sector)) if name == "plane of symmetry" else sector.joint()
     prepared = prepare_model(sector.model(), joint, n_reductions=3)
     pairs, forms = prepared.pairs, prepared.reduction.forms
     load = np.stack([prepared.static_load, joint.load.row(sector.mesh.n_nodes)], axis=1)

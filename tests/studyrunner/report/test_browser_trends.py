@@ -23,7 +23,6 @@ pytestmark = MARKS
 
 FOUR = {**AXES, "wear_coefficient": (5e-12, 1e-12, 5e-11), "excitation_amplitude": (0.5, 1.5)}
 SHAPE = (4, 3, 2, 1, 2, 1)
-N_POINTS, OTHERS = 48, 15
 FAILED = 30
 ERROR, PEAK, SHIFT = 1, 2, 3  # places in the lists; the worn volume stands first
 

@@ -17,23 +17,12 @@ from tests.studyrunner.report.figure_cases import (
 )
 from tests.studyrunner.report.figure_numbers import draw_figure
 
-ALL_DRAWINGS = [
-    "natural_frequencies",
-    "frequency_response",
-    "worn_volume",
-    "worn_volume_map",
-    "wear_rate_map",
-    "final_worn_volume",
-    "worn_root",
-    "pair_numbers",
-    "wear_depth",
-    "worn_profile",
-    "mean_pressure",
-    "fretting_loops",
-    "normal_load",
-    "pair_motion",
-    "estimated_errors",
-]
+ALL_DRAWINGS = (
+    "natural_frequencies frequency_response worn_volume worn_volume_map wear_rate_map final_worn_volume worn_root"
+    " pair_numbers wear_depth worn_profile mean_pressure fretting_loops normal_load pair_motion estimated_errors"
+)
+
+
 WITHOUT_UNITS = {"contact pair", "nodal diameter", "estimated relative error", "scheme", "sweep", ""}
 
 
@@ -73,7 +62,7 @@ ABSENT = {
     "no cycles": {"worn_volume", "worn_volume_map", "wear_depth", "worn_profile"},
     "nothing wears": {"worn_volume_map", "final_worn_volume", "wear_depth", "worn_profile"},
     "pairs nowhere": {"worn_profile"},
-    "all failed": set(ALL_DRAWINGS),
+    "all failed": set(ALL_DRAWINGS.split()),
 }
 """What is not drawn, as there is nothing to see."""
 
@@ -88,6 +77,8 @@ def test_no_figure_is_empty_and_all_axes_have_units(case):
     names = [item.name for item in items]
     assert len(set(names)) == len(names)
     assert not ABSENT.get(case, set()) & set(_names(items, Drawing))
+    if case == "complete":
+        assert (" ".join(_names(items, Drawing)), _names(items, Missing)) == (ALL_DRAWINGS, [])
     for item in items:
         assert item.title
         if isinstance(item, Drawing):
@@ -119,20 +110,12 @@ def _check_panels(drawing):
             assert label.endswith(")") or label in WITHOUT_UNITS, label
 
 
-@pytest.mark.slow
-def test_a_complete_file_gives_every_figure_in_its_order():
-    items = list(draw_report(_complete()))
-    assert _names(items, Drawing) == ALL_DRAWINGS
-    assert _names(items, Missing) == []
-
-
 def test_what_is_missing_says_which_output_to_ask_for():
     items = list(draw_report(CASES["nothing asked for"]()))
     sentences = {item.name: item.sentence for item in items if isinstance(item, Missing)}
-    assert sentences["worn_volume"] == "Add worn_volume to [outputs] variables."
-    assert sentences["frequency_response"] == "Add response_amplitude to [outputs] variables."
-    assert sentences["mean_pressure"] == "Add mean_pressure to [outputs] variables."
-    assert sentences["wear_depth"] == "Add wear_depth to [outputs] variables."
+    for name in ("worn_volume", "frequency_response", "mean_pressure", "wear_depth"):
+        variable = "response_amplitude" if name == "frequency_response" else name
+        assert sentences[name] == f"Add {variable} to [outputs] variables."
     assert "loops = [0]" in sentences["fretting_loops"]
     assert sentences["natural_frequencies"].startswith("Add natural_frequency and mesh to [outputs] variables.")
 
@@ -146,22 +129,29 @@ def test_all_points_failed():
     assert table.rows == (("3", "branch lost", "8", "The branch was lost.", "200 Hz, implicit scheme"),)
 
 
+def _pixels(path):
+    """Width of a picture."""
+    header = path.read_bytes()[:24]
+    assert header.startswith(b"\x89PNG")
+    return int.from_bytes(header[16:20])
+
+
 @pytest.mark.slow
-def test_figures_are_saved_as_svg_and_png(tmp_path):
+def test_figures_are_saved_as_svg_and_png_those_of_one_panel_for_a_column_too(tmp_path):
     before = dict(mpl.rcParams)
+    drawings = {item.name: item for item in draw_report(make_result()) if isinstance(item, Drawing)}
     # one in three dimensions is in the tests of the root; saving takes long
-    for item in draw_report(make_result()):
-        if isinstance(item, Drawing) and item.name in ("worn_volume", "wear_rate_map"):
-            svg, png = item.save(tmp_path)
-            assert svg.name == f"{item.name}.svg"
-            assert svg.read_text(encoding="utf-8").rstrip().endswith("</svg>")
-            assert svg.stat().st_size < 200_000
-            svg_bytes = svg.read_bytes()
-            header = png.read_bytes()[:24]
-            assert header.startswith(b"\x89PNG")
-            assert int.from_bytes(header[16:20]) == 2250  # 190 mm at 300 dpi
-            again = draw_figure(make_result(), item.name).save(tmp_path)[0]
-            assert again.read_bytes() == svg_bytes
+    for name, fits in (("final_worn_volume", True), ("worn_volume_map", False)):
+        assert drawings[name].fits_column == fits
+        svg, png = drawings[name].save(tmp_path)
+        content = svg.read_bytes()
+        assert content.rstrip().endswith(b"</svg>")
+        assert len(content) < 200_000
+        assert _pixels(png) == 2250  # 190 mm at 300 dpi
+        assert draw_figure(make_result(), name).save(tmp_path)[0].read_bytes() == content
+    assert _pixels(tmp_path / "final_worn_volume_column.png") == 1065  # 90 mm at 300 dpi
+    names = ("final_worn_volume", "final_worn_volume_column", "worn_volume_map")
+    assert {path.name for path in tmp_path.iterdir()} == {f"{name}.{kind}" for name in names for kind in ("svg", "png")}
     assert dict(mpl.rcParams) == before
 
 

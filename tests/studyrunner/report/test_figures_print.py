@@ -86,20 +86,3 @@ def test_a_legend_names_each_label_once_and_its_figure_grows():
         add_legend(empty)
     assert 3.0 < heights[0] < heights[1]
     assert not empty.legends
-
-
-@pytest.mark.slow
-def test_figures_of_one_panel_are_saved_for_a_column_too(tmp_path):
-    drawings = {item.name: item for item in draw_report(make_result()) if isinstance(item, Drawing)}
-    assert drawings["final_worn_volume"].fits_column
-    assert not drawings["worn_volume_map"].fits_column
-    for name in ("final_worn_volume", "worn_volume_map"):
-        drawings[name].save(tmp_path)
-    expected = {f"{name}.{suffix}" for name in drawings for suffix in ("svg", "png") if "worn_volume" in name}
-    found = {path.name for path in tmp_path.iterdir()}
-    assert found == {each for each in expected if each.startswith(("final_worn_volume", "worn_volume_map"))} | {
-        "final_worn_volume_column.svg",
-        "final_worn_volume_column.png",
-    }
-    pixels = (tmp_path / "final_worn_volume_column.png").read_bytes()[16:20]
-    assert int.from_bytes(pixels) == 1065  # 90 mm at 300 dpi

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from studyrunner.api import open_result
 from studyrunner.report.reading.choice import choose
 from studyrunner.report.reading.result import open_for_report
 from studyrunner.report.reading.units import scale_for, show_cycles, show_number, show_power
@@ -24,6 +25,9 @@ def test_a_result_file_is_opened_lazily(tmp_path):
     result.close()
 
 
+NO_POINT = xr.Dataset({"outcome": ("frequency", np.zeros(0, np.int8))}, {"cycle": [0.0], "contact": [0]})
+
+
 @pytest.mark.parametrize(
     ("content", "remedy"),
     [
@@ -31,23 +35,18 @@ def test_a_result_file_is_opened_lazily(tmp_path):
         (b"no NetCDF at all", "is no NetCDF file"),
         (b"", "is no NetCDF file"),
         (xr.Dataset({"a": ("x", [1.0])}), "holds no outcome and no cycle and no contact"),
-        (
-            xr.Dataset(
-                {"outcome": ("frequency", np.zeros(0, dtype=np.int8))},
-                {"cycle": ("cycle", [0.0]), "contact": ("contact", [0])},
-            ),
-            "holds no point",
-        ),
+        (NO_POINT, "holds no point"),
     ],
 )
-def test_what_is_no_result_file_is_refused_in_one_line(tmp_path, content, remedy):
+@pytest.mark.parametrize("opening", [open_for_report, open_result])
+def test_what_is_no_result_file_is_refused_in_one_line(tmp_path, opening, content, remedy):
     path = tmp_path / "file.nc"
     if isinstance(content, bytes):
         path.write_bytes(content)
-    elif isinstance(content, xr.Dataset):
+    elif content is not None:
         content.to_netcdf(path)
     with pytest.raises(UserError) as caught:
-        open_for_report(path)
+        opening(path)
     assert remedy in str(caught.value)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -111,11 +110,4 @@ def test_numbers_in_words():
     assert show_cycles(123456.0) == "123\N{NO-BREAK SPACE}456 cycles"
     assert show_cycles(1) == "1 cycle"
     assert show_cycles(0) == "0 cycles"
-    assert [show_power(value) for value in (1.0, 0.1, 1e-12, 1e4, 2e-3, 0.0)] == [
-        "1",
-        "10⁻¹",
-        "10⁻¹²",
-        "10⁴",
-        "0.002",
-        "",
-    ]
+    assert " ".join(map(show_power, (1.0, 0.1, 1e-12, 1e4, 2e-3, 0.0))) == "1 10⁻¹ 10⁻¹² 10⁴ 0.002 "

@@ -6,7 +6,6 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-import xarray as xr
 
 from studyrunner.report.drawing import style
 from studyrunner.report.figures.flank import draw_flanks
@@ -19,7 +18,6 @@ from studyrunner.report.reading.scene_pairs import last_depth, of_scene, of_show
 from studyrunner.report.reading.schema_check import check_dataset
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.vtu import find_writer
-from studyrunner.user_error import UserError
 from tests.studyrunner.report.scatter_cases import mesh_file, sample_file
 from tests.studyrunner.report.test_page_data import decode
 
@@ -115,36 +113,3 @@ def test_the_root_of_one_scene_is_written(kind, n_files, request, tmp_path):
     mesh = meshio.read(tmp_path / "vtu" / f"root_{n_files - 1:04d}.vtu")
     expected = last_depth(result, result.shown_point())
     assert np.nanmax(mesh.point_data["wear_depth (m)"]) == np.nanmax(expected)
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        ("cycle", np.zeros(3)),
-        (("contact", "sample"), np.zeros((24, 64))),
-        (("sample", "frequency"), np.zeros((64, 2))),
-        ("sample", np.array(["text"] * 64)),
-        ("sample", np.full(64, np.nan)),
-        ("sample", np.full(64, 1e31)),
-    ],
-)
-def test_drawn_values_that_lie_are_refused(wrong):
-    with pytest.raises(UserError, match="sample_other"):
-        check_dataset(sample_file().assign_coords(sample_other=wrong), "samples.nc")
-
-
-def test_too_many_inputs_or_values_are_refused(monkeypatch):
-    from studyrunner.report.reading import schema_check
-
-    monkeypatch.setattr(schema_check, "_MOST_DRAWN", 100)
-    with pytest.raises(UserError, match="sample_gap"):
-        check_dataset(sample_file(), "samples.nc")
-    monkeypatch.setattr(schema_check, "_MOST_INPUTS", 2)
-    with pytest.raises(UserError, match="3 inputs"):
-        check_dataset(sample_file(), "samples.nc")
-
-
-def test_a_result_without_samples_has_no_drawn_values():
-    dataset: xr.Dataset = sample_file().isel(sample=0, drop=True)
-    with pytest.raises(UserError, match="sample_gap: dimensions contact"):
-        check_dataset(dataset, "samples.nc")

@@ -12,12 +12,14 @@ import pytest
 import xarray as xr
 
 from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
+from studyrunner.report.reading import schema_check
 from studyrunner.report.reading.result import open_for_report
 from studyrunner.report.reading.schema_check import check_dataset, check_numbers
 from studyrunner.user_error import UserError
 from tests.studyrunner.own_time import Stopwatch
 from tests.studyrunner.report.page_cases import build_file
 from tests.studyrunner.report.scatter_cases import sample_file
+from tests.studyrunner.result_mutations import replace_variable
 
 pytestmark = pytest.mark.usefixtures("reader")
 
@@ -49,8 +51,6 @@ def attribute(name, value, variable=""):
 def study(text):
     def change(file):
         del file.attrs["study"]
-        file.create_dataset("text", data=0).attrs["x"] = 0
-        del file["text"]
         file.attrs.create("study", text, dtype=h5py.string_dtype("utf-8"))
 
     return change
@@ -88,20 +88,7 @@ def values(name, place, value):
 
 def other_kind(name, content):
     """A variable of another type, its dimensions as before."""
-
-    def change(file):
-        old = file[name]
-        scales = [dict(dimension.items()) for dimension in old.dims]
-        attributes = {key: old.attrs[key] for key in ("_Netcdf4Coordinates",) if key in old.attrs}
-        shape = old.shape
-        del file[name]
-        new = file.create_dataset(name, data=np.broadcast_to(np.asarray(content), shape))
-        new.attrs.update(attributes)
-        for number, found in enumerate(scales):
-            for scale in found.values():
-                new.dims[number].attach_scale(scale)
-
-    return change
+    return lambda file: replace_variable(file, name, np.full(file[name].shape, content), file[name].ndim)
 
 
 REFUSED = {
@@ -177,12 +164,9 @@ def test_choices_are_numbers_or_auto(text, tmp_path, monkeypatch, capsys):
 @pytest.mark.slow
 def test_numbers_that_are_damaged_where_they_are_large(folder, capsys):
     """What is not read beforehand shows its damage while it is drawn."""
-    made = build_file(
-        axes={"frequency": np.linspace(190.0, 200.0, 200), "scheme": ("implicit", "explicit")}, cycles=range(160)
-    )
-    shape = made["wear_depth"].shape
-    encoding = {"wear_depth": {"zlib": True, "chunksizes": shape}}
-    made.to_netcdf("large.nc", encoding=encoding)
+    axes = {"frequency": np.linspace(190.0, 200.0, 200), "scheme": ("implicit", "explicit")}
+    made = build_file(axes, cycles=range(160))
+    made.to_netcdf("large.nc", encoding={"wear_depth": {"zlib": True, "chunksizes": made["wear_depth"].shape}})
     with h5py.File("large.nc") as file:
         place = file["wear_depth"].id.get_chunk_info(0)
         assert file["wear_depth"].size * 8 > 2**23
@@ -194,23 +178,46 @@ def test_numbers_that_are_damaged_where_they_are_large(folder, capsys):
     assert line == "study-report: large.nc: the file = damaged: give a result file of run-study that is whole"
 
 
+def gaps(*dimensions, missing=0):
+    """Drawn values of pairs along these dimensions. missing: number of pairs that no sample has."""
+
+    def change(dataset):
+        gap = np.ones([dataset.sizes[name] for name in dimensions])
+        gap[..., :missing] = np.nan
+        return dataset.assign_coords(sample_gap=(dimensions, gap, {"units": "m"}))
+
+    return change
+
+
+def other_input(dimensions, values):
+    return lambda dataset: dataset.assign_coords(sample_other=(dimensions, values))
+
+
 @pytest.mark.parametrize(
-    ("dimensions", "missing", "right"),
+    ("change", "wrong"),
     [
-        (("sample", "contact"), 0, True),
-        (("frequency", "sample", "contact"), 1, True),
-        (("frequency", "sample", "contact"), 100, False),
-        (("sample", "frequency", "contact"), 0, False),
-        (("frequency", "contact"), 0, False),
-        (("contact", "sample"), 0, False),
-        (("frequency", "scheme", "sample"), 0, False),
+        (gaps("sample", "contact"), ""),
+        (gaps("frequency", "sample", "contact", missing=1), ""),
+        (gaps("frequency", "sample", "contact", missing=100), "sample_gap: "),
+        (gaps("sample", "frequency", "contact"), "sample_gap: "),
+        (gaps("frequency", "contact"), "sample_gap: "),
+        (gaps("contact", "sample"), "sample_gap: "),
+        (gaps("frequency", "scheme", "sample"), "sample_gap: "),
+        (lambda dataset: dataset.isel(sample=0, drop=True), "sample_gap: dimensions contact"),
+        (other_input("cycle", np.zeros(3)), "sample_other"),
+        (other_input("sample", np.array(["text"] * 4)), "sample_other"),
+        (other_input("sample", np.full(4, np.nan)), "sample_other"),
+        (other_input("sample", np.full(4, 1e31)), "sample_other"),
     ],
 )
-def test_drawn_values_of_pairs_are_along_any_axes_in_order(dimensions, missing, right):
-    """missing: number of pairs that no sample has."""
-    dataset = sample_file(4)
-    gap = np.ones([dataset.sizes[name] for name in dimensions])
-    gap[..., :missing] = np.nan
-    dataset = dataset.assign_coords(sample_gap=(dimensions, gap, {"units": "m"}))
-    with contextlib.nullcontext() if right else pytest.raises(UserError, match="sample_gap: "):
+def test_drawn_values_are_along_any_axes_in_order(change, wrong):
+    dataset = change(sample_file(4))
+    with pytest.raises(UserError, match=wrong) if wrong else contextlib.nullcontext():
         xr.testing.assert_equal(check_dataset(dataset, "s.nc").sample_gap.variable, dataset.sample_gap.variable)
+
+
+def test_too_many_drawn_inputs_or_values_are_refused(monkeypatch):
+    for name, most, said in (("_MOST_DRAWN", 100, "sample_gap"), ("_MOST_INPUTS", 2, "3 inputs")):
+        monkeypatch.setattr(schema_check, name, most)
+        with pytest.raises(UserError, match=said):
+            check_dataset(sample_file(), "samples.nc")
