@@ -34,8 +34,13 @@ from studies.finite_element.condensation.ordered_form import OrderedForm
 # 27, 21, 17 and 16 CPU s.
 _LARGE = 1400
 _LARGE_FOR_EACH = 2.0
-_ROUND_OFF = 1e-14  # of a unit displacement of the boundary: what shapes may lose
+# Of a unit displacement of the boundary: what shapes may lose. With 336 pairs 1e-14, 1e-12 and 1e-10 leave 818, 694 and
+# 547 of 1008 shapes below the slot (by singular values); 1e-12 changes mass and damping by up to 1e-11 of a diagonal
+# entry with 336 pairs.
+_LOST = 1e-12
+_WORTH = 0.8  # of the shapes: the most that combined shapes may be, to be worth their making
 _FEW = 48  # shapes that are not worth being combined
+_STEPS = 16  # so many steps to as many combined shapes as there are shapes; 8 or 32 take the time of 16 to 3 %
 _PROBES = 8
 
 
@@ -63,10 +68,9 @@ class Projection:
         # All is done with the conjugate, whose fronts are there in C's order.
         driven = driven.conj()
         totals = [driven.conj().T @ (form.kept(dissection, self.phase).conj() @ driven) for form in self.forms]
-        large = max(_LARGE, _LARGE_FOR_EACH * driven.shape[1])
         for root in dissection.roots:
             places = dissection.fronts[root].boundary - dissection.n_eliminated
-            self._add_child(root, driven[dofs_of(places)], totals, large)
+            self._add_child(root, driven[dofs_of(places)], totals)
         return [np.asarray(0.5 * (total + total.conj().T)).conj() for total in totals]
 
     def condense(self) -> list[Dense]:
@@ -79,19 +83,18 @@ class Projection:
                 total[np.ix_(places, places)] += mirrored(part)
         return totals
 
-    def _add_child(self, number: int, boundary: Dense, totals: list[Dense], large: float) -> None:
+    def _add_child(self, number: int, boundary: Dense, totals: list[Dense]) -> None:
         """Adds what a front and those below it have on shapes with displacements `boundary` (n, n_shapes)."""
-        if self._largest[number] <= large:
-            for total, part in zip(totals, self._condensed(number), strict=True):
-                # as a matrix in C's order the lower triangle is the conjugate
-                total += boundary.conj().T @ times(mirrored(part).conj(), boundary)
-            return
-        few, combined = _narrowed(boundary)
-        parts = self._on_shapes(number, few, large)
+        few, combined = (boundary, None) if self._largest[number] <= _LARGE else _narrowed(boundary)
+        if self._largest[number] <= max(_LARGE, _LARGE_FOR_EACH * few.shape[1]):
+            # as a matrix in C's order the lower triangle is the conjugate
+            parts = [few.conj().T @ times(mirrored(part).conj(), few) for part in self._condensed(number)]
+        else:
+            parts = self._on_shapes(number, few)
         for total, part in zip(totals, parts, strict=True):
             total += part if combined is None else combined.conj().T @ (part @ combined)
 
-    def _on_shapes(self, number: int, boundary: Dense, large: float) -> list[Dense]:
+    def _on_shapes(self, number: int, boundary: Dense) -> list[Dense]:
         """Forms of a front and those below it on shapes with the displacements `boundary` (n, n_shapes)."""
         front, factor = self.factor.dissection.fronts[number], self.factor.fronts[number]
         own = -solve_lower(factor.lower, times(factor.below.T, boundary), transposed=True)
@@ -107,7 +110,7 @@ class Projection:
             n = int(np.searchsorted(places, front.stop))
             inner = dofs_of(places[:n] - front.first)
             outer = len(own) + dofs_of(np.searchsorted(front.boundary, places[n:]))
-            self._add_child(child, shapes[np.concatenate([inner, outer])], totals, large)
+            self._add_child(child, shapes[np.concatenate([inner, outer])], totals)
         return totals
 
     def _condensed(self, number: int) -> list[Dense]:
@@ -143,20 +146,23 @@ def _condense(own: Dense, below: Dense, update: Dense, shapes: Dense) -> Dense:
 
 
 def _narrowed(shapes: Dense) -> tuple[Dense, Dense | None]:
-    """`few, combined` with `shapes = few @ combined` to round-off, the rows of `combined` orthonormal.
+    """`few, combined` with `shapes = few @ combined` to `_LOST`, the rows of `combined` orthonormal.
 
     None for `combined` where shapes are as few as can be.
     """
     n, n_shapes = shapes.shape
-    size = max(_FEW, n_shapes // 8)
     rng = np.random.default_rng(0)
     probes = rng.standard_normal((n_shapes, _PROBES))
-    wanted = shapes @ probes
-    while size <= n_shapes // 2:
-        sample = rng.standard_normal((size, n)) @ shapes
-        combined = qr(sample.conj().T, mode="economic", overwrite_a=True, check_finite=False)[0].conj().T
-        few = shapes @ combined.conj().T
-        if np.abs(wanted - few @ (combined @ probes)).max() <= _ROUND_OFF * np.sqrt(n_shapes):
-            return np.ascontiguousarray(few), np.ascontiguousarray(combined)
-        size *= 2
+    step = max(_FEW, n_shapes // _STEPS)
+    combined = np.zeros((0, n_shapes), dtype=shapes.dtype)
+    while len(combined) + step <= _WORTH * n_shapes:
+        # rows of the shapes, those that are known taken out of them: twice, for round-off
+        sample = rng.standard_normal((step, n)) @ shapes
+        for _ in range(2):
+            sample -= (sample @ combined.conj().T) @ combined
+            sample = qr(sample.conj().T, mode="economic", overwrite_a=True, check_finite=False)[0].conj().T
+        combined = np.concatenate([combined, sample])
+        probes = probes - sample.conj().T @ (sample @ probes)
+        if np.abs(shapes @ probes).max() <= _LOST * np.sqrt(n_shapes):
+            return np.ascontiguousarray(shapes @ combined.conj().T), combined
     return shapes, None
