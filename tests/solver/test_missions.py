@@ -376,7 +376,7 @@ def test_a_vibration_is_late_by_its_decay_time():
     assert fast.sweep_rate == pytest.approx(7.0 / (30.0 / (2.0 * np.pi)) ** 2)
     assert slow.sweep_rate == pytest.approx(0.01 * fast.sweep_rate)
     # as if the largest wear over frequency were missed, or added, over the lag
-    states = _states(case(7.0), Passage(180.0, 220.0, 7.0), np.linspace(190.0, 210.0, 41))
+    states = _states(case(7.0), Passage(180.0, 220.0, 7.0), np.linspace(190.0, 210.0, 41), None)
     assert isinstance(states, list)
     most = max(float(each.density[0]) for each in states)
     assert fast.growth_error - slow.growth_error == pytest.approx(6.93 / 30.0 * most / fast.growth[0], rel=0.02)
