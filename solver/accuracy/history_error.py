@@ -19,7 +19,7 @@ class HistoryError:
 
     worn_volume (n_output,): relative; 0 where nothing has worn.
     wear_depth (n_output, n_contact): m.
-    response, wear_rate (n_output,): relative, of the state at a count.
+    response, wear_rate (n_output,): relative, of the state at a count; NaN beyond the end of the history.
     """
 
     worn_volume: FloatArray
@@ -116,6 +116,8 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
         )
     )
     response = np.fmax(response, _change_within(volume, error, steps, area))
+    # beyond the end of the history nothing is known, not even an error
+    response, rate = (np.where(reached, each, np.nan) for each in (response, rate))
     return HistoryError(relative, of_pairs, response, rate)
 
 

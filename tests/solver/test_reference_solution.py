@@ -233,3 +233,13 @@ def test_a_response_is_not_known_better_than_the_worn_volume():
     assert wrong[1] > 0.0
     assert found.response[1] == pytest.approx(wrong[1] * 0.5 / 3.0)
     assert found.response[2] == pytest.approx(wrong[2] * 0.5 / 3.0 / 1.5)
+
+
+def test_a_count_that_the_history_does_not_reach_has_no_errors():
+    nothing = {name: [1e-3, 1e-3, np.nan] for name in ("response_error", "wear_rate_error", "local")}
+    nothing |= {name: [[1.0], [1.0], [np.nan]] for name in ("response", "response_peak")}
+    ended = read([[0.0, 0.0], [1.0, 1.0], [np.nan, np.nan]], ((1.0, 1.0), (1.0, 1.0), (np.nan, np.nan)), **nothing)
+    found = error_of(ended, ended, "adaptive")
+    for errors in (found.worn_volume, found.response, found.wear_rate):
+        assert np.isfinite(errors).tolist() == [True, True, False]
+        assert np.isnan(errors[2])
