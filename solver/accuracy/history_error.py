@@ -19,7 +19,8 @@ class HistoryError:
 
     worn_volume (n_output,): relative; 0 where nothing has worn.
     wear_depth (n_output, n_contact): m.
-    response, wear_rate (n_output,): relative, of the state at a count; NaN beyond the end of the history.
+    response, wear_rate (n_output,): relative, of the state at a count.
+    All are NaN beyond the end of the history.
     """
 
     worn_volume: FloatArray
@@ -103,9 +104,11 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
     relative[~reached] = np.nan
     # no pair is known better than the volume: one that agrees with the reference solution does so by chance. Without
     # this 5 and 7 of 24 deep pairs of the dovetail at 211.25 and 211.375 Hz are outside of their errors, by seven times
+    of_pair = np.minimum(ACCURACY.pair_over_volume, np.sqrt(_pairs_that_count(depth * area))) * relative
     with np.errstate(invalid="ignore"):
-        of_pairs = np.fmax(np.fmax(difference, crossing(apart)), np.where(depth > 0.0, relative[:, None] * depth, 0.0))
+        of_pairs = np.fmax(np.fmax(difference, crossing(apart)), np.where(depth > 0.0, of_pair[:, None] * depth, 0.0))
     of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
+    of_pairs[~reached] = np.nan
     # an unworn state has errors of its own, from states with more harmonics
     unworn = (counts == 0.0) | (volume <= 0.0)
     response, rate = (
@@ -153,6 +156,16 @@ def _start_error(fine: Mapping[str, Any], reference: Mapping[str, Any], area: Fl
     rate, other = fine["depth_rate"][0] * area, reference["depth_rate"][0] * area
     whole = float(rate.sum())
     return float(np.abs(rate - other).sum()) / whole if whole > 0.0 and np.isfinite(other).all() else 0.0
+
+
+def _pairs_that_count(volumes: FloatArray) -> FloatArray:
+    """Number (n,) of equal pairs that would share the volume as these (n, n_contact); 1 where nothing has worn.
+
+    The relative error of the volume is smaller than that of its pairs by the root of this number where their errors are
+    independent.
+    """
+    squares = (volumes**2).sum(axis=1)
+    return np.divide(volumes.sum(axis=1) ** 2, squares, out=np.ones_like(squares), where=squares > 0.0)
 
 
 def _depth_change(both: Both) -> FloatArray:

@@ -30,7 +30,7 @@ import numpy as np
 import scipy.linalg
 from numba import njit
 
-from solver.model import FloatArray, ReducedModel
+from solver.model import ComplexArray, FloatArray, ReducedModel
 
 _LOAD_STEPS = 20  # of the static load
 _CONTACT_ITERATIONS = 90
@@ -66,7 +66,7 @@ class Structure:
     limits: FloatArray
     dofs: np.ndarray
     load: FloatArray
-    mode: FloatArray
+    mode: ComplexArray
     rate: complex
 
 
@@ -99,12 +99,16 @@ def build(model: ReducedModel, friction: float, frequency: float, amplitude: flo
     mass, damping, stiffness = (np.real(part) for part in (linear.mass, linear.damping, linear.stiffness))
     dofs = model.contact.dofs
     free = np.setdiff1d(np.arange(len(mass)), dofs[dofs >= 0])
-    mode, rate = np.zeros(len(mass)), 0.0 + 0.0j
+    mode, rate = np.zeros(len(mass), dtype=complex), 0.0 + 0.0j
     if free.size and np.abs(mass[np.ix_(free, free)]).max() > 0.0:
         squares, shapes = scipy.linalg.eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)])
-        nearest = int(np.argmin(np.abs(np.sqrt(np.abs(squares)) - omega)))
-        mode[free] = shapes[:, nearest]
-        rate = -0.5 * float(mode @ damping @ mode) + 1j * float(np.sqrt(squares[nearest]))
+        nearest = squares[np.argmin(np.abs(np.sqrt(np.abs(squares)) - omega))]
+        # of several modes with one frequency that which the excitation moves: the wave on a ring of sectors
+        shapes = shapes[:, np.abs(squares - nearest) <= 1e-6 * nearest]
+        mode[free] = shapes @ (shapes.T @ linear.load_harmonic[free])
+        size = np.sqrt(np.real(mode.conj() @ mass @ mode))
+        mode = mode / size if size > 0.0 else mode
+        rate = -0.5 * complex(mode.conj() @ damping @ mode).real + 1j * float(np.sqrt(nearest)) if size > 0.0 else 0.0
     return Structure(
         omega, step, weights, mass, damping, np.linalg.inv(weights[0] ** 2 * mass + weights[0] * damping + stiffness),
         linear.load_static, amplitude * linear.load_harmonic.real, -amplitude * linear.load_harmonic.imag,
@@ -255,9 +259,9 @@ def at_rest(model: ReducedModel, structure: Structure, gap: FloatArray) -> Motio
 
 def amplitude_of_mode(structure: Structure, motion: Motion) -> complex:
     """Complex amplitude Q of the glued mode at the end of a period, phase 0: q = Re Q, q' = Re(i omega Q)."""
-    share = structure.mode @ structure.inertia
+    share = structure.mode.conj() @ structure.inertia
     mean = share @ motion.responses.mean(axis=0)
-    return complex(share @ motion.x[0] - mean, -(share @ motion.v[0]) / structure.omega)
+    return complex(share @ motion.x[0] - mean - 1j * (share @ motion.v[0]) / structure.omega)
 
 
 def push_mode(structure: Structure, motion: Motion, change: complex) -> Motion:
@@ -265,8 +269,8 @@ def push_mode(structure: Structure, motion: Motion, change: complex) -> Motion:
     turns = change * np.exp(-1j * structure.omega * structure.step * np.arange(2))
     return replace(
         motion,
-        x=motion.x + np.outer(turns.real, structure.mode),
-        v=motion.v + np.outer((1j * structure.omega * turns).real, structure.mode),
+        x=motion.x + np.outer(turns, structure.mode).real,
+        v=motion.v + np.outer(1j * structure.omega * turns, structure.mode).real,
     )
 
 
@@ -288,7 +292,7 @@ def settle(
         moved = one_period(structure, motion, gap)
         change = amplitude_of_mode(structure, moved) - here
         size = max(abs(here), 1e-300)
-        faint = _FAINT_WORK * np.pi * size * abs(structure.mode @ (structure.cosine - 1j * structure.sine))
+        faint = _FAINT_WORK * np.pi * size * abs(structure.mode.conj() @ (structure.cosine - 1j * structure.sine))
         still = np.abs(moved.work - work).max() <= work_change * max(float(moved.work.max()), faint)
         calm = calm + 1 if still and abs(change / growth) <= _SETTLED * size else 0
         if calm >= 2:

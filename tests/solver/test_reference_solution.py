@@ -163,6 +163,7 @@ def read(depth, rate=((1.0, 1.0), (1.0, 1.0), (1.0, 1.0)), **other):
 
 
 DEPTH = [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]
+LESS_KNOWN = 3.0 / 5.0**0.5  # root of the number of equal pairs that share a volume as these two, of areas 1 and 2, do
 
 
 def at_step(value):
@@ -183,10 +184,13 @@ def test_an_error_adds_up_what_differs_at_each_pair():
     found = error_of(read(DEPTH), read(other), "implicit")
     safety = ACCURACY.history_safety
     assert found.worn_volume == pytest.approx([0.0, safety * 0.4 / 3.0, safety * 0.8 / 6.0])
-    # the second pair differs by a tenth, but no pair is known better than the volume
+    # the second pair differs by a tenth, but of pairs of volumes 1 and 2 none is known better than the volume times
+    # the root of 9 / 5
     apart = safety * np.abs(np.subtract(DEPTH, other))
-    assert found.wear_depth[:, 0] == pytest.approx(apart[:, 0])
-    assert found.wear_depth[:, 1] == pytest.approx(found.worn_volume * [0.0, 1.0, 2.0])
+    assert found.wear_depth[:, 0] == pytest.approx(
+        np.fmax(apart[:, 0], LESS_KNOWN * found.worn_volume * [0.0, 1.0, 2.0])
+    )
+    assert found.wear_depth[:, 1] == pytest.approx(LESS_KNOWN * found.worn_volume * [0.0, 1.0, 2.0])
     assert (found.wear_depth[1:, 1] > apart[1:, 1]).all()
     assert found.response == pytest.approx(np.full(3, 1e-3))
     assert found.wear_rate == pytest.approx(np.zeros(3))
@@ -197,14 +201,23 @@ def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing():
     found = error_of(fine, read(DEPTH), "adaptive")
     assert found.worn_volume == pytest.approx([0.0, 0.1, 0.1])
     # it falls to the pairs as they are worn
-    assert found.wear_depth == pytest.approx(0.1 * np.array(DEPTH))
+    assert found.wear_depth == pytest.approx(LESS_KNOWN * 0.1 * np.array(DEPTH))
     # between the outputs, at a step, all values of the reference solution differ; at the outputs they agree
-    steps = Both(np.array([1.5]), at_step(2.0), at_step(2.5))
+    steps = Both(np.array([1.5]), at_step(2.0), at_step(2.5) | {"wear_depth": np.array([[2.5, 2.0]])})
     crossing, safety = error_of(fine, read(DEPTH), "adaptive", steps), ACCURACY.history_safety
-    assert crossing.worn_volume == pytest.approx([0.0, 0.1, safety * 1.5 / 6.0])
-    assert crossing.wear_depth[2] == pytest.approx([safety * 0.5] * 2)
+    assert crossing.worn_volume == pytest.approx([0.0, 0.1, safety * 0.5 / 6.0])
+    assert crossing.wear_depth[2] == pytest.approx([safety * 0.5, LESS_KNOWN * safety * 0.5 / 6.0 * 2.0])
     assert crossing.response == pytest.approx([1e-3, 1e-3, safety * 0.25])
     assert crossing.wear_rate == pytest.approx([0.0, 0.0, safety * 0.25])
+
+
+@pytest.mark.parametrize(("worn", "less"), [([1.0, 0.0, 0.0, 0.0, 0.0], 1.0), ([1.0] * 5, ACCURACY.pair_over_volume)])
+def test_one_pair_is_known_as_the_volume_and_one_of_many_half_as_well(worn, less):
+    depth = np.outer([0.0, 1.0, 2.0], worn)
+    fine = read(depth, local=[0.0, 0.1, 0.2], depth_rate=np.ones((3, 5)))
+    nowhere = {name: value[:0] for name, value in at_step(0.0).items()} | {"wear_depth": np.zeros((0, 5))}
+    found = history_error(Both(COUNTS, fine, fine), Both(np.zeros(0), nowhere, nowhere), np.ones(5), "adaptive")
+    assert found.wear_depth == pytest.approx(less * found.worn_volume[:, None] * depth)
 
 
 def test_what_nothing_confirms_is_not_known():
@@ -240,6 +253,6 @@ def test_a_count_that_the_history_does_not_reach_has_no_errors():
     nothing |= {name: [[1.0], [1.0], [np.nan]] for name in ("response", "response_peak")}
     ended = read([[0.0, 0.0], [1.0, 1.0], [np.nan, np.nan]], ((1.0, 1.0), (1.0, 1.0), (np.nan, np.nan)), **nothing)
     found = error_of(ended, ended, "adaptive")
-    for errors in (found.worn_volume, found.response, found.wear_rate):
+    for errors in (found.worn_volume, found.response, found.wear_rate, found.wear_depth[:, 0]):
         assert np.isfinite(errors).tolist() == [True, True, False]
         assert np.isnan(errors[2])
