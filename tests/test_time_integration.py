@@ -1,23 +1,27 @@
-"""The plain time integration of the benchmarks: against closed forms, and nonlinear modes against its free decay."""
+"""The plain time integration of the benchmarks: closed forms, free decay against nonlinear modes, travelling waves."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from solver import backbone, build_model
+from solver import backbone, build_model, frequency_response
 from tests.benchmarks.free_decay import decay_of, free_decay
+from tests.benchmarks.ring_of_sectors import ring_of_sectors
 from tests.benchmarks.time_integration import (
     at_rest,
     build,
     first_harmonic,
     fitted_weights,
+    loaded,
     one_period,
+    ramp,
     settle,
     wear,
 )
 from tests.references import den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
-from tests.solver.models import scene
+from tests.solver.models import cyclic_model, glued_frequency, scene
+from tests.solver.reconstruction import harmonic_structure
 
 MASS, STIFFNESS, FREQUENCY, FORCE = 0.1, 1.6e5, 160.0, 10.0
 OMEGA = 2.0 * np.pi * FREQUENCY
@@ -116,3 +120,31 @@ def test_a_nonlinear_mode_is_what_its_free_decay_shows_at_three_amplitudes():
         seen, damped = (np.interp(tip, amplitude[::-1], of[::-1]) for of in (frequency, damping))
         assert seen == pytest.approx(mode.frequency[place], rel=2e-3)
         assert damped == pytest.approx(mode.damping_ratio[place], rel=0.05)
+
+
+@pytest.mark.parametrize(("n_sectors", "nodal_diameter", "n_sectors_apart"), [(6, 2, 3), (7, 3, 7), (5, 2, 5)])
+def test_a_ring_moves_in_each_wave_as_the_sector_of_this_harmonic(n_sectors, nodal_diameter, n_sectors_apart):
+    model = cyclic_model(3, ("3d", "one_tangent"), n_sectors, nodal_diameter, n_sectors_apart)
+    ring = ring_of_sectors(model)
+    assert ring.contact.n_contact == n_sectors_apart * model.contact.n_contact
+    for harmonic in range(n_sectors_apart):
+        one = harmonic_structure(model, harmonic)
+        shape = np.array([1.0, 1j]) @ np.random.default_rng(harmonic).standard_normal((2, len(one.mass)))
+        wave = np.exp(2j * np.pi * harmonic * nodal_diameter / n_sectors * np.arange(n_sectors_apart))
+        for name in ("mass", "damping", "stiffness"):
+            moved = getattr(ring.linear[0], name) @ np.kron(wave, shape)
+            np.testing.assert_allclose(moved, np.kron(wave, getattr(one, name) @ shape), rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_travelling_wave_in_time_is_the_periodic_state_of_its_sector():
+    model = cyclic_model(5, ("3d", "3d"), 6, 2, 21)
+    frequency, force = 0.93 * glued_frequency(model), 20.0
+    found = frequency_response(model, np.array([frequency]), force, 0.4)
+    ring = ring_of_sectors(model)
+    structure, motion = loaded(ring, 0.4, ramp(frequency, force, 60), 240)
+    work = motion.work.reshape(3, 2)
+    np.testing.assert_allclose(work, work[[0]].repeat(3, axis=0), rtol=1e-3)
+    tip = first_harmonic(structure, motion, ring.linear[0].response)
+    assert np.linalg.norm(tip - found.response[0]) <= (found.response_error[0] + 5e-3) * np.linalg.norm(tip)
+    assert (motion.work > 0.0).all()

@@ -165,7 +165,7 @@ def _pairs_that_count(volumes: FloatArray) -> FloatArray:
     independent.
     """
     squares = (volumes**2).sum(axis=1)
-    return np.divide(volumes.sum(axis=1) ** 2, squares, out=np.ones_like(squares), where=squares > 0.0)
+    return np.asarray(np.divide(volumes.sum(axis=1) ** 2, squares, out=np.ones_like(squares), where=squares > 0.0))
 
 
 def _depth_change(both: Both) -> FloatArray:

@@ -40,6 +40,7 @@ _FAINT_WORK = 1e-5  # of the work of the excitation: slip work below which no ch
 _MOST_PERIODS = 3000
 _HELD = 1000  # periods after a run-up or ramp, in which the first mode dies out to 0.1 %
 _AHEAD = 15.0  # periods in one of the glued mode; |1 + 15 (mu - 1)| < 1 for its multiplier mu
+_GROWTH = 1.05  # from period to period, of the change of the mode, above which fewer are taken in one
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Structure:
     - inertia, drag (n, n): M and C. flexibility (n, n): G, m/N.
     - static (n,), cosine, sine (n,): loads, N. limits: friction coefficients (n_contact,).
     - dofs (n_contact, 3), load (n_contact,): displacements of the pairs, -1 for none; constant normal forces, N.
-    - mode (n,), rate: glued mode nearest to the excitation, mass-normalised, and its exponent, 1/s; zeros for none.
+    - mode (n,), rate: mass-normalised glued mode that the excitation moves most, its exponent, 1/s; zeros for none.
     """
 
     omega: float
@@ -102,13 +103,14 @@ def build(model: ReducedModel, friction: float, frequency: float, amplitude: flo
     mode, rate = np.zeros(len(mass), dtype=complex), 0.0 + 0.0j
     if free.size and np.abs(mass[np.ix_(free, free)]).max() > 0.0:
         squares, shapes = scipy.linalg.eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)])
-        nearest = squares[np.argmin(np.abs(np.sqrt(np.abs(squares)) - omega))]
-        # of several modes with one frequency that which the excitation moves: the wave on a ring of sectors
-        shapes = shapes[:, np.abs(squares - nearest) <= 1e-6 * nearest]
+        moved = np.abs(shapes.T @ linear.load_harmonic[free]) / np.abs(squares - omega**2)
+        most = squares[np.argmax(moved)]
+        # two modes of one frequency make the wave on a ring of sectors
+        shapes = shapes[:, np.abs(squares - most) <= 1e-6 * most]
         mode[free] = shapes @ (shapes.T @ linear.load_harmonic[free])
         size = np.sqrt(np.real(mode.conj() @ mass @ mode))
         mode = mode / size if size > 0.0 else mode
-        rate = -0.5 * complex(mode.conj() @ damping @ mode).real + 1j * float(np.sqrt(nearest)) if size > 0.0 else 0.0
+        rate = -0.5 * complex(mode.conj() @ damping @ mode).real + 1j * float(np.sqrt(most)) if size > 0.0 else 0.0
     return Structure(
         omega, step, weights, mass, damping, np.linalg.inv(weights[0] ** 2 * mass + weights[0] * damping + stiffness),
         linear.load_static, amplitude * linear.load_harmonic.real, -amplitude * linear.load_harmonic.imag,
@@ -329,14 +331,16 @@ def wear(
 ) -> Iterator[tuple[float, FloatArray, Motion]]:
     """Cycle count, depths (n_contact,), m, and motion after each period, in which the joint wears `each` cycles."""
     depth, cycle, work = np.zeros(model.contact.n_contact), 0.0, motion.work
-    amplitude = amplitude_of_mode(structure, motion)
+    amplitude, change, ahead = amplitude_of_mode(structure, motion), 0.0j, _AHEAD
     while cycle < cycles * (1.0 - 1e-12):
         taken = min(each, cycles - cycle)
         moved = one_period(structure, motion, model.contact.gap + depth)
         depth = depth + taken * wear_coefficient * 0.5 * (work + moved.work) / model.contact.area
-        cycle, work, here = cycle + taken, moved.work, amplitude_of_mode(structure, moved)
-        further = (_AHEAD - 1.0) * (here - amplitude)
-        motion, amplitude = push_mode(structure, moved, further), here + further
+        cycle, work, here, before = cycle + taken, moved.work, amplitude_of_mode(structure, moved), change
+        change = here - amplitude
+        # a worn joint has another resonance than a glued one: beside it the beat of the mode would grow
+        ahead = max(0.5 * ahead, 1.0) if abs(change) > _GROWTH * abs(before) else min(1.1 * ahead, _AHEAD)
+        motion, amplitude = push_mode(structure, moved, (ahead - 1.0) * change), here + (ahead - 1.0) * change
         yield cycle, depth, motion
 
 
