@@ -8,21 +8,8 @@ from typing import Any
 
 import numpy as np
 import pyHarm  # type: ignore[import-not-found]
-from pyHarm.Elements.NodeToNodeElements.DLFTElements.DLFTFriction import (  # type: ignore[import-not-found]
-    DLFTFriction,
-)
 
 ARC = 20.0  # rad/s along the curve: steps of about 3 Hz
-
-
-class RigidFriction(DLFTFriction):  # type: ignore[misc]
-    """pyHarm's rigid friction to the ground, which counts as no body: as it is, the force is divided by two bodies."""
-
-    factory_keyword = "RigidFriction"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.nbSub = 1
 
 
 def curve(asked: dict[str, Any]) -> dict[str, Any]:
@@ -31,15 +18,11 @@ def curve(asked: dict[str, Any]) -> dict[str, Any]:
     if asked["kind"] == "rigid":
         # The penalty of DLFT is the user's: with that of the mount the error at 5 harmonics is 38 % in the median.
         friction = {"type": "DLFTFriction", "eps": 1e3 * asked["mount"]}
-    if asked["kind"] == "rigid, own element":
-        # with that of the mount Newton's method does not find the first point
-        friction = {"type": "RigidFriction", "eps": 10.0 * asked["mount"]}
     matrices = {"M": asked["mass"], "C": asked["damping"], "K": asked["mount"], "G": 0.0}
     place = {"connect": {"slider": [0]}, "dirs": [0]}
     matrix = {name: np.array([[value]]) for name, value in matrices.items()}
     newton = {"tol_residual": 1e-6, "tol_delta_x": 1e-9, "max_iter": 60}
     study = {
-        "plugin": [RigidFriction],
         "system": {"type": "Base", "nh": asked["harmonics"], "nti": asked["samples"], "adim": {"status": False}},
         "substructures": {"slider": {"matrix": matrix, "ndofs": 1, "nnodes": 1}},
         "connectors": {

@@ -109,7 +109,7 @@ def slider(pyharm: Run, tmdsimpy: Run, nlvib: Run) -> None:
         for harmonics in (*HARMONICS, None):
             own_curve(kind, harmonics)
             show("fretwear", kind, harmonics or "auto, rtol 1 %", own_curve(kind, harmonics))
-    attempt("pyHarm", lambda: peer_rows("pyHarm", ("elastic", "rigid", "rigid, own element"), pyharm))
+    attempt("pyHarm", lambda: peer_rows("pyHarm", ("elastic", "rigid"), pyharm))
     attempt("tmdsimpy", lambda: peer_rows("tmdsimpy", ("elastic",), tmdsimpy))
     attempt("NLvib", lambda: peer_rows("NLvib", ("elastic",), nlvib))
 
