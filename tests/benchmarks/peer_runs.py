@@ -23,7 +23,7 @@ def environment(folder: Path, name: str, packages: tuple[str, ...]) -> str:
     python = folder / name / "bin" / "python"
     if not python.exists():
         venv.create(folder / name, with_pip=True)
-        subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True, capture_output=True, text=True)
+    subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True, capture_output=True, text=True)
     return str(python)
 
 

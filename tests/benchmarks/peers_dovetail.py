@@ -109,8 +109,8 @@ class Table:
         self.file, self.model = file, build_scene("dovetail_sector", mesh=1)
         self.known: dict[float, float] = {}  # true amplitudes, m, by frequency, Hz
         print(
-            "\n| program | contact | N/m | harmonics | points, failed attempts | iterations | CPU time |"
-            " largest amplitude | error of the first harmonic |\n|---|---|---|---|---|---|---|---|---|"
+            "\n| program | contact | N/m | harmonics | points | failed attempts | iterations | CPU time |"
+            " largest amplitude | error of the first harmonic |\n|---|---|---|---|---|---|---|---|---|---|"
         )
 
     def truth(self, frequencies: FloatArray) -> FloatArray:
@@ -125,14 +125,14 @@ class Table:
     def show(self, name: str, contact: str, harmonics: int | str, curve: Curve) -> None:
         """Prints a row."""
         if not curve["frequency"]:
-            print(f"| {name} | {contact} | {harmonics} | 0, {curve['failed']} | | | | |", flush=True)
+            print(f"| {name} | {contact} | {harmonics} | 0 | {curve['failed']} | | | | |", flush=True)
             return
         frequencies, amplitudes = np.array(curve["frequency"]), np.array(curve["amplitude"])
         errors = np.abs(amplitudes / self.truth(frequencies) - 1.0)
         largest, worst, middle = int(np.argmax(amplitudes)), int(np.argmax(errors)), float(np.median(errors))
         print(
-            f"| {name} | {contact} | {harmonics} | {frequencies.size}, {curve['failed']} |"
-            f" {curve['iterations']:.0f} | {curve['seconds']:.1f} s |"
+            f"| {name} | {contact} | {harmonics} | {frequencies.size}, to {frequencies.max():.1f} Hz |"
+            f" {curve['failed']} | {curve['iterations']:.0f} | {curve['seconds']:.1f} s |"
             f" {1e3 * amplitudes[largest]:.3f} mm at {frequencies[largest]:.3f} Hz |"
             f" {100.0 * errors[worst]:.2f} % at {frequencies[worst]:.3f} Hz, median {100.0 * middle:.2f} % |",
             flush=True,
