@@ -51,6 +51,7 @@ def attempt(name: str, run: Callable[[], None]) -> None:
     try:
         run()
     except (subprocess.CalledProcessError, FileNotFoundError) as error:
-        said = (getattr(error, "stderr", None) or str(error)).strip().splitlines()
-        said = [line for line in said if "preparing to exit" not in line]  # what Octave adds to any error
-        print(f"{name} is not run here: {said[-1] if said else 'no message'}", flush=True)
+        said = (getattr(error, "stderr", None) or str(error)).strip().splitlines() or ["no message"]
+        # Octave says first what is wrong, Python last
+        why = next((line for line in said if line.startswith("error: ")), said[-1])
+        print(f"{name} is not run here: {why}", flush=True)
