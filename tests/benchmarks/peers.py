@@ -1,25 +1,21 @@
-"""Other harmonic balance programs on the same slider, each in an environment of its own.
+"""Other harmonic balance programs on the same slider and the same dovetail, each in an environment of its own.
 
-    python -m tests.benchmarks.peers [--folder ~/.cache/fretwear_peers] [--tmdsimpy FOLDER]
+    python -m tests.benchmarks.peers [--folder ~/.cache/fretwear_peers] [--tmdsimpy FOLDER] [--nlvib FOLDER]
 
 One response curve of a mass of 0.1 kg on a mount (1.6e5 N/m, 20 N s/m) under 10 N, held by friction of 5 N from 120 to
 250 Hz: rigid friction, and elastic friction behind a spring of 1.6e6 N/m. Printed are the CPU time of the second of two
 equal runs (compiling is left out), Newton iterations, and the largest error of the first harmonic against the exact
-motion at the frequencies that the program has chosen.
+motion at the frequencies that the program has chosen. Then one curve of the dovetail: see `peers_dovetail`.
 
-Environments are built in the folder, pyHarm from the package index. tmdsimpy is no package: `--tmdsimpy` names a copy
-of its repository, without it git fetches one. What cannot be had is said in a sentence, and the others go on. NLvib is
-not run: it needs MATLAB or Octave.
+Environments are built in the folder, pyHarm and JAX from the package index. tmdsimpy and NLvib are no packages:
+`--tmdsimpy` and `--nlvib` name copies of their repositories, without them git fetches them. NLvib runs under Octave
+(`octave-cli`). What cannot be had is said in a sentence, and the others go on.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import subprocess
-import sys
 import time
-import venv
 from pathlib import Path
 
 import numpy as np
@@ -29,12 +25,16 @@ from solver.compliant_contact import TANGENTIAL_RATIO
 from solver.loading_history.start_states import follow_branch
 from solver.settings import SolverSettings
 from studies import build_scene
+from tests.benchmarks import peers_dovetail
+from tests.benchmarks.peer_runs import Curve, Run, attempt, curve_of, environment, repository
 from tests.references import slider_orbit
 from tests.solver.random_orbits import behind_spring
 
 MASS, DAMPING, MOUNT, FORCE, FRICTION, SPRING = 0.1, 20.0, 1.6e5, 10.0, 5.0, 1.6e6
 FIRST, LAST, N_FREQUENCIES = 120.0, 250.0, 27
 HARMONICS, SAMPLES = (5, 13), 256
+PYHARM, JAX = ("pyharm-os==1.2.2",), ("jax[cpu]", "scipy")
+TMDSIMPY, NLVIB = "https://github.com/tmd-lab/tmdsimpy", "https://github.com/maltekrack/NLvib"
 SLIDER = {
     "mass": MASS,
     "damping": DAMPING,
@@ -47,9 +47,6 @@ SLIDER = {
     "n_frequencies": N_FREQUENCIES,
     "samples": SAMPLES,
 }
-PYHARM = "pyharm-os==1.2.2"
-TMDSIMPY = "https://github.com/tmd-lab/tmdsimpy"
-Curve = dict[str, list[float] | float]
 
 
 def exact(kind: str, frequency: float) -> float:
@@ -82,28 +79,11 @@ def own_curve(kind: str, harmonics: int | None) -> Curve:
     }
 
 
-def environment(folder: Path, package: str) -> Path:
-    """Interpreter of an environment with the package. Raises CalledProcessError."""
-    place = folder / package.partition("=")[0]
-    python = place / "bin" / "python"
-    if not python.exists():
-        venv.create(place, with_pip=True)
-    subprocess.run([python, "-m", "pip", "install", "-q", package], check=True, capture_output=True, text=True)
-    return python
-
-
-def peer_curve(python: Path, script: str, source: Path | None, kind: str, harmonics: int) -> Curve:
-    """The curve of another program, by its script in this folder. Raises CalledProcessError."""
-    asked = {
-        "source": None if source is None else str(source),
-        "kind": kind,
-        "harmonics": harmonics,
-        **SLIDER,
-    }
-    command = [str(python), str(Path(__file__).with_name(script)), json.dumps(asked)]
-    done = subprocess.run(command, check=True, capture_output=True, text=True)
-    curve: Curve = json.loads(done.stdout.splitlines()[-1])
-    return curve
+def peer_rows(name: str, kinds: tuple[str, ...], run: Run) -> None:
+    """Prints the rows of another program. Raises CalledProcessError."""
+    for kind in kinds:
+        for harmonics in HARMONICS:
+            show(name, kind, harmonics, run({"kind": kind, "harmonics": harmonics, **SLIDER}))
 
 
 def show(name: str, kind: str, harmonics: int | str, curve: Curve) -> None:
@@ -121,50 +101,48 @@ def show(name: str, kind: str, harmonics: int | str, curve: Curve) -> None:
     )
 
 
-def tmdsimpy_copy(folder: Path, given: Path | None) -> Path:
-    """A copy of the repository of tmdsimpy. Raises CalledProcessError."""
-    if given is not None:
-        return given
-    place = folder / "tmdsimpy"
-    if not place.exists():
-        subprocess.run(
-            ["git", "clone", "-q", "--depth", "1", TMDSIMPY, place], check=True, capture_output=True, text=True
-        )
-    return place
-
-
-def main() -> None:
-    """Builds the environments and prints the table."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--folder", type=Path, default=Path.home() / ".cache" / "fretwear_peers")
-    parser.add_argument("--tmdsimpy", type=Path)
-    given = parser.parse_args()
-    given.folder.mkdir(parents=True, exist_ok=True)
+def slider(pyharm: Run, tmdsimpy: Run, nlvib: Run) -> None:
+    """Prints the table of the slider."""
     print("| program | friction | harmonics | points | iterations | CPU time | error of the first harmonic |")
     print("|---|---|---|---|---|---|---|")
     for kind in ("elastic", "rigid"):
         for harmonics in (*HARMONICS, None):
             own_curve(kind, harmonics)
             show("fretwear", kind, harmonics or "auto, rtol 1 %", own_curve(kind, harmonics))
-    peers = {
-        "pyHarm": lambda: (environment(given.folder, PYHARM), "peer_pyharm.py", None, ("elastic", "rigid")),
-        "tmdsimpy": lambda: (
-            Path(sys.executable),
-            "peer_tmdsimpy.py",
-            tmdsimpy_copy(given.folder, given.tmdsimpy),
-            ("elastic",),
-        ),
-    }
-    for name, prepare in peers.items():
-        try:
-            python, script, source, kinds = prepare()
-            for kind in kinds:
-                for harmonics in HARMONICS:
-                    show(name, kind, harmonics, peer_curve(python, script, source, kind, harmonics))
-        except subprocess.CalledProcessError as error:
-            said = (error.stderr or "").strip().splitlines() or ["no message"]
-            print(f"{name} is not run here: {said[-1]}")
-    print("NLvib is not run: it needs MATLAB or Octave.")
+    attempt("pyHarm", lambda: peer_rows("pyHarm", ("elastic", "rigid"), pyharm))
+    attempt("tmdsimpy", lambda: peer_rows("tmdsimpy", ("elastic",), tmdsimpy))
+    attempt("NLvib", lambda: peer_rows("NLvib", ("elastic",), nlvib))
+
+
+def main() -> None:
+    """Builds the environments and prints the tables."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--folder", type=Path, default=Path.home() / ".cache" / "fretwear_peers")
+    parser.add_argument("--tmdsimpy", type=Path)
+    parser.add_argument("--nlvib", type=Path)
+    given = parser.parse_args()
+    folder = given.folder.resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    tmdsimpy_copy = (given.tmdsimpy or folder / "tmdsimpy_copy").resolve()
+    nlvib_copy = (given.nlvib or folder / "nlvib_copy").resolve()
+
+    def pyharm(script: str) -> Run:
+        return lambda asked: curve_of([environment(folder, "pyharm", PYHARM)], script, asked)
+
+    def tmdsimpy(script: str) -> Run:
+        return lambda asked: curve_of(
+            [environment(folder, "tmdsimpy", JAX)], script, {**asked, "source": repository(tmdsimpy_copy, TMDSIMPY)}
+        )
+
+    def nlvib(asked: dict[str, object]) -> Curve:
+        return curve_of(["octave-cli", "-q"], "peer_nlvib.m", {**asked, "source": repository(nlvib_copy, NLVIB)})
+
+    slider(pyharm("peer_pyharm.py"), tmdsimpy("peer_tmdsimpy.py"), nlvib)
+    dovetail = peers_dovetail.Table(folder / "dovetail.npz")
+    dovetail.own_rows()
+    attempt("pyHarm", lambda: dovetail.peer_rows("pyHarm", pyharm("peer_pyharm_dovetail.py")))
+    attempt("tmdsimpy", lambda: dovetail.peer_rows("tmdsimpy", tmdsimpy("peer_tmdsimpy_dovetail.py")))
+    print("NLvib has no friction whose normal force changes.")
 
 
 if __name__ == "__main__":

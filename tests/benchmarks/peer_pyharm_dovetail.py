@@ -1,0 +1,159 @@
+"""The dovetail of `peers` by pyHarm, in its environment: prints JSON. pyHarm is made for joints of this kind.
+
+- `Penalty3D` is pyHarm's: a spring closes the gap, friction of Coulomb behind springs follows the normal force.
+- `DLFT3D` is pyHarm's rigid contact, unchanged. Between a body and the ground it divides the force by two bodies, so a
+  pair is a spring of twice the penalty; the derivative of the linear forces is missing in its Jacobian.
+- `Rigid` is the same law with the ground counted as no body, and with that derivative.
+
+pyHarm's closing is negative: the normal displacements change their sign.
+"""
+
+import json
+import logging
+import sys
+import time
+from typing import Any
+
+import jax
+import numpy as np
+import pyHarm  # type: ignore[import-not-found]
+from pyHarm.Elements.NodeToNodeElements.DLFTElements.DLFT3D import (  # type: ignore[import-not-found]
+    DLFT3D,
+    DLFTFriction3DResidual_jax,
+)
+from pyHarm.Elements.SubstructureMatrixElements.MatrixElement import MatrixElement  # type: ignore[import-not-found]
+from pyHarm.Systems.System import System  # type: ignore[import-not-found]
+
+PRESSED = 1e-9  # N; pyHarm's Penalty3D takes a pair that is pressed, with none it has friction only where it is open
+_slopes = jax.jit(jax.jacfwd(DLFTFriction3DResidual_jax, argnums=(0, 2)))
+
+
+class Load(MatrixElement):  # type: ignore[misc]
+    """Static load and first cosine on all displacements of the root; pyHarm's own forcing takes one at a time."""
+
+    factory_keyword = "Load"
+
+    def _generateMatrices(self, data: dict[str, Any]) -> None:  # noqa: N802
+        self.load = np.zeros(len(self.nabla) * len(data["static"]))
+        self.load[: 2 * len(data["static"])] = np.concatenate([data["static"], data["cosine"]])
+
+    def __flag_update__(self) -> None:
+        self.flag_extforcing, self.flag_elemtype = True, -1
+
+    def adim(self, *_: float) -> None:
+        """Nothing: the system keeps its units."""
+
+    def evalResidual(self, *_: Any) -> Any:  # noqa: N802
+        """Force on the left side, N."""
+        return -self.load
+
+    def evalJacobian(self, *_: Any) -> Any:  # noqa: N802
+        """Zero, for displacements and frequency."""
+        return np.zeros((self.load.size, self.load.size)), np.zeros(self.load.size)
+
+
+class Rigid(DLFT3D):  # type: ignore[misc]
+    """pyHarm's rigid contact, to the ground."""
+
+    factory_keyword = "Rigid"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.nbSub = 1
+
+    def evalJacobian(self, x: Any, omega: float, Rglin: Any, dJgdomlin: Any, **_: Any) -> Any:  # noqa: N802
+        """Derivatives, those by the linear forces beside (`through`)."""
+        own = (self.Pdir, self.Pslave, self.Pmaster, self.mu, self.N0, self.g, self.eps, self.D["ft"], self.D["tf"])
+        direct, through = _slopes(x[self.indices], omega, Rglin[self.indices], float(self.nbSub), *own)
+        self.through = np.asarray(through)
+        return np.asarray(direct), self.through @ dJgdomlin[self.indices]
+
+
+class WholeSlope(System):  # type: ignore[misc]
+    """A system whose rigid pairs see all displacements through the linear forces."""
+
+    factory_keyword = "WholeSlope"
+
+    def _jacobian(self, elements: Any, x: Any, **known: Any) -> Any:
+        slope, by_omega = super()._jacobian(elements, x, **known)
+        for pair in elements if "dJgdxlin" in known else ():
+            slope[pair.indices] += pair.through @ known["dJgdxlin"][pair.indices]
+        return slope, by_omega
+
+
+def study_of(asked: dict[str, Any], model: dict[str, Any]) -> dict[str, Any]:
+    """The input of pyHarm: pairs of three displacements, then modes."""
+    n_pairs, omega = asked["pairs"], 2.0 * np.pi * np.array(asked["frequency"])
+    springs = {"k_n": asked["stiffness"], "k_t": asked["stiffness"], "N0": PRESSED}
+    law = springs if asked["element"] == "Penalty3D" else {"eps": asked["stiffness"], "N0": 0.0}
+    pair = {"type": asked["element"], "mu": asked["friction"], "g": 0.0, "dirs": [0, 1, 2], **law}
+    newton = {"tol_residual": asked["tolerance"], "tol_delta_x": 1e-9, "max_iter": asked["most"]}
+    matrix = {name: model[name] for name in "MCK"} | {"G": np.zeros_like(model["M"])}
+    step = float(omega[1] - omega[0])
+    return {
+        "plugin": [Load, Rigid, WholeSlope],
+        "system": {
+            "type": "WholeSlope" if asked["element"] == "Rigid" else "Base",
+            "nh": asked["harmonics"],
+            "nti": asked["samples"],
+            "adim": {"status": False},
+        },
+        "substructures": {
+            "root": {"matrix": matrix, "ndofs": 3, "nnodes": n_pairs, "nmodes": len(model["M"]) - 3 * n_pairs}
+        },
+        "connectors": {
+            "load": {"type": "Load", "connect": "root", "static": model["static"], "cosine": model["cosine"]},
+            **{f"pair{i}": {**pair, "connect": {"root": [i]}} for i in range(n_pairs)},
+        },
+        "kinematics": {},
+        "analysis": {
+            "curve": {
+                "study": "frf",
+                "solver": "NewtonRaphson",
+                "solver_options": newton,
+                "predictor": "previous",
+                "corrector": "nocontinuation",
+                "verbose": False,
+                "puls_inf": float(omega[0]),
+                "puls_sup": float(omega[-1]) - 1e-3 * step,
+                "ds0": step,
+                "ds_max": step,
+                "ds_min": step / 64.0,
+            }
+        },
+    }
+
+
+def curve(asked: dict[str, Any]) -> dict[str, Any]:
+    """Frequencies, Hz, amplitudes, m, Newton iterations, CPU seconds, failed attempts."""
+    with np.load(asked["file"]) as file:
+        model = dict(file)
+    n = len(model["M"])
+    sign = np.ones(n)
+    sign[: 3 * asked["pairs"] : 3] = -1.0
+    for name in "MCK":
+        model[name] = sign[:, None] * model[name] * sign
+    for name in ("static", "cosine", "row"):
+        model[name] = sign * model[name]
+    start = (np.tile(sign, 2 * asked["harmonics"] + 1) * model["start"]).copy()
+    began = time.process_time()
+    run = pyHarm.Maestro(study_of(asked, model))
+    run.operate(x0=start)
+    spent = time.process_time() - began
+    points = run.nls["curve"].SolList
+    found = [point for point in points if point.flag_accepted]
+    row = model["row"]
+    return {
+        "frequency": [float(point.x[-1]) / (2.0 * np.pi) for point in found],
+        "amplitude": [float(np.hypot(row @ point.x[n : 2 * n], row @ point.x[2 * n : 3 * n])) for point in found],
+        "iterations": sum(int(point.iter_numb) for point in points),
+        "seconds": spent,
+        "failed": len(points) - len(found),
+    }
+
+
+if __name__ == "__main__":
+    logging.disable(logging.CRITICAL)
+    given = json.loads(sys.argv[1])
+    curve({**given, "frequency": given["frequency"][:2]})  # compiles
+    print(json.dumps(curve(given)))
