@@ -40,7 +40,7 @@ _FAINT_WORK = 1e-5  # of the work of the excitation: slip work below which no ch
 _MOST_PERIODS = 3000
 _HELD = 1000  # periods after a run-up or ramp, in which the first mode dies out to 0.1 %
 _AHEAD = 15.0  # periods in one of the glued mode; |1 + 15 (mu - 1)| < 1 for its multiplier mu
-_GROWTH = 1.05  # from period to period, of the change of the mode, above which fewer are taken in one
+_BEAT = 0.08  # relative difference of the changes of the mode in two periods, above which fewer are taken in one
 
 
 @dataclass(frozen=True)
@@ -339,7 +339,8 @@ def wear(
         cycle, work, here, before = cycle + taken, moved.work, amplitude_of_mode(structure, moved), change
         change = here - amplitude
         # a worn joint has another resonance than a glued one: beside it the beat of the mode would grow
-        ahead = max(0.5 * ahead, 1.0) if abs(change) > _GROWTH * abs(before) else min(1.1 * ahead, _AHEAD)
+        beats = abs(change - before) > _BEAT * abs(change)
+        ahead = max(0.8 * ahead, 1.0) if beats else min(1.1 * ahead, _AHEAD)
         motion, amplitude = push_mode(structure, moved, (ahead - 1.0) * change), here + (ahead - 1.0) * change
         yield cycle, depth, motion
 
