@@ -13,7 +13,7 @@ another one in two ways:
 - the coarse mesh under the static forces of the fine one, shared among the coarse pairs in the same way.
 
 If pairs are what matters, the first is like the coarse mesh; if bodies are, it is like the fine one. The picture shows
-what `meshes.csv` holds of earlier runs; those of meshes 3 and 4 are of version 0.4.0.
+what `meshes.csv` holds of earlier runs.
 """
 
 import argparse
@@ -120,7 +120,7 @@ def draw(path: Path) -> None:
             marker="o" if of_one_mesh else "x", linestyle="-" if of_one_mesh else "none",
         )  # fmt: skip
     axes.set(xlabel="excitation over first frequency of the mesh", ylabel="worn volume after 1e5 cycles (mm3)")
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, loc="upper left")
     figure.tight_layout()
     figure.savefig(path, dpi=110)
 
