@@ -2,7 +2,7 @@
 
 `python -m tests.benchmarks.time_integration [--mesh 1] [--frequency 212.42] [--each 20] [--steps 250]` prints worn
 volume and tip amplitude of the bundled dovetail root. `--approach ramp --periods 50 --cycles 0` shows the unworn motion
-after a fast ramp, `--sectors 48 --diameter 16 --steps 120` a travelling wave on the three sectors that move apart.
+after a fast ramp, `--sectors 48 --diameter 16 --steps 120` a travelling wave on three sectors, after which it repeats.
 Nothing of the solver is used but the model.
 
 - Time: backward differences of second order whose three weights are exact for the excitation frequency. With them
