@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import LinAlgError, eigh
 
+from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.scene_error import SceneError
 
@@ -40,15 +41,39 @@ class NaturalFrequencies:
 
 
 @dataclass(frozen=True)
-class ExactAnswer:
-    """Exact answer at one frequency and excitation amplitude, NaN where it does not hold.
+class WearQuestion:
+    """What an exact answer is asked for: wear and vibration at one frequency and excitation amplitude.
 
-    worn_volume (n_wear, n_cycles): m3, for some wear coefficients. response_amplitude (n_wear, n_cycles, n_response):
+    frequency: Hz. excitation_amplitude: N. wear_coefficients (n_wear,): 1/Pa. cycles (n_cycles,): counts. law: wear
+    law. worn_depth: m, of each pair at the count 0. changed: keys of a study that differ from their defaults, as
+    "wear.law"; a closed form that does not know one of them holds no longer.
+    """
+
+    frequency: float
+    excitation_amplitude: float
+    wear_coefficients: FloatArray
+    cycles: FloatArray
+    law: WearLaw = ARCHARD
+    worn_depth: float = 0.0
+    changed: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class ExactAnswer:
+    """Exact answer to a `WearQuestion`, NaN where it does not hold.
+
+    worn_volume (n_wear, n_cycles): m3, since the count 0. response_amplitude (n_wear, n_cycles, n_response):
     amplitude of the first harmonic, m.
     """
 
     worn_volume: FloatArray
     response_amplitude: FloatArray
+
+
+def unknown_answer(asked: WearQuestion, n_response: int) -> ExactAnswer:
+    """The answer where no closed form holds."""
+    shape = asked.wear_coefficients.size, asked.cycles.size
+    return ExactAnswer(np.full(shape, np.nan), np.full((*shape, n_response), np.nan))
 
 
 def stuck_frequencies(model: ReducedModel) -> NaturalFrequencies:

@@ -8,7 +8,8 @@ leaves the contact stiffness to this registry. It may also have the functions
 - `natural_frequencies(parameters) -> NaturalFrequencies`, where it knows more of them than its reduced model,
 - `with_room_for_wear(parameters, expected) -> Parameters`, where its pairs end at an artificial edge,
 - `FRICTION_IN_MODEL`, where the model depends on the friction coefficient,
-- `exact_answer(parameters, frequency, excitation_amplitude, wear_coefficients, cycles) -> ExactAnswer`.
+- `exact_answer(parameters, asked) -> ExactAnswer` to a `WearQuestion`, with `EXACT_ANSWER_KNOWS`: all keys of a study
+  on which the answer depends, as "scene.mass". Where any other key differs from its default there is no exact answer.
 
 A module is imported when its scene is asked for, so that listing the scenes costs nothing.
 """
@@ -25,8 +26,8 @@ from studies.scene_error import SceneError
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from solver.model import FloatArray, ReducedModel
-    from studies.scene_answers import ExactAnswer, NaturalFrequencies, SurfaceMesh
+    from solver.model import ReducedModel
+    from studies.scene_answers import ExactAnswer, NaturalFrequencies, SurfaceMesh, WearQuestion
     from studies.scenes.half_space.room_for_wear import ExpectedWear
 
 BUNDLED = ("cylinder_on_flat", "dovetail_sector", "sdof_slider", "sphere_on_flat", "two_masses", "vibro_impact")
@@ -89,17 +90,26 @@ def scene_with_room(model: str, parameters: BaseModel, expected: ExpectedWear) -
     return cast("BaseModel", _scene_attribute(model, "with_room_for_wear")(parameters, expected))
 
 
-def scene_answer(
-    model: str,
-    parameters: BaseModel,
-    frequency: float,
-    excitation_amplitude: float,
-    wear_coefficients: FloatArray,
-    cycles: FloatArray,
-) -> ExactAnswer:
-    """Exact answer of a bundled scene that has one. Hz, N, 1/Pa (n_wear,), cycle counts (n_cycles,)."""
-    answer = _scene_attribute(model, "exact_answer")
-    return cast("ExactAnswer", answer(parameters, frequency, excitation_amplitude, wear_coefficients, cycles))
+def scene_answer(model: str, parameters: BaseModel, asked: WearQuestion) -> ExactAnswer:
+    """Exact answer of a bundled scene that has one; NaN where a key that its closed form does not know is changed."""
+    known = cast("frozenset[str]", _scene_attribute(model, "EXACT_ANSWER_KNOWS"))
+    if changed_keys(parameters, "scene") | asked.changed <= known:
+        return cast("ExactAnswer", _scene_attribute(model, "exact_answer")(parameters, asked))
+    # imported here: listing the scenes costs nothing
+    from studies.scene_answers import unknown_answer
+
+    return unknown_answer(asked, len(build_scene(model, parameters, 1).response_names))
+
+
+def changed_keys(table: BaseModel, name: str) -> frozenset[str]:
+    """Keys of a table of a study file that differ from their defaults, with the name of the table: "scene.mass"."""
+    fields = type(table).model_fields.items()
+    return frozenset(
+        f"{name}.{key}"
+        for key, field in fields
+        if not field.exclude
+        and (field.is_required() or getattr(table, key) != field.get_default(call_default_factory=True))
+    )
 
 
 def _scene_attribute(model: str, name: str) -> Any:

@@ -11,10 +11,11 @@ from __future__ import annotations
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.contact.wear_law import wearing_work
+from solver.model import ContactInterface, LinearModel, ReducedModel
 from studies.contact_compliance import ContactStiffness
-from studies.scene_answers import ExactAnswer
-from studies.scenes.closed_forms.den_hartog import DenHartogSlider, worn_normal_force
+from studies.scene_answers import ExactAnswer, WearQuestion, unknown_answer
+from studies.scenes.closed_forms.den_hartog import DenHartogSlider, WearingSlider
 
 
 class Parameters(BaseModel):
@@ -78,32 +79,31 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
     return ReducedModel(linear={0: linear}, contact=contact, response_names=("mass",))
 
 
-def exact_answer(
-    parameters: Parameters,
-    frequency: float,
-    excitation_amplitude: float,
-    wear_coefficients: FloatArray,
-    cycles: FloatArray,
-) -> ExactAnswer:
+_OF_SCENE = "friction_coefficient", "mass", "stiffness", "normal_load", "normal_stiffness", "area", "worn"
+_OF_WEAR = "law", "threshold", "pressure", "depth", "factor", "surfaces"
+_OF_AXES = "frequency", "wear_coefficient", "excitation_amplitude"
+_KNOWN = {"scene": _OF_SCENE, "wear": _OF_WEAR, "axes": _OF_AXES}
+EXACT_ANSWER_KNOWS = frozenset(f"{table}.{key}" for table, keys in _KNOWN.items() for key in keys)
+"""Keys of a study on which `exact_answer` depends; a damped mount or a compliant contact has no closed form."""
+
+
+def exact_answer(parameters: Parameters, asked: WearQuestion) -> ExactAnswer:
     """Wear and vibration from Den Hartog's closed form and the differential equation of the wear depth.
 
-    frequency: Hz. excitation_amplitude: N. wear_coefficients (n_wear,): 1/Pa. cycles (n_cycles,): counts. NaN where the
-    form does not hold: the mount is damped, the contact is no rigid one, the mass stops on its way, or the frequency is
-    one of its singular ones.
+    NaN where the mass stops on its way, or the frequency is one of the singular ones of the form.
     """
     p = parameters
-    slider = DenHartogSlider(p.mass, p.stiffness, excitation_amplitude, 2.0 * np.pi * frequency)
-    limit = p.friction_coefficient * p.normal_load
-    sliding = np.multiply.outer(wear_coefficients, cycles)
-    if p.damping > 0.0 or p.contact_stiffness is not None or not slider.holds(limit):
-        return ExactAnswer(np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan))
+    load = p.normal_load - p.normal_stiffness * asked.worn_depth
+    slider = DenHartogSlider(p.mass, p.stiffness, asked.excitation_amplitude, 2.0 * np.pi * asked.frequency)
+    if not slider.holds(p.friction_coefficient * max(load, 0.0)):
+        return unknown_answer(asked, 1)
+    law, contact = asked.law.begun_at(np.array([asked.worn_depth])), build(p, 1).contact
+    work = wearing_work(law, contact, np.array([p.friction_coefficient]))
     # the worn state depends on wear coefficient and cycle count through their product alone
+    sliding = np.multiply.outer(asked.wear_coefficients, asked.cycles)
     different, places = np.unique(sliding, return_inverse=True)
-    relieved = worn_normal_force(slider, p.friction_coefficient, p.normal_load, p.normal_stiffness, p.area, different)
-    if p.normal_stiffness > 0.0:
-        depth = np.abs(np.expm1(relieved)) * p.normal_load / p.normal_stiffness
-    else:
-        depth = p.normal_load / p.area * 4.0 * slider.amplitude(np.array(limit)) * different
-    response = slider.first_harmonic(limit * np.exp(relieved))
+    pair = WearingSlider(slider, p.friction_coefficient, load, p.normal_stiffness, p.area, work)
+    depth, force = pair.worn(different)
+    response = slider.first_harmonic(p.friction_coefficient * force)
     places = places.reshape(sliding.shape)
     return ExactAnswer(p.area * depth[places], response[places][..., np.newaxis])

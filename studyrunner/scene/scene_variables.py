@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from pydantic import BaseModel
 
-from studies.scenes import scene_answer
+from studies.scene_answers import WearQuestion
+from studies.scenes import changed_keys, scene_answer
 from studyrunner.coordinates import SCENE
 from studyrunner.scene.scene_set import SceneSet, axes_of_difference
 from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.realisation import realise
+from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
 
 
@@ -66,17 +69,49 @@ def exact_answers(study: Study) -> tuple[SceneVariable, ...]:
     return tuple(variables)
 
 
+_HOW_TO_COMPUTE = {
+    "study": ("name", "title"),
+    "scene": ("model", "parameters"),
+    "axes": ("step", "scheme", "sweep", *SOLVER_AXES),
+    "slow_time": ("cycles", "final_share", "outputs", "until", "largest_depth"),
+    "solver": (*SOLVER_AXES, "shortcuts", "time_limit"),
+    "outputs": ("variables", "loops", "scene"),
+}
+_WITHOUT_INFLUENCE = frozenset(f"{table}.{key}" for table, keys in _HOW_TO_COMPUTE.items() for key in keys)
+"""Keys of a study that say how a point is computed and shown, and not which point. A key that is not among them may
+change the truth: only a closed form that knows the key still holds where it differs from its default."""
+
+
+def _changed(study: Study) -> frozenset[str]:
+    """Keys of a part of a study that differ from their defaults and may change the exact answer.
+
+    Without the parameters of the scene, which `scene_answer` looks at.
+    """
+    found: set[str] = set()
+    for name, field in type(study).model_fields.items():
+        table = getattr(study, name)
+        if not field.exclude and table:
+            found |= changed_keys(table, name) if isinstance(table, BaseModel) else {name}
+    return frozenset(found - _WITHOUT_INFLUENCE)
+
+
 def _answers(study: Study) -> dict[str, np.ndarray]:
-    axes = study.axes
+    axes, changed = study.axes, _changed(study)
+    (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
     answers = [
         [
             scene_answer(
                 study.scene.model,
                 study.scene.parameters,
-                frequency,
-                amplitude,
-                np.array(axes.wear_coefficient),
-                np.array(study.cycles_kept),
+                WearQuestion(
+                    frequency,
+                    amplitude,
+                    np.array(axes.wear_coefficient),
+                    np.array(study.cycles_kept),
+                    study.wear_law,
+                    depth,
+                    changed,
+                ),
             )
             for amplitude in axes.excitation_amplitude
         ]

@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import linalg
+from scipy.integrate import solve_ivp
 
-from studies.scene_answers import stuck_frequencies
+from solver.contact.wear_law import ARCHARD, WearLaw, WearTable
+from studies.scene_answers import WearQuestion, stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_has, scene_mesh, scene_parameters
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
@@ -21,8 +23,8 @@ def slider(**changes):
     return scene_parameters("sdof_slider")(**changes)
 
 
-def answer(frequency=160.0, amplitude=10.0, wear=WEAR, cycles=CYCLES, **changes):
-    return scene_answer("sdof_slider", slider(**changes), frequency, amplitude, wear, cycles)
+def answer(frequency=160.0, amplitude=10.0, wear=WEAR, cycles=CYCLES, law=ARCHARD, worn=0.0, **changes):
+    return scene_answer("sdof_slider", slider(**changes), WearQuestion(frequency, amplitude, wear, cycles, law, worn))
 
 
 def dovetail(**changes):
@@ -68,6 +70,70 @@ def test_the_slider_wears_by_its_differential_equation(frequency):
             assert response == pytest.approx(exact, rel=1e-8, abs=0.0)
 
 
+def rate_by_hand(law, depth, begun, frequency=160.0):
+    """dW/dn over the wear coefficient, of the depth since the start, from the definition of each law."""
+    force = 10.0 - 1e5 * (begun + depth)
+    slip_work = 4.0 * force * slider_amplitude(0.1, 0.0, 1.6e5, 10.0, 0.5 * force, 2 * np.pi * frequency)
+    if law.name == "energy":
+        slip_work *= 0.5
+    if law.name == "threshold":
+        slip_work = max(slip_work - law.threshold * 1e-4, 0.0)
+    if law.name == "table":
+        across = [np.interp(force / 1e-4, law.table.pressure, column) for column in zip(*law.table.factor, strict=True)]
+        slip_work *= np.interp(begun + depth, law.table.depth, across)
+    return slip_work * sum((factor for _, factor in law.surfaces), 0.0 if law.surfaces else 1.0) / 1e-4
+
+
+LAWS = {
+    "archard": WearLaw(),
+    "energy": WearLaw("energy"),
+    "threshold": WearLaw("threshold", threshold=40.0),
+    "table": WearLaw("table", table=WearTable((6e4, 9e4), (0.0, 1.5e-5, 4e-5), ((0.5, 2.0, 1.0), (1.5, 0.5, 0.8)))),
+    "surfaces": WearLaw(surfaces=(("support", 0.3),)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("begun", [0.0, 2e-5])
+@pytest.mark.parametrize("law", LAWS)
+def test_the_slider_wears_by_the_differential_equation_of_its_law(law, begun):
+    found = answer(law=LAWS[law], worn=begun)
+    solved = solve_ivp(
+        lambda _, depth: [rate_by_hand(LAWS[law], depth[0], begun)],
+        (0.0, WEAR[0] * CYCLES[-1]),
+        [0.0],
+        "LSODA",
+        WEAR[0] * CYCLES,
+        rtol=1e-11,
+        atol=1e-18,
+        max_step=1e-9,
+    )
+    assert found.worn_volume[0] == pytest.approx(1e-4 * solved.y[0], rel=1e-7, abs=0.0)
+    assert not found.worn_volume[1].any()
+    for depth, response in zip(solved.y[0], found.response_amplitude[0, :, 0], strict=True):
+        friction = 0.5 * (10.0 - 1e5 * (begun + depth))
+        exact = abs(slider_orbit(0.1, 0.0, 1.6e5, 10.0, friction, 2 * np.pi * 160.0).harmonic(0))
+        assert response == pytest.approx(exact, rel=1e-7, abs=0.0)
+
+
+def test_a_pair_that_was_worn_open_slides_without_friction():
+    found = answer(worn=1.1e-4)
+    assert not found.worn_volume.any()
+    free = 10.0 / abs(1.6e5 - 0.1 * (2 * np.pi * 160.0) ** 2)
+    assert found.response_amplitude == pytest.approx(free, rel=1e-12)
+    # what stops the mass is the friction that is left
+    assert np.isnan(answer(amplitude=6.0).worn_volume).all()
+    assert np.isfinite(answer(amplitude=6.0, worn=5e-5).worn_volume).all()
+
+
+@pytest.mark.parametrize("law", ["energy", "threshold"])
+def test_under_a_constant_force_each_law_has_a_constant_rate(law):
+    found = answer(law=LAWS[law], worn=2e-5, normal_stiffness=0.0)
+    assert found.worn_volume == pytest.approx(
+        np.outer(WEAR, CYCLES) * 1e-4 * rate_by_hand(LAWS[law], 0.0, 0.0), rel=1e-12, abs=0.0
+    )
+
+
 def test_a_constant_force_wears_at_a_constant_rate():
     found = answer(normal_stiffness=0.0)
     amplitude = slider_amplitude(0.1, 0.0, 1.6e5, 10.0, 5.0, 2 * np.pi * 160.0)
@@ -77,8 +143,14 @@ def test_a_constant_force_wears_at_a_constant_rate():
 
 @pytest.mark.parametrize(
     "changes",
-    [{"damping": 1.0}, {"amplitude": 6.0}, {"frequency": 60.0}, {"frequency": np.sqrt(1.6e6) / (6 * np.pi)}],
-    ids=["damped", "stops", "stops far below resonance", "singular"],
+    [
+        {"damping": 1.0},
+        {"contact_stiffness": 1e13},
+        {"amplitude": 6.0},
+        {"frequency": 60.0},
+        {"frequency": np.sqrt(1.6e6) / (6 * np.pi)},
+    ],
+    ids=["damped", "compliant", "stops", "stops far below resonance", "singular"],
 )
 def test_where_the_closed_form_does_not_hold_there_is_no_answer(changes):
     found = answer(**changes)

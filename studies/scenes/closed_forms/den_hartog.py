@@ -13,16 +13,19 @@ from there, the force F cos(theta + phi), cos(phi) = X k / (F V) and sin(phi) = 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from solver.contact.wear_law import WearingWork
 from solver.model import FloatArray
 
 _SINGULAR = 1e-9  # 1/r beside an odd number, where G has no bound
 _POINTS = 4001  # in a half period, among which the slowest moment of the motion is sought
 _STEPS = 64  # at least, from the first cycle to the last
+_LEAST_FORCE = 1e-200  # of the first one: any number that can be divided by
 
 
 @dataclass(frozen=True)
@@ -86,35 +89,66 @@ class DenHartogSlider:
         return np.hypot(self.amplitude(friction_force), friction_force / self.stiffness * (g + 4.0 / np.pi * v))
 
 
-def worn_normal_force(
-    slider: DenHartogSlider,
-    friction_coefficient: float,
-    normal_load: float,
-    normal_stiffness: float,
-    area: float,
-    sliding: FloatArray,
-) -> FloatArray:
-    """Logarithm of the normal force N over `normal_load` of a slider that a spring presses, while it wears.
+@dataclass(frozen=True)
+class WearingSlider:
+    """The slider with one pair that wears; a spring presses the pair, or a constant force.
 
-    sliding (n,): wear coefficient times cycle count, 1/Pa, ascending from 0 or above. The wear depth W follows
-    `dW/ds = (N / area) 4 X(mu N)`, `N = N_0 - k_N W` (N, N/m), s the sliding; with z = ln(N / N_0) that is
-    `dz/ds = -(4 k_N / area) X(mu N_0 exp(z))`, which stays calm however much is worn.
+    mu: friction coefficient. load: normal force at the start, N. normal_stiffness: k_N of the spring, N/m; 0 for a
+    constant force. area: m2. work: part of the slip work that wears, of the only pair.
     """
-    limit = friction_coefficient * normal_load
+
+    slider: DenHartogSlider
+    mu: float
+    load: float
+    normal_stiffness: float
+    area: float
+    work: WearingWork
+
+    def worn(self, sliding: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Depth worn since the start, m, and normal force, N, at each sliding (n,), 1/Pa, ascending from 0 or above.
+
+        Sliding: s, wear coefficient times cycle count. The depth W follows `dW/ds = X(S, N / area, W) / area` with the
+        normal force `N = load - k_N W`, the slip work of a cycle `S = 4 N X_0(mu N)`, X_0 the amplitude of the motion,
+        and the wearing work X of the law (`solver.contact.wear_law`). With a spring the unknown is z = ln(N / load),
+        `dz/ds = -(k_N / area) X / N`, which stays calm however much is worn.
+        """
+        if self.load <= 0.0:
+            return np.zeros_like(sliding), np.zeros_like(sliding)
+        if self.normal_stiffness <= 0.0:
+            depth = _integrated(lambda w: self._rate(self.load, w) * self.load, sliding)
+            return depth, np.full_like(sliding, self.load)
+
+        def fall(z: float) -> float:
+            depth = -np.expm1(z) * self.load / self.normal_stiffness
+            return -self.normal_stiffness * self._rate(self.load * max(np.exp(z), _LEAST_FORCE), depth)
+
+        z = _integrated(fall, sliding)
+        return np.abs(np.expm1(z)) * self.load / self.normal_stiffness, self.load * np.exp(z)
+
+    def _rate(self, force: float, depth: float) -> float:
+        """`dW/ds` over the normal force, 1/N m: of the force, N, and the depth, m."""
+        slip_work = 4.0 * force * float(self.slider.amplitude(np.array(self.mu * force)))
+        worn = self.work.work(np.array([slip_work]), np.array([force]), np.array([depth]))
+        return float(worn[0]) / force / self.area
+
+
+def _integrated(rate: Callable[[float], float], sliding: FloatArray) -> FloatArray:
+    """The solution y (n,) of `dy/ds = rate(y)`, y(0) = 0, at ascending s (n,) from 0 or above."""
     from scipy.integrate import solve_ivp  # where it is used: it takes a while to load
 
-    def rate(_: float, z: FloatArray) -> FloatArray:
-        return -4.0 * normal_stiffness / area * slider.amplitude(limit * np.exp(z))
-
-    fastest = abs(float(rate(0.0, np.zeros(1))[0]))
-    worn = np.zeros_like(sliding)
-    later = sliding > 0.0
+    found, fastest, later = np.zeros_like(sliding), abs(rate(0.0)), sliding > 0.0
     if fastest > 0.0 and later.any():
-        smallest = 1e-13 * fastest * float(sliding[later][0])
-        end = float(sliding[-1])
+        end, smallest = float(sliding[-1]), 1e-13 * fastest * float(sliding[later][0])
         # between two steps the solution is interpolated, with an error that the tolerance does not bound
         solution = solve_ivp(
-            rate, (0.0, end), [0.0], "DOP853", sliding[later], rtol=1e-11, atol=smallest, max_step=end / _STEPS
+            lambda _, y: [rate(float(y[0]))],
+            (0.0, end),
+            [0.0],
+            "DOP853",
+            sliding[later],
+            rtol=1e-11,
+            atol=smallest,
+            max_step=end / _STEPS,
         )
-        worn[later] = solution.y[0]
-    return worn
+        found[later] = solution.y[0]
+    return found
