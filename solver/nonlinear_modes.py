@@ -58,7 +58,7 @@ def backbone(
     friction_coefficient: ArrayLike | None,
     *,
     mode: int = 1,
-    direction: Direction = "up",
+    sweep: Direction = "up",
     settings: SolverSettings | None = None,
     wear_depth: ArrayLike | None = None,
 ) -> Backbone:
@@ -81,7 +81,7 @@ def backbone(
     mode
         Number of the linear mode, from 1 on in ascending frequency, from which the nonlinear one begins: closed pairs
         stick. Of a joint that has fewer such modes, as a mass on a rigid slider: closed pairs slide.
-    direction
+    sweep
         Loading history: the amplitude is raised from zero ("up"), or raised to at least twice the amplitude of the
         point and then lowered ("down"). A joint whose mode exists only while it slides has "down" alone.
     settings
@@ -98,13 +98,13 @@ def backbone(
     settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("amplitude", amplitude, above=0.0)
     friction = check_friction(model, friction_coefficient)
-    check_word("direction", direction, get_args(Direction))
+    check_word("sweep", sweep, get_args(Direction))
     check_settings(model, settings)
     if isinstance(mode, bool) or int(mode) != mode or mode < 1:
         raise ValueError(f"mode: give a whole number from 1 on instead of {mode!r}")
     worn = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
-    found = dict(follow_mode(worn, friction, ascending, int(mode), direction, settings))
+    found = dict(follow_mode(worn, friction, ascending, int(mode), sweep, settings))
     points = [found[index] for index in place.tolist()]
     columns = [values_of(model, point) for point in points]
     gathered = {name: np.array([getattr(each, name) for each in columns]) for name in OF_A_POINT}

@@ -89,8 +89,7 @@ _SENTENCES = {
     " the whole joint slips or opens. More static load, friction or damping, or less excitation, would help.",
     Outcome.RESONANCE_LOST: "The excitation follows the resonance, but there was no resonance in the range, or the"
     " resonance left the range: message says where. The values before are valid.",
-    Outcome.TIME_LIMIT: "The computation took longer than solver.time_limit and was stopped. --retry-failed continues"
-    " with a larger limit.",
+    Outcome.TIME_LIMIT: "The computation took longer than its time limit and was stopped.",
     Outcome.EXCEPTION: "The computation ended with an unexpected error; see the variable message.",
     Outcome.CRASHED: "The process that computed this point crashed; see the variable message.",
     Outcome.NOT_COMPUTED: "The run ended before this point was computed. The same command continues.",

@@ -68,6 +68,8 @@ def advise(outcome: str, used: Used) -> str:
         return _try(*_given(used))
     if outcome == "certificate_failed":
         return _try(*_given(used), "a smaller tolerance")
+    if outcome == "time_limit":
+        return "--retry-failed continues with a larger solver.time_limit."
     if outcome == "no_final_state":
         other = "another scheme with " if used.scheme == "final" else ""
         target = "" if used.until else " or slow_time.until"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from solver.results.cut_off import describe_cut_off
 from solver.results.history import WearHistory
-from solver.results.verdict import judge
+from solver.results.verdict import judge, last_error
 from studyrunner.plan.point_text import describe_reach, show_count
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.tasks import MarchTask
@@ -43,6 +43,7 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
     if target > (1.0 + _ROUND_OFF) * counts[-1] / slower:
         # another history of the march goes farther
         target = math.nan
+    life_error = math.nan if math.isnan(target) else history.cycles_to_target_error / slower
     whole = bool(reached.all())
     # one that was not reached to its end has ended as the integrated history has
     shared = place > 0 and whole and (not endless or history.outcome.complete)
@@ -65,12 +66,13 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         "outcome": int(outcome),
         "jump_cycle": jump,
         "cycles_to_target": target,
-        "error_estimate": _last_error(history, known, last),
+        "cycles_to_target_error": life_error,
+        "error_estimate": last_error(history, known, last),
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
         "final_method": _METHODS.index(history.final_method or "none"),
-        "message": message or _of_target(task, history, known, target, whole=whole),
+        "message": message or _of_target(task, history, known, target, life_error, whole=whole),
     }
     of_march = {name: getattr(history, name) for name in KEPT if name not in of_its_own}
     variables = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
@@ -92,26 +94,18 @@ def _end_of_shared(
     return describe_reach(last, math.inf if task.to_the_end is not None else task.cycles[-1], worn)
 
 
-def _last_error(history: WearHistory, known: NDArray[np.intp], last: float) -> float:
-    """Estimated relative error of the last worn volume that the result holds; NaN where there is none.
-
-    The unworn joint has no volume to be wrong, but where it is all that is held of a history that went on (a target may
-    be reached before the first count) what has worn there is not known. last: count that the march has come to.
-    """
-    if not known.size or (history.cycles[known[-1]] == 0.0 and last > 0.0 and bool(history.wear_rate[known[-1]] > 0.0)):
-        return math.nan
-    return float(history.worn_volume_error[known[-1]])
-
-
-def _of_target(task: MarchTask, history: WearHistory, known: NDArray[np.intp], target: float, *, whole: bool) -> str:
+def _of_target(
+    task: MarchTask, history: WearHistory, known: NDArray[np.intp], target: float, error: float, *, whole: bool
+) -> str:
     """That the target of a history was not reached, or that the counts behind it are not computed; else empty.
 
-    known: its rows that were reached. whole: whether these are all.
+    known: its rows that were reached. error: of the count `target`. whole: whether these are all.
     """
     if task.until is None or not known.size:
         return ""
     if not math.isnan(target):
-        return "" if whole else f"at its target at cycle {show_count(target)}: later counts are not computed"
+        at = f"at its target at cycle {show_count(round(target))} +- {error:.2g}"
+        return "" if whole else f"{at}: later counts are not computed"
     if task.until.quantity == "frequency_shift":
         return f"frequency_shift stays below {task.until.value:g}"
     deepest, volume = history.wear_depth[known[-1]].max(initial=0.0), history.worn_volume[known[-1]]

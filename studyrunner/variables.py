@@ -243,6 +243,12 @@ KEPT = {
         comment="The point ends with the step that reaches it. NaN where there is no target, or where it is never"
         " reached: message says how far the wear came.",
     ),
+    "cycles_to_target_error": Variable(
+        (),
+        "1",
+        "estimated error of cycles_to_target",
+        comment="Cycles; NaN where the target is never reached.",
+    ),
     "newton_iterations": Variable(
         (),
         "1",

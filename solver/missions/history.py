@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.accuracy.history_error import Both, HistoryError, history_error
-from solver.accuracy.options import ACCURACY
+from solver.accuracy.target_error import error_of_wear, target_error
 from solver.missions.blocks import Mission
 from solver.missions.course import RESPONSES, MissionCourse
 from solver.missions.one_block import integrate_one_block, is_one_history
@@ -160,19 +160,17 @@ def _of_blocks(
 
 
 def _target_error(solutions: MissionSolutions, fine: MissionCourse, reference: MissionCourse | None) -> float:
-    """Estimated error of the number of missions to the target: the difference to that of the reference solution.
-
-    At least the error of the volume there, taken at the mean rate of the last step.
-    """
-    if reference is None:
+    """Estimated error of the number of missions to the target; the rate of the wear is that of the last step."""
+    until, area = solutions.mission.until, solutions.mission.area
+    if reference is None or until is None:
         return math.inf
     at, other = solutions.missions_to_target(fine), solutions.missions_to_target(reference)
     whole, *_ = _errors(solutions.mission, np.array([0.0, at]), fine, reference)
+    depth = fine.growth_at(np.array([at])).sum(axis=1)[0]
+    known_to = error_of_wear(until.quantity, depth, whole.wear_depth[1], float(whole.worn_volume[1] * (depth @ area)))
     before, end = fine.nodes[-2:]
     per_mission = (solutions.worn(end.growth) - solutions.worn(before.growth)) / (end.mission - before.mission)
-    assert solutions.mission.until is not None
-    by_volume = float(whole.worn_volume[-1]) * solutions.mission.until.value / per_mission
-    return max(by_volume, ACCURACY.history_safety * abs(other - at) if math.isfinite(other) else 0.0)
+    return target_error(at, other, known_to, per_mission)
 
 
 def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> Failure:

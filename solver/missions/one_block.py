@@ -58,10 +58,7 @@ def _as_missions(
 ) -> MissionHistory:
     """A wear history in missions. rows: of the missions; mission_rows: of begin and end of the missions before."""
     _, cycles = mission.blocks[0].steady
-    target = history.cycles_to_target / cycles
     volume, error = history.worn_volume[rows], history.worn_volume_error[rows]
-    reached = np.flatnonzero(np.isfinite(error))
-    at_rate = history.wear_rate[rows[reached[-1]]] * cycles if reached.size else np.nan
     responses: dict[str, Any] = {}
     for name in ("response", "response_peak"):
         for place, at in zip(("begin", "end"), mission_rows, strict=True):
@@ -87,10 +84,8 @@ def _as_missions(
         error_estimate=history.error_estimate,
         last_mission=history.last_cycle / cycles,
         steps=np.array([history.last_cycle / cycles]),
-        missions_to_target=target,
-        missions_to_target_error=float(error[reached[-1]] * volume[reached[-1]] / at_rate)
-        if target == target
-        else np.nan,
+        missions_to_target=history.cycles_to_target / cycles,
+        missions_to_target_error=history.cycles_to_target_error / cycles,
         newton_iterations=history.newton_iterations,
         run_time=history.run_time,
     )

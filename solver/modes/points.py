@@ -117,7 +117,7 @@ class _Way:
         if isinstance(self._rest, tuple):
             return ModePoint(*self._rest)
         if self._direction == "up" and not self._rest.glued:
-            said = 'the joint has no such mode while its pairs stick: give direction = "down", from large amplitudes'
+            said = 'the joint has no such mode while its pairs stick: give sweep = "down", from large amplitudes'
             return ModePoint(Outcome.START_FAILED, said)
         first = self._direction == "up" and amplitude < first_amplitude(self._rest)
         sweep = None if first else self._sweep_to(self._rest, amplitude)

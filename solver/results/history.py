@@ -90,10 +90,12 @@ class WearHistory:
     - jump_cycle: first cycle count at which the branch was lost, NaN if never.
     - cycles_to_target: count at which the target of the wear was reached, NaN if never or without a target. The history
       ends with the step that reaches the target.
+    - cycles_to_target_error: its estimated error, cycles; NaN where the target was never reached.
     - worn_volume_error (n_output,): estimated relative error of the worn volume by steps and their propagation,
       harmonics, samples and start state; 0 where nothing has worn.
     - wear_depth_error (n_output, n_contact): estimated error of the depths by these causes, m.
-    - error_estimate: `worn_volume_error` at the last count that was reached.
+    - error_estimate: `worn_volume_error` at the last count that was reached; NaN where nothing has worn at this count
+      and the joint wears.
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
       certificate of the states, all relative; NaN where not estimated.
     - stable (n_output,): bool.
@@ -151,6 +153,7 @@ class WearHistory:
     wear_depth_error: FloatArray
     last_cycle: float = math.nan
     cycles_to_target: float = math.nan
+    cycles_to_target_error: float = math.nan
     branch: int = 0
     fold_frequency: float = math.nan
     step_limit: float = math.inf

@@ -26,8 +26,11 @@ from solver.structure.fourier import to_complex
 from solver.structure.joint import Joint
 
 
-def resonance_frequency(joint: Joint, evaluation: Evaluation) -> float:
-    """w_r, rad/s, of a converged state; NaN where no mass moves, or where w_r^2 is not positive."""
+def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, float]:
+    """w_r, rad/s, of a converged state, and its relative change per relative change of the motion at most.
+
+    The latter is `|x^H F| / (2 w_r^2 x^H M x)`. Both are NaN where no mass moves, or where w_r^2 is not positive.
+    """
     linear, conjugate = joint.model.harmonic_structure(1)
     mass, damping, stiffness, shape = (
         np.conj(part) if conjugate else part
@@ -46,8 +49,8 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> float:
             return cast("ComplexArray", whole)
 
         moved[internal] = np.linalg.solve(block(internal), force[internal] - block(relative) @ moved[relative])
-    inertia = float(np.real(np.vdot(moved, mass @ moved)))
+    inertia, work = float(np.real(np.vdot(moved, mass @ moved))), complex(np.vdot(moved, force))
     if not inertia > 0.0:
-        return float("nan")
-    square = joint.omega**2 + float(np.real(np.vdot(moved, force))) / inertia
-    return float(np.sqrt(square)) if square > 0.0 else float("nan")
+        return float("nan"), float("nan")
+    square = joint.omega**2 + work.real / inertia
+    return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2

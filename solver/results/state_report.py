@@ -41,7 +41,8 @@ class StateReport:
     """Reported values of a state; units and shapes as in `WearHistory`, without the dimension n_output.
 
     excitation_frequency_error: by the harmonics and samples of the state.
-    resonance: `resonance_frequency`, rad/s; NaN where it was not asked for.
+    resonance: `resonance_frequency`, rad/s; resonance_error: its estimated relative error by harmonics and samples; NaN
+        where they were not asked for.
     """
 
     wear_depth: FloatArray
@@ -57,6 +58,7 @@ class StateReport:
     excitation_frequency: float = float("nan")
     excitation_frequency_error: float = 0.0
     resonance: float = float("nan")
+    resonance_error: float = float("nan")
 
 
 def report_state(
@@ -80,6 +82,7 @@ def report_state(
     """
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
+    resonance, slope = resonance_frequency(joint, evaluation) if with_resonance else (float("nan"),) * 2
     return StateReport(
         wear_depth=evaluation.wear_depth,
         mean_pressure=evaluation.force_h[:, 0, 0] / joint.contact.area,
@@ -92,7 +95,8 @@ def report_state(
         certificate=certificate,
         resolution=Resolution(joint.basis.orders, joint.basis.n_samples),
         excitation_frequency=joint.omega / (2.0 * np.pi),
-        resonance=resonance_frequency(joint, evaluation) if with_resonance else float("nan"),
+        resonance=resonance,
+        resonance_error=slope * certificate.response_error,
     )
 
 

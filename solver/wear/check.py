@@ -87,15 +87,18 @@ class PlainCheck:
     """No check, for a reference solution: its harmonics only follow a given schedule.
 
     resolutions: cycle count from which on a resolution holds, and this resolution; ascending counts, the first 0.
+    with_resonance: whether the resonance of the vibration is reported.
     """
 
     resolutions: tuple[tuple[float, Resolution], ...]
+    with_resonance: bool = False
 
     def __call__(self, work: WearingJoint, state: WearState) -> Checked | Failure:
         """The state with the harmonics wanted at its count, or unchanged where no such state is found."""
         wanted = [resolution for count, resolution in self.resolutions if count <= state.cycle][-1]
         state = with_harmonics(work, state, wanted) or state
-        return Checked(state, report_state(work.at(state), state.point.evaluation, NOT_CERTIFIED))
+        joint, at = work.at(state), state.point.evaluation
+        return Checked(state, report_state(joint, at, NOT_CERTIFIED, with_resonance=self.with_resonance))
 
 
 def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution) -> WearState | None:

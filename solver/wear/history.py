@@ -11,6 +11,7 @@ import numpy as np
 
 from solver.accuracy.history_error import Both, history_error
 from solver.accuracy.options import ACCURACY
+from solver.accuracy.target_error import error_of_wear, target_error
 from solver.model import FloatArray, ReducedModel
 from solver.options import COMMON
 from solver.outcome import Outcome
@@ -18,7 +19,7 @@ from solver.packing import Packed, unpack
 from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState, WearHistory
 from solver.results.other_peak import find_other_peak
-from solver.results.verdict import judge
+from solver.results.verdict import judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
 from solver.wear.output import DenseOutput, no_output
@@ -73,9 +74,10 @@ def integrate_wear(
         if reference.failure.outcome in (Outcome.TIME_LIMIT, Outcome.EXCEPTION):
             fine = replace(fine, failure=reference.failure)
     history = _assembled(solutions, fine, reference)
+    rows = np.flatnonzero(np.isfinite(history.worn_volume))
+    history = replace(history, error_estimate=last_error(history, rows, history.last_cycle))
     if history.outcome is not Outcome.CONVERGED:
         return history
-    rows = np.flatnonzero(np.isfinite(history.worn_volume))
     outcome, message = judge(history, rows, settings.rtol)
     return replace(history, outcome=outcome, message=message)
 
@@ -92,8 +94,8 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
     steps = Both(at_steps, course.values(), _read_or_nan(coarse, at_steps, own))
     error = history_error(Both(counts, own, other), steps, area, asked.scheme)
     volume = own["wear_depth"] @ area
-    reached = np.flatnonzero(np.isfinite(volume))
     last, target, worst = course.ends[-1], fine.output.reached, state.worst
+    ends_at_target = target <= asked.end
     values: dict[str, Any] = {name: own[name] for name in own if name not in ("local", "depth_rate")}
     values |= {"response_error": error.response, "wear_rate_error": error.wear_rate}
     if asked.follow is not None:
@@ -110,7 +112,7 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
         worn_volume_error=error.worn_volume,
         wear_depth_error=error.wear_depth,
         reference_volume=other["wear_depth"] @ area,
-        error_estimate=float(error.worn_volume[reached[-1]]) if reached.size else math.nan,
+        error_estimate=math.nan,
         newton_iterations=start.newton_iterations + iterations,
         run_time=start.run_time + solutions.spent,
         last_cycle=min(last, float(counts[-1])),
@@ -118,7 +120,8 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
         fold_frequency=start.fold_frequency,
         # adaptive steps go beyond the last count
         jump_cycle=state.jump_cycle if state.jump_cycle <= asked.end else math.nan,
-        cycles_to_target=target if target <= asked.end else math.nan,
+        cycles_to_target=target if ends_at_target else math.nan,
+        cycles_to_target_error=_target_error(output, coarse, steps, asked) if ends_at_target else math.nan,
         cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
         step_limit=state.step_limit if state.step_limit > 0.0 else math.inf,
         # other schemes are stable: only small corners of the wear rate alternate there
@@ -129,6 +132,26 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
         held_from=math.inf if math.isnan(state.held_from) else state.held_from,
         other_peaks=_other_peaks(solutions, state),
     )
+
+
+def _target_error(output: DenseOutput, coarse: DenseOutput | None, steps: Both, asked: SlowTime) -> float:
+    """Estimated error, cycles, of the count at which a history has reached its target.
+
+    output, coarse: of the history and of its reference solution, None if there is none; steps: both at the ends of the
+    steps.
+    """
+    if coarse is None or asked.until is None:
+        return math.inf
+    area, at, quantity = output.area, output.taken.reached, asked.until.quantity
+    counts = np.array([0.0, at])
+    own = output.read(counts)
+    error = history_error(Both(counts, own, _read_or_nan(coarse, counts, own)), steps, area, asked.scheme)
+    depth = own["wear_depth"][1]
+    known_to = error_of_wear(quantity, depth, error.wear_depth[1], float(error.worn_volume[1] * (depth @ area)))
+    deepest = np.arange(area.size) == depth.argmax()
+    weights = deepest if quantity == "wear_depth" else area
+    rate = min(float(rates @ weights) for rates in (own["depth_rate"][1], output.taken.nodes[-1].rate))
+    return target_error(at, coarse.target_count(), known_to, rate) + output.target_within()
 
 
 def _other_peaks(solutions: Solutions, last: WearState) -> tuple[float, float]:

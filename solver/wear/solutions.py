@@ -157,10 +157,9 @@ class Solutions:
         if smooth:
             control = AdaptiveSteps(settings.rtol, end=self._last_step_end(asked.end))
         stop = InSteadyState(asked.cycles.final_share) if isinstance(asked.cycles, ToTheEnd) else AtCount(asked.end)
-        shifts = asked.until is not None and asked.until.quantity == "frequency_shift"
         integration = Integration(
             control,
-            FullCheck(asked.loops, with_resonance=shifts),
+            FullCheck(asked.loops, with_resonance=self._shifts),
             stop,
             DenseOutput(work.area, counts, smooth=smooth, target=asked.until),
             lambda progress: self._save(integration, work, progress, None),
@@ -196,7 +195,7 @@ class Solutions:
         resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in like.resolutions)
         integration = Integration(
             AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, bounded=False, end=self._last_step_end(end)),
-            PlainCheck(resolutions),
+            PlainCheck(resolutions, with_resonance=self._shifts),
             AtCount(end),
             DenseOutput(work.area, compared, smooth=True),
             lambda progress: self._save(integration, work, progress, fine),
@@ -204,6 +203,11 @@ class Solutions:
             most_iterations=like.iterations + WEAR.history_iterations,
         )
         return self._run(integration, work, lambda: begin_reference(work, self.start, like.step_limit), end)
+
+    @property
+    def _shifts(self) -> bool:
+        """Whether the history ends at a shift of the resonance of the vibration."""
+        return self.asked.until is not None and self.asked.until.quantity == "frequency_shift"
 
     def _last_step_end(self, last: float) -> float:
         """Count beyond which no adaptive step goes; last: last count of the integration."""
@@ -226,14 +230,15 @@ class Solutions:
         return self._output(ended, smooth=True)
 
     def _output(self, ended: Ended, *, smooth: bool) -> DenseOutput:
-        output = DenseOutput(self.case.model.contact.area, None, smooth=smooth)
+        output = DenseOutput(self.case.model.contact.area, None, smooth=smooth, target=self.asked.until)
         output.taken = ended.output
         return output
 
     def _compared(self, fine: Ended) -> FloatArray:
         """Ascending counts at which the reference solution is read, the first 0."""
         reached = min(fine.output.course.ends[-1], self.asked.end)
-        counts = np.concatenate([[0.0], self.counts(fine), fine.output.course.cycles])
+        # NaN where no target was reached
+        counts = np.concatenate([[0.0, fine.output.reached], self.counts(fine), fine.output.course.cycles])
         return np.unique(counts[counts <= reached])
 
     def _joint(self) -> WearingJoint:

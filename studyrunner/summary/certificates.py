@@ -16,6 +16,7 @@ from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.summary.edge_wear import EdgeWear
 from studyrunner.summary.followed_frequency import FollowedFrequencies
+from studyrunner.summary.lives import Lives
 from studyrunner.summary.mesh_change import MeshChange
 from studyrunner.summary.outcome_table import OutcomeTable
 from studyrunner.summary.plausibility import Doubts, doubts_of_study
@@ -65,6 +66,7 @@ class CertificateTable:
         self._edge = EdgeWear(study, facts)
         self._frequencies = FollowedFrequencies(study)
         self._mesh = MeshChange(study)
+        self._lives = Lives(study)
         self._outcomes = OutcomeTable(study)
         self._doubts = Doubts(study, facts)
         self._n_complete = 0
@@ -78,7 +80,7 @@ class CertificateTable:
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Adds records (n,), and the points of each record."""
         lines = (self._small, self._edge, self._frequencies, self._mesh, self._outcomes, self._doubts)
-        for collected in (self._volumes, *lines):
+        for collected in (self._volumes, self._lives, *lines):
             collected.add(points, records)
         complete = np.isin(records["outcome"], list(COMPLETE))
         first = [min(of_one) for of_one in points]
@@ -100,12 +102,13 @@ class CertificateTable:
     def format(self) -> str:
         """Table in lines.
 
-        How well the worn volume is known, what another mesh changes, whether wear is small, how much of it is at the
-        edge, and outcomes where loads and wear vary. Then the largest value of each certificate over all points
+        How well the worn volume is known, what another mesh changes, the shortest life where there is a target, whether
+        wear is small, how much of it is at the edge, and outcomes where loads and wear vary. Then the largest value of
+        each certificate over all points
         computed to the end, with its place, and how many folds, jumps, too long steps, oscillating wear rates and
         unstable states there are.
         """
-        rows = [("worn volume", self._volumes.format()), *self._mesh.rows()]
+        rows = [("worn volume", self._volumes.format()), *self._mesh.rows(), *self._lives.rows()]
         rows.append(("small-wear assumption", self._small.format()))
         rows.extend(self._edge.rows())
         rows.extend(self._frequencies.rows())

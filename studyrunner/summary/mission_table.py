@@ -9,17 +9,17 @@ from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE
 from studyrunner.percent import show_percent
-from studyrunner.plan.point_text import describe_point, show_count
+from studyrunner.plan.point_text import describe_point
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.summary.edge_wear import EdgeWear
+from studyrunner.summary.lives import Lives
 from studyrunner.summary.mesh_change import MeshChange
 from studyrunner.summary.outcome_table import OutcomeTable
 from studyrunner.summary.plausibility import doubts_of_study
 from studyrunner.summary.small_wear import SmallWear
 from studyrunner.summary.worn_volumes import WornVolumes
-from studyrunner.system.progress import count
 
 
 class MissionTable:
@@ -33,12 +33,11 @@ class MissionTable:
         self._mesh = MeshChange(study)
         self._outcomes = OutcomeTable(study)
         self._most: tuple[float, Index, NDArray[np.float64]] | None = None
-        self._lives: list[tuple[float, float, Index]] = []
-        self._n_beyond = 0
+        self._lives = Lives(study)
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Adds records (n,), and the points of each record."""
-        for collected in (self._volumes, self._small, self._edge, self._mesh, self._outcomes):
+        for collected in (self._volumes, self._small, self._edge, self._mesh, self._outcomes, self._lives):
             collected.add(points, records)
         for row in np.flatnonzero(np.isin(records["outcome"], list(COMPLETE))).tolist():
             record, first = records[row], min(points[row])
@@ -46,16 +45,11 @@ class MissionTable:
             volume = float(record["worn_volume"][reached[-1]])
             if volume > 0.0 and (self._most is None or (-volume, first) < (-self._most[0], self._most[1])):
                 self._most = (volume, first, record["block_worn_volume"][reached[-1]] / volume)
-            if np.isnan(record["missions_to_target"]):
-                self._n_beyond += len(points[row])
-            else:
-                self._lives.append((record["missions_to_target"], record["missions_to_target_error"], first))
 
     def format(self) -> str:
         """Table in lines."""
         rows = [("worn volume", self._volumes.format()), *self._mesh.rows(), ("wear by block", self._blocks())]
-        if self._study.until is not None:
-            rows.append((f"missions to {self._study.until.quantity}", self._life()))
+        rows.extend(self._lives.rows())
         rows.append(("small-wear assumption", self._small.format()))
         rows.extend(self._edge.rows())
         rows.extend(self._outcomes.rows())
@@ -78,16 +72,3 @@ class MissionTable:
             for block, share in zip(self._study.mission, shares, strict=True)
         )
         return ", ".join(parts) + (f" at {where}" if where else "")
-
-    def _life(self) -> str:
-        """The shortest life, and how many points have none."""
-        assert self._study.until is not None
-        beyond = count(self._n_beyond, "point") if self._n_beyond else ""
-        if not self._lives:
-            return f"not reached by {beyond}" if beyond else "nothing was computed"
-        shortest, error, point = min(self._lives)
-        where = describe_point(self._study, point)
-        text = f"{show_count(round(shortest))} +- {max(error, 0.0):.2g}" + (
-            f" at {where}, the shortest" if where else ""
-        )
-        return f"{text}; not reached by {beyond}" if beyond else text

@@ -56,7 +56,7 @@ def main():
     row = np.real(model.linear[0].response)[0]
     signal = free_decay(structure, begun, model.contact.gap, PERIODS) @ row
     height, frequency, damping = decay_of(signal, structure.step)
-    modes = {way: backbone(model, AMPLITUDES, 0.5, direction=way) for way in ("down", "up")}
+    modes = {way: backbone(model, AMPLITUDES, 0.5, sweep=way) for way in ("down", "up")}
     for place, amplitude in enumerate(AMPLITUDES):
         tip = abs(modes["down"].response[place, 0])
         nearest = int(np.argmin(abs(height - tip)))

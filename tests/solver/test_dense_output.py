@@ -107,7 +107,16 @@ def test_a_shift_of_the_resonance_is_found_as_a_function_of_the_worn_volume():
     for n, resonance in enumerate((100.0, 101.0, 97.0)):
         output.add(10.0 * n, report([n, n], 0.0, resonance=resonance), np.ones(2), 0.0)
     # by 1 % up, then by 3 % down
-    assert output.taken.reached == pytest.approx(15.0)
+    assert output.taken.reached == pytest.approx(17.5)
+    assert output.taken.reached_within == 0.0
+    # a parabola through the end before and both ends of the step
+    output = DenseOutput(AREA, None, smooth=False, target=WearTarget("frequency_shift", 0.06))
+    for n in range(4):
+        output.add(10.0 * n, report([n, n], 0.0, resonance=100.0 + 10.0 * (n / 3.0) ** 0.5), np.ones(2), 0.0)
+    ends = [0.0, 10.0, 20.0]
+    shifts = [0.1 * (end / 30.0) ** 0.5 for end in ends]
+    assert output.taken.reached == pytest.approx(np.polyval(np.polyfit(shifts, ends, 2), 0.06))
+    assert output.taken.reached_within == pytest.approx(np.interp(0.06, shifts, ends) - output.taken.reached)
 
 
 def test_even_counts_are_as_far_from_each_other_in_volume_and_cycles_together():

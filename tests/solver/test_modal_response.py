@@ -30,7 +30,7 @@ def test_without_slip_the_curve_is_that_of_a_linear_oscillator():
 def test_with_slip_the_curve_is_near_the_full_response():
     """A mass on a rigid slider: both sides of the resonance, where friction damps more than the damper."""
     model = slider(damping=2.0)
-    mode = backbone(model, np.geomspace(8.0, 25.0, 6) * SIZE * np.sqrt(MASS), 0.5, direction="down")
+    mode = backbone(model, np.geomspace(8.0, 25.0, 6) * SIZE * np.sqrt(MASS), 0.5, sweep="down")
     curve = modal_response(model, mode, 8.0)
     assert np.isfinite(curve.frequency).all()
     top = int(np.argmax(curve.amplitude))

@@ -51,7 +51,7 @@ FOOT_AMPLITUDES = np.array([1e-8, 8e-6, 2e-5, 1e-4, 3e-3])
 @lru_cache
 def slider_modes():
     settings = SolverSettings(rtol=1e-3)
-    return backbone(slider(), FIRST * SIZE * np.sqrt(MASS), 0.5, direction="down", settings=settings)
+    return backbone(slider(), FIRST * SIZE * np.sqrt(MASS), 0.5, sweep="down", settings=settings)
 
 
 @lru_cache
@@ -72,7 +72,7 @@ def test_a_mass_on_a_rigid_slider_has_the_closed_form():
 
 
 def test_below_the_friction_limit_the_slider_has_no_mode():
-    found = backbone(slider(), [0.5 * SIZE * np.sqrt(MASS)], 0.5, direction="down")
+    found = backbone(slider(), [0.5 * SIZE * np.sqrt(MASS)], 0.5, sweep="down")
     assert found.outcome[0] is Outcome.BRANCH_LOST
     assert np.isnan(found.frequency).all()
     assert found.message[0]
@@ -91,7 +91,7 @@ def test_negative_damping_gives_the_limit_cycle_of_the_closed_form():
     moved = -moved * (np.cos(phase) - rate * np.sin(phase)) - 1.0
     first = 2.0 / np.pi * abs(np.trapezoid(moved * np.exp(-1j * phase), phase))
     model = slider(-2.0 * grows * NATURAL * MASS)
-    found = backbone(model, [first * SIZE * np.sqrt(MASS)], 0.5, direction="down", settings=SolverSettings(rtol=1e-3))
+    found = backbone(model, [first * SIZE * np.sqrt(MASS)], 0.5, sweep="down", settings=SolverSettings(rtol=1e-3))
     assert abs(found.damping_ratio[0]) < 1e-3 * grows
     assert found.frequency[0] == pytest.approx(NATURAL * np.sqrt(1.0 - grows**2) / (2.0 * np.pi), rel=1e-3)
 
@@ -204,9 +204,9 @@ def test_the_negative_damping_feeds_in_what_damping_and_friction_take(joint):
 def test_a_point_does_not_depend_on_the_others(direction):
     up = direction == "up"
     amplitudes = FOOT_AMPLITUDES if up else FOOT_AMPLITUDES[2:]
-    together = foot_modes() if up else backbone(foot(), amplitudes, 0.5, direction="down")
+    together = foot_modes() if up else backbone(foot(), amplitudes, 0.5, sweep="down")
     for index in (1, 3) if up else (1,):
-        alone = backbone(foot(), amplitudes[index], 0.5, direction=direction)  # type: ignore[arg-type]
+        alone = backbone(foot(), amplitudes[index], 0.5, sweep=direction)  # type: ignore[arg-type]
         for name in ("frequency", "damping_ratio", "frequency_error", "damping_error", "response", "shape"):
             np.testing.assert_array_equal(getattr(alone, name)[0], getattr(together, name)[index])
 
@@ -244,14 +244,14 @@ def test_what_has_no_mode_says_so():
     assert "fewer linear modes" in found.message[0]
     found = backbone(slider(), [1e-3], 0.5)
     assert found.outcome == (Outcome.START_FAILED,)
-    assert 'direction = "down"' in found.message[0]
+    assert 'sweep = "down"' in found.message[0]
 
 
 @pytest.mark.slow
 def test_a_mode_that_is_lost_says_where_and_keeps_its_other_points():
     """A heavy foot whose own vibration the harmonics meet stops several times in a period."""
     # raised as far as it goes, and lowered from there
-    found = backbone(foot(mass=0.05), [1e-4, 1.5e-5], 0.5, direction="down")
+    found = backbone(foot(mass=0.05), [1e-4, 1.5e-5], 0.5, sweep="down")
     assert found.outcome == (Outcome.BRANCH_LOST, Outcome.CONVERGED)
     assert np.isnan(found.frequency[0])
     assert 350.0 < found.frequency[1] < 450.0

@@ -61,7 +61,7 @@ def test_it_is_that_of_the_equation_of_motion(nodal_diameter):
     held[relative] = found[n:]
     square = np.real(np.vdot(x, stiffness @ x + held + 1j * joint.omega * damping @ x)) / np.real(np.vdot(x, mass @ x))
     expected = np.sqrt(square) if square > 0.0 else np.nan
-    assert resonance_frequency(joint, at) == pytest.approx(expected, rel=1e-9, nan_ok=True)
+    assert resonance_frequency(joint, at)[0] == pytest.approx(expected, rel=1e-9, nan_ok=True)
 
 
 @pytest.mark.slow

@@ -1,14 +1,19 @@
 """Histories that end at a wear: the count at which it is reached."""
 
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
+from solver import march_wear
+from solver.contact.wear_law import ARCHARDS_WORK
 from solver.outcome import Outcome
-from solver.settings import Scheme, WearTarget
+from solver.settings import Scheme, SolverSettings, WearTarget
+from studies import build_scene
+from studies.scenes.closed_forms.den_hartog import DenHartogSlider, WearingSlider
 from tests.solver.worn_slider import AREA, CYCLES, END, march, rate_of_depth
 
 STEP = 4000.0
@@ -64,3 +69,75 @@ def test_a_wear_that_is_not_reached_changes_nothing():
         assert np.isnan(found.cycles_to_target)
         assert np.array_equal(found.wear_depth, whole.wear_depth)
         assert np.array_equal(found.worn_volume_error, whole.worn_volume_error)
+
+
+def slider_at(frequency):
+    return DenHartogSlider(0.1, 1.6e5, 10.0, 2 * np.pi * frequency)
+
+
+def exact_count(frequency, depth):
+    """Cycles until the slider is worn so deep."""
+    pair = WearingSlider(slider_at(frequency), 0.5, 10.0, 1e5, AREA, ARCHARDS_WORK)
+    return brentq(lambda n: pair.worn(1.1e-11 * np.array([0.0, n]))[0][1] - depth, 1.0, 1e6)
+
+
+def exact_shift(frequency, depth):
+    """Relative change of w_r, w_r^2 = w^2 + Re(x^H F) / (m |x|^2), from the first harmonics of motion and force."""
+    slider, resonances = slider_at(frequency), []
+    v, g = slider._factors
+    for friction in (5.0, 0.5 * (10.0 - 1e5 * depth)):
+        largest = float(slider.amplitude(np.array(friction)))
+        motion = largest - 1j * friction / 1.6e5 * (g + 4.0 / np.pi * v)
+        force = largest * 1.6e5 / v - 1j * friction * g / v
+        work = float((np.conj(motion) * force).real)
+        resonances.append(np.sqrt(slider.omega**2 + work / (0.1 * abs(motion) ** 2)))
+    return abs(resonances[1] / resonances[0] - 1.0)
+
+
+TARGETS = {
+    "wear_depth": lambda _, depth: depth,
+    "worn_volume": lambda _, depth: depth * AREA,
+    "frequency_shift": exact_shift,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("quantity", TARGETS)
+@pytest.mark.parametrize(("frequency", "depth"), [(160.0, 3e-5), (190.0, 1.5e-5)])
+def test_the_error_of_a_life_is_at_least_the_true_one_whatever_is_read(frequency, depth, quantity):
+    model, exact = build_scene("sdof_slider"), exact_count(frequency, depth)
+    target = WearTarget(quantity, TARGETS[quantity](frequency, depth))
+    found = [
+        march_wear(model, frequency, 10.0, 0.5, 1.1e-11, np.linspace(0.0, 4e5, n), until=target) for n in (2, 11, 101)
+    ]
+    for each in found:
+        assert abs(each.cycles_to_target - exact) <= each.cycles_to_target_error < np.inf
+        assert each.cycles_to_target == found[0].cycles_to_target
+        assert each.cycles_to_target_error == pytest.approx(found[0].cycles_to_target_error, rel=1e-9)
+    # all that is held of the first one is the unworn joint, which tells nothing of what has worn
+    assert np.isnan(found[0].error_estimate)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scheme", "quantity"), [*product(("explicit", "implicit"), TARGETS)])
+def test_the_error_of_a_life_holds_that_of_euler_steps(scheme, quantity):
+    target = WearTarget(quantity, TARGETS[quantity](160.0, 3e-5))
+    asked = {"cycles": np.linspace(0.0, 4e5, 11), "scheme": scheme, "step": 4000.0, "until": target}
+    found = march_wear(build_scene("sdof_slider"), 160.0, 10.0, 0.5, 1.1e-11, **asked)
+    assert abs(found.cycles_to_target - exact_count(160.0, 3e-5)) <= found.cycles_to_target_error
+
+
+@pytest.mark.slow
+def test_a_life_is_known_better_with_a_smaller_rtol():
+    settings = SolverSettings(harmonics=19, samples=256, rtol=1e-3)
+    for quantity in ("wear_depth", "frequency_shift"):
+        target = WearTarget(quantity, TARGETS[quantity](160.0, 3e-5))
+        found = march_wear(
+            build_scene("sdof_slider"), 160.0, 10.0, 0.5, 1.1e-11, [4e5], until=target, settings=settings
+        )
+        off = abs(found.cycles_to_target - exact_count(160.0, 3e-5))
+        assert off <= found.cycles_to_target_error < 2e-2 * found.cycles_to_target
+
+
+def test_a_target_that_is_never_reached_has_no_error():
+    assert np.isnan(march_until(WearTarget("wear_depth", 1.0)).cycles_to_target_error)

@@ -62,10 +62,16 @@ def test_points_end_at_their_target_each_at_its_own_count(tmp_path):
     assert counts[1] == pytest.approx(2.0 * counts[0], rel=1e-9)
     assert np.isnan(counts[2])
     assert result.outcome.values.tolist() == [0, 0, 0]
-    for message, count in zip(result.message.values.tolist()[:2], counts[:2], strict=True):
-        assert message.startswith("at its target at cycle ")
-        assert float(message.split()[5].rstrip(":")) == pytest.approx(count, rel=1e-5)
-        assert message.endswith(": later counts are not computed")
+    errors = result.cycles_to_target_error.values
+    assert errors[1] == pytest.approx(2.0 * errors[0], rel=1e-9)
+    assert 0.0 < errors[0] < 0.05 * counts[0]
+    assert np.isnan(errors[2])
+    for message, count, error in zip(result.message.values.tolist()[:2], counts[:2], errors[:2], strict=True):
+        reached = f"{count:,.0f}".replace(",", " ")
+        assert message == f"at its target at cycle {reached} +- {error:.2g}: later counts are not computed"
+    life = f"cycles to wear_depth                {counts[0]:,.0f}".replace(",", " ") + f" +- {errors[0]:.2g} ("
+    assert life in whole.attrs["certificate_summary"]
+    assert "at wear_coefficient 1e-11 1/Pa, the shortest; not reached by 1 point" in whole.attrs["certificate_summary"]
     assert result.message.values[2].startswith("wear_depth stays below 1e-05 m: it is ")
     assert result.worn_volume.isel(cycle=-1).isnull().values.tolist() == [True, True, False]
     depth = result.wear_depth.isel(contact=0)

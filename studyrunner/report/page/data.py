@@ -43,6 +43,7 @@ COURSES = (
 POINT_NUMBERS = (
     "jump_cycle",
     "cycles_to_target",
+    "cycles_to_target_error",
     "error_estimate",
     "last_cycle",
     "largest_wear_depth",

@@ -8,6 +8,7 @@ _NAMES = {
     "mission": "cycle",
     "last_mission": "last_cycle",
     "missions_to_target": "cycles_to_target",
+    "missions_to_target_error": "cycles_to_target_error",
 }
 
 

@@ -38,6 +38,7 @@ _INFINITE = (
     "cycle_count",
     "block_worn_volume_error",
     "missions_to_target_error",
+    "cycles_to_target_error",
     "response_error",
     *CERTIFICATE,
 )
