@@ -16,7 +16,7 @@ ContactStiffness = Annotated[
         gt=0,
         le=LARGEST_CONTACT_STIFFNESS,
         description="normal stiffness of the rough surfaces per area, in series with each pair; the tangential one is"
-        " 0.82 times as large; rigid if not given, N/m3",
+        " 14/17 times as large; rigid if not given, N/m3",
     ),
 ]
 

@@ -44,7 +44,7 @@ from studies.finite_element.joint_model import (
     ReductionOptions,
     Retainer,
 )
-from studies.scene_answers import N_MODES, NaturalFrequencies
+from studies.scene_answers import N_MODES, KeepFrequencies, NaturalFrequencies
 from studies.scene_error import SceneError
 
 Progress = Callable[[str], None]
@@ -219,18 +219,35 @@ def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int
         raise _refused(error, nodal_diameter, prepared.rotation) from error
 
 
-def natural_frequencies(prepared: PreparedModel) -> NaturalFrequencies:
-    """Lowest natural frequencies of the glued structure at all nodal diameters.
+def natural_frequencies(
+    prepare: Callable[[], PreparedModel], n_sectors: int, known: NaturalFrequencies, keep: KeepFrequencies
+) -> NaturalFrequencies:
+    """Lowest natural frequencies of the glued structure at all nodal diameters 0..n_sectors // 2.
 
-    Raises SceneError where the glued structure is not held, or unstable.
+    Parameters
+    ----------
+    prepare
+        Prepares the model; called only where something is left to compute.
+    known
+        Those of the first nodal diameters, from an interrupted computation.
+    keep
+        Called after each nodal diameter with all that are known.
+
+    Raises
+    ------
+    SceneError
+        Where the glued structure is not held, or unstable.
     """
-    cut = prepared.reduction.ordered.supports.cut
-    nodal_diameters = tuple(range(1 if cut is None else cut.axis.n_sectors // 2 + 1))
-    frequencies = np.full((len(nodal_diameters), N_MODES), np.nan)
-    for k in nodal_diameters:
-        found = glued_frequencies(prepared, k, N_MODES)
-        frequencies[k, : len(found)] = found
-    return NaturalFrequencies(nodal_diameters, frequencies)
+    n_known, n_all = len(known.nodal_diameters), n_sectors // 2 + 1
+    if n_known < n_all:
+        prepared = prepare()
+        for k in range(n_known, n_all):
+            row = np.full((1, N_MODES), np.nan)
+            found = glued_frequencies(prepared, k, N_MODES)
+            row[0, : len(found)] = found
+            known = NaturalFrequencies(tuple(range(k + 1)), np.concatenate([known.frequencies, row]))
+            keep(known)
+    return known
 
 
 def _layers(coordinates: FloatArray, coupled: sparse.csr_matrix, cut: CutFaces | None) -> FloatArray:

@@ -29,9 +29,9 @@ from studies.finite_element.joint import surfaces
 from studies.finite_element.joint.cut_faces import CutFaces, CyclicAxis
 from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, Retainer, SetMotion
-from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
+from studies.finite_element.reduced_joint import PreparedModel, build_fe_scene, prepare_model
 from studies.finite_element.reduced_joint import natural_frequencies as frequencies_of_all_waves
-from studies.scene_answers import NaturalFrequencies, SurfaceMesh
+from studies.scene_answers import KeepFrequencies, NaturalFrequencies, SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scenes.dovetail_mesh import DovetailMesh, build_dovetail_mesh, chord_directions
 from studies.scenes.dovetail_parameters import Parameters, check_parameters
@@ -70,13 +70,18 @@ def describe_mesh(parameters: Parameters) -> SurfaceMesh:
     return surfaces.describe_mesh(build_solid_mesh(parameters, build_dovetail_mesh(parameters)))
 
 
-def natural_frequencies(parameters: Parameters) -> NaturalFrequencies:
+def natural_frequencies(parameters: Parameters, known: NaturalFrequencies, keep: KeepFrequencies) -> NaturalFrequencies:
     """Lowest frequencies of the glued sector, with the effects of rotation if wanted, at all nodal diameters 0..N/2.
+
+    known: those of the first nodal diameters. keep: takes what is known, after each nodal diameter.
 
     Raises SceneError where the parameters do not go together.
     """
-    n_reductions = parameters.n_sectors // 2 + 1
-    return frequencies_of_all_waves(prepare_model(*define_sector(parameters), n_reductions=n_reductions))
+
+    def prepare() -> PreparedModel:
+        return prepare_model(*define_sector(parameters), n_reductions=parameters.n_sectors // 2 + 1)
+
+    return frequencies_of_all_waves(prepare, parameters.n_sectors, known, keep)
 
 
 def define_sector(parameters: Parameters) -> tuple[MeshModel, JointDefinition]:

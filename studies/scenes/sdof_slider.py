@@ -1,9 +1,10 @@
 """A spring-mounted mass that slides on a rigid support: the textbook case of dry friction.
 
 The mass moves along one tangent. A constant force presses the mass on the support, or a spring that wear relaxes: with
-the wear depth W the normal force is `N(W) = normal_load - normal_stiffness W` until the pair opens. Without wear the
-motion has the closed form of Den Hartog, "Forced vibrations with combined Coulomb and viscous friction", Trans. ASME 53
-(1931), if the mass never stops and has no viscous damping.
+the wear depth W the normal force is `N(W) = normal_load - normal_stiffness W` until the pair opens. A spring gives way
+to rough surfaces: `contact_stiffness` divides N(W) by `1 + normal_stiffness / (contact_stiffness area)`. Without wear
+the motion has the closed form of Den Hartog, "Forced vibrations with combined Coulomb and viscous friction", Trans.
+ASME 53 (1931), if the mass never stops, has no viscous damping, and the contact is rigid.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class Parameters(BaseModel):
     mass: float = Field(0.1, gt=0, description="mass, kg")
     damping: float = Field(0.0, ge=0, description="viscous damping of the mount, N s/m")
     stiffness: float = Field(1.6e5, gt=0, description="tangential stiffness of the mount, N/m")
-    normal_load: float = Field(10.0, gt=0, description="normal force without wear, N")
+    normal_load: float = Field(10.0, gt=0, description="normal force without wear, of a rigid contact, N")
     normal_stiffness: float = Field(
         1e5, ge=0, description="stiffness of the spring that presses, N/m; 0: the normal force is constant"
     )

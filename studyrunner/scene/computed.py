@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 from solver.packed_model import pack_model, unpack_model
 from solver.packing import Packed, pack, unpack
 from studies.scene_answers import NaturalFrequencies
-from studies.scenes import scene_has
+from studies.scenes import scene_frequencies, scene_has
 from studyrunner.study.study import Study
 from studyrunner.system.source_digest import package_digest
 
@@ -76,15 +76,33 @@ def read_model(study: Study, n_harmonics: int, computed: Computed) -> ReducedMod
     return unpack_model(packed)
 
 
-def frequencies_once(study: Study, computed: Computed, find: Callable[[], NaturalFrequencies]) -> NaturalFrequencies:
-    """Natural frequencies of a bundled scene, computed or from an earlier run."""
-    return _once(
-        _key("natural frequencies", study),
-        computed,
-        find,
-        lambda found: pack((found.nodal_diameters, found.frequencies)),
-        lambda packed: NaturalFrequencies(*unpack(packed)),
-    )
+def frequencies_once(study: Study, computed: Computed) -> NaturalFrequencies:
+    """Natural frequencies of a bundled scene: those of an earlier run, and what that run had left to compute.
+
+    An interrupted run loses `LEAST_SECONDS` of work at most.
+    """
+    key, scene = _key("natural frequencies", study), study.scene
+    known = _read(key, computed, lambda packed: NaturalFrequencies(*unpack(packed)))
+    began = last = time.monotonic()
+
+    def keep(found: NaturalFrequencies, since: float) -> None:
+        nonlocal last
+        if time.monotonic() > since + LEAST_SECONDS:
+            computed.keep_computed(key, pack((found.nodal_diameters, found.frequencies)))
+            last = time.monotonic()
+
+    found = scene_frequencies(scene.model, scene.parameters, known, lambda found: keep(found, last))
+    keep(found, began)
+    return found
+
+
+def _read(key: str, computed: Computed, unpacked: Callable[[Packed], T]) -> T | None:
+    """A value that an earlier run has kept; None where there is none, or a damaged one, or one of another version."""
+    known = computed.read_computed(key)
+    if known is not None:
+        with contextlib.suppress(ValueError, KeyError, TypeError, IndexError, AttributeError):
+            return unpacked(known)
+    return None
 
 
 def _once(
@@ -94,11 +112,9 @@ def _once(
     packed: Callable[[T], Packed | None],
     unpacked: Callable[[Packed], T],
 ) -> T:
-    known = computed.read_computed(key)
+    known = _read(key, computed, unpacked)
     if known is not None:
-        # what another version has kept under this name, or what is damaged, is computed again
-        with contextlib.suppress(ValueError, KeyError, TypeError, IndexError, AttributeError):
-            return unpacked(known)
+        return known
     began = time.monotonic()
     found = compute()
     if time.monotonic() > began + LEAST_SECONDS and (value := packed(found)) is not None:

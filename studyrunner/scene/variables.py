@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import scene_frequencies, scene_has, scene_mesh
+from studies.scenes import scene_has, scene_mesh
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.scene.computed import Computed, InMemory, frequencies_once
 from studyrunner.study.study import Study
@@ -146,11 +146,7 @@ def _mesh(study: Study, _: ReducedModel) -> Iterator[SceneVariable]:
 
 
 def _frequencies(computed: Computed, study: Study, model: ReducedModel) -> Iterator[SceneVariable]:
-    if _has_frequencies(study):
-        scene = study.scene
-        found = frequencies_once(study, computed, lambda: scene_frequencies(scene.model, scene.parameters))
-    else:
-        found = stuck_frequencies(model)
+    found = frequencies_once(study, computed) if _has_frequencies(study) else stuck_frequencies(model)
     (entry,) = SCENE["natural_frequency"].values()
     labels = {"nodal_diameter": found.nodal_diameters, "mode": range(1, found.frequencies.shape[1] + 1)}
     yield SceneVariable("natural_frequency", entry, found.frequencies)

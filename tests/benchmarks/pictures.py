@@ -3,7 +3,8 @@
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures dovetail.nc
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures dovetail.nc --precision work_precision_slider.nc
 
-`dovetail.nc` is the result of the bundled study, `run-study dovetail`; that of `run-study work_precision_slider`, whose
+`dovetail.nc` is the result of the bundled study with its natural frequencies, `run-study dovetail --set
+'outputs.variables=["default", "natural_frequency"]'`; that of `run-study work_precision_slider`, whose
 picture shows CPU times and is in no test, is drawn where it is named. Written are the PNG files of `NAMES`, as the
 report draws them, and `numbers.json`: the study, what the artists of each figure hold, and a checksum of each picture.
 `tests/studyrunner/report/test_pictures.py` compares all of that with the bundled study, with the files, and with points
@@ -129,7 +130,7 @@ def as_text(numbers: dict[str, Any]) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Writes pictures and numbers of the result that is named."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("result", type=Path, help="result file of the bundled study dovetail")
+    parser.add_argument("result", type=Path, help="result file of dovetail, natural_frequency included")
     parser.add_argument("-o", dest="folder", type=Path, default=FOLDER, help="default: studies/pictures")
     parser.add_argument("--precision", type=Path, help="result file of work_precision_slider, for precision.png")
     options = parser.parse_args(arguments)

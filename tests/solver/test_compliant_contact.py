@@ -1,12 +1,16 @@
 """Springs in series with the pairs: condensed compliance, closed forms, other unknowns, the rigid limit."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import studies
 from solver import build_model, frequency_response, march_wear, with_contact_stiffness
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, TANGENTIAL_RATIO
 from solver.structure.condensation import build_structure, relative_indices
 from studies import build_scene
+from studies.contact_compliance import ContactStiffness
 from tests.references import den_hartog_amplitude, slider_wear_depth
 from tests.solver.models import OMEGA, cyclic_model, random_model
 
@@ -43,6 +47,22 @@ def test_a_stuck_block_on_its_foundation_is_a_mass_on_two_springs():
     for frequency in (160.0, 300.0):
         found = frequency_response(block, frequency, 10.0, friction_coefficient=0.5).response[0, 0]
         assert abs(found) == pytest.approx(10.0 / abs(spring - 0.1 * (2.0 * np.pi * frequency) ** 2), rel=1e-9)
+
+
+@pytest.mark.parametrize("worn", [0.0, 2e-5])
+def test_a_spring_that_presses_gives_way_to_rough_surfaces(worn):
+    """The force is divided by 1 + k_N / (contact stiffness times area), as the pages of the scene say."""
+    for contact_stiffness, share in ((None, 1.0), (2e10, 1.05)):
+        block = build_scene("sdof_slider", contact_stiffness=contact_stiffness)
+        found = march_wear(block, 160.0, 10.0, 0.5, 0.0, [0.0], wear_depth=[worn])
+        assert 1e-4 * found.mean_pressure[0, 0] == pytest.approx((10.0 - 1e5 * worn) / share, rel=1e-9)
+
+
+def test_the_pages_have_the_ratio_of_the_code():
+    assert pytest.approx(14.0 / 17.0, rel=1e-15) == TANGENTIAL_RATIO
+    page = (Path(studies.__file__).parent / "ROUGH_JOINTS.md").read_text(encoding="utf-8")
+    assert f"14/17 = {TANGENTIAL_RATIO:.4f} times" in page
+    assert "14/17 times" in str(ContactStiffness)
 
 
 @pytest.mark.slow

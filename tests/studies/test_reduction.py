@@ -7,7 +7,8 @@ from scipy import linalg
 from studies.finite_element.condensation import projection
 from studies.finite_element.condensation.extend_add import add_lower
 from studies.finite_element.condensation.modes import lowest_modes
-from studies.scenes.dovetail_sector import Parameters, build, natural_frequencies
+from studies.scenes import scene_frequencies
+from studies.scenes.dovetail_sector import Parameters, build
 
 
 @pytest.mark.slow
@@ -27,7 +28,7 @@ def test_combined_shapes_give_what_condensed_forms_give(monkeypatch):
 @pytest.mark.slow
 def test_natural_frequencies_are_those_of_the_reduced_models():
     parameters = Parameters(mesh=1, nodal_diameter=5)
-    told = natural_frequencies(parameters)
+    told = scene_frequencies("dovetail_sector", parameters)
     model = build(parameters, 4)
     n_relative = 3 * model.contact.n_contact
     for k, linear in model.linear.items():
