@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from solver.results.state_report import StateReport
 from solver.settings import Resolution, WearTarget
 from solver.wear.interpolation import depth_within, fraction_where
 from solver.wear.options import WEAR
+from solver.wear.target import TargetSearch
 
 INTERPOLATED = (
     "wear_depth",
@@ -172,9 +172,9 @@ class DenseOutput:
         last, nodes, reached, within = self.last, list(self.taken.nodes), self.taken.reached, self.taken.reached_within
         node = Node(cycle, report, rate, error + (0.0 if last is None else last.local))
         if last is not None:
-            if math.isnan(reached):
-                reached = self._target_within(last, node)
-                within = abs(reached - self._target_within(last, node, straight=True))
+            if math.isnan(reached) and self._search is not None:
+                reached = self._search.within(last, node, self.taken.course)
+                within = abs(reached - self._search.within(last, node, self.taken.course, straight=True))
             before = nodes[-2].cycle if len(nodes) > 1 else -math.inf
             read = self._is_read(before, last.cycle) or self._is_read(last.cycle, cycle)
             if not read and not before < reached <= cycle:
@@ -192,92 +192,22 @@ class DenseOutput:
         place = int(np.searchsorted(self.counts, before, "right"))
         return place < self.counts.size and bool(self.counts[place] <= cycle)
 
+    @property
+    def _search(self) -> TargetSearch | None:
+        return None if self.target is None else TargetSearch(self.target, self.area, self.smooth)
+
     def target_count(self) -> float:
         """Count at which the stored steps reach the target; if they do not, extrapolated by the mean rate of the last
         one, inf where this rate is 0.
         """
-        nodes = self.taken.nodes
-        for start, end in pairwise(nodes):
-            if not math.isnan(found := self._target_within(start, end)):
-                return found
-        if self.target is None or len(nodes) < 2:
-            return math.inf
-        first, last = (
-            abs(self._shift(node)) if self._shifts else self._worn(node.report.wear_depth) for node in nodes[-2:]
-        )
-        grown, length = last - first, nodes[-1].cycle - nodes[-2].cycle
-        return nodes[-1].cycle + (self.target.value - last) * length / grown if grown > 0.0 else math.inf
+        return math.inf if self._search is None else self._search.count(self.taken.nodes, self.taken.course)
 
     def target_within(self) -> float:
         """Error, cycles, of the count at which the target was reached by the interpolation within the step, and by the
         errors of the resonance at its end and at the start.
         """
-        nodes = self.taken.nodes
-        if not self._shifts:
-            return self.taken.reached_within
-        start, end = next(step for step in pairwise(nodes) if self.taken.reached <= step[1].cycle)
-        shifted, known_to = abs(self._shift(end) - self._shift(start)), (nodes[0].report, end.report)
-        error = max(each.resonance_error for each in known_to)
-        by_resonance = error * (end.cycle - start.cycle) / shifted if shifted > 0.0 else math.inf
+        by_resonance = 0.0 if self._search is None else self._search.by_resonance(self.taken.nodes, self.taken.reached)
         return self.taken.reached_within + by_resonance
-
-    @property
-    def _shifts(self) -> bool:
-        return self.target is not None and self.target.quantity == "frequency_shift"
-
-    def _shift(self, node: Node) -> float:
-        """Relative change of the resonance since the first state; above 0 where it rises."""
-        return node.report.resonance / self.taken.nodes[0].report.resonance - 1.0
-
-    def _target_within(self, start: Node, end: Node, *, straight: bool = False) -> float:
-        """Count at which a step reaches the target, NaN where it does not.
-
-        The resonance is a parabola in the worn volume through both ends of the step and the end before, or straight.
-        """
-        if self.target is None:
-            return math.nan
-        wanted = self.target.value
-        if self._shifts:
-            if not abs(self._shift(end)) >= wanted:
-                return math.nan
-            wanted = self._volume_at_shift(start, end, straight=straight)
-        if self._worn(end.report.wear_depth) < wanted:
-            return math.nan
-
-        def worn_at(fraction: float) -> float:
-            return self._worn(self._depth(start, end, np.array([fraction]))[0])
-
-        return start.cycle + fraction_where(wanted, worn_at) * (end.cycle - start.cycle)
-
-    def _volume_at_shift(self, start: Node, end: Node, *, straight: bool) -> float:
-        """Worn volume, m3, at which the resonance has shifted to the target, within a step whose end has reached it."""
-        assert self.target is not None
-        course, wanted = self.taken.course, self.target.value
-        volumes = [self._worn(node.report.wear_depth) for node in (start, end)]
-        way = math.copysign(1.0, self._shift(end))
-        shifts = [way * self._shift(node) for node in (start, end)]
-        if not shifts[1] > shifts[0]:
-            return volumes[0]
-        slope = (volumes[1] - volumes[0]) / (shifts[1] - shifts[0])
-        line = volumes[0] + max(wanted - shifts[0], 0.0) * slope
-        place = int(np.searchsorted(course.cycles, start.cycle)) - 1
-        if straight or place < 0:
-            return line
-        volume = self._worn(course.depths[place])
-        shift = way * (course.resonances[place] / course.resonances[0] - 1.0)
-        if not (volume < volumes[0] < volumes[1] and shift < shifts[0] < wanted):
-            return line
-        # Newton's form of the volume as a function of the shift, which has to rise
-        bend = (slope - (volumes[0] - volume) / (shifts[0] - shift)) / (shifts[1] - shift)
-        found = line + bend * (wanted - shifts[0]) * (wanted - shifts[1])
-        return found if volumes[0] < found < volumes[1] else line
-
-    def _worn(self, depth: FloatArray) -> float:
-        """Wear to compare with the target, from depths (n_contact,), m: the largest depth, m, or the volume, m3."""
-        assert self.target is not None
-        if self.target.quantity == "wear_depth":
-            return float(depth.max(initial=0.0))
-        return float(depth @ self.area)
 
     def _depth(self, start: Node, end: Node, fraction: FloatArray) -> FloatArray:
         """Depths (n, n_contact), m, at fractions (n,) of a step."""

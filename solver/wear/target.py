@@ -1,0 +1,111 @@
+"""The count at which the steps of a wear history reach a target: wear depth, worn volume, or shift of the resonance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.model import FloatArray
+from solver.settings import WearTarget
+from solver.wear.interpolation import depth_within, fraction_where
+
+if TYPE_CHECKING:
+    from solver.wear.output import Course, Node
+
+
+@dataclass(frozen=True)
+class TargetSearch:
+    """Seeks a target within steps. area (n_contact,): m2. smooth: whether the depth is a cubic within a step."""
+
+    target: WearTarget
+    area: FloatArray
+    smooth: bool
+
+    def within(self, start: Node, end: Node, course: Course, *, straight: bool = False) -> float:
+        """Count at which a step reaches the target, NaN where it does not.
+
+        The resonance is a parabola in the worn volume through both ends of the step and the end before, or straight.
+
+        course: of all steps before this one.
+        """
+        wanted = self.target.value
+        if self._shifts:
+            if not abs(_shift(end, course)) >= wanted:
+                return math.nan
+            wanted = self._volume_at_shift(start, end, course, straight=straight)
+        if self._worn(end.report.wear_depth) < wanted:
+            return math.nan
+        length = end.cycle - start.cycle
+        ends = [(node.report.wear_depth, node.rate) for node in (start, end)]
+
+        def worn_at(fraction: float) -> float:
+            return self._worn(depth_within(np.array([fraction]), length, ends[0], ends[1], self.smooth)[0])
+
+        return start.cycle + fraction_where(wanted, worn_at) * length
+
+    def count(self, nodes: Sequence[Node], course: Course) -> float:
+        """Count at which some steps reach the target; if they do not, extrapolated by the mean rate of the last one,
+        inf where this rate is 0.
+        """
+        for start, end in pairwise(nodes):
+            if not math.isnan(found := self.within(start, end, course)):
+                return found
+        if len(nodes) < 2:
+            return math.inf
+        first, last = (
+            abs(_shift(node, course)) if self._shifts else self._worn(node.report.wear_depth) for node in nodes[-2:]
+        )
+        grown, length = last - first, nodes[-1].cycle - nodes[-2].cycle
+        return nodes[-1].cycle + (self.target.value - last) * length / grown if grown > 0.0 else math.inf
+
+    def by_resonance(self, nodes: Sequence[Node], reached: float) -> float:
+        """Error, cycles, of the count `reached` by the errors of the resonance at the end of its step and at the start;
+        0 for other targets.
+        """
+        if not self._shifts:
+            return 0.0
+        start, end = next(step for step in pairwise(nodes) if reached <= step[1].cycle)
+        shifted = abs(end.report.resonance - start.report.resonance) / nodes[0].report.resonance
+        error = max(node.report.resonance_error for node in (nodes[0], end))
+        return error * (end.cycle - start.cycle) / shifted if shifted > 0.0 else math.inf
+
+    @property
+    def _shifts(self) -> bool:
+        return self.target.quantity == "frequency_shift"
+
+    def _volume_at_shift(self, start: Node, end: Node, course: Course, *, straight: bool) -> float:
+        """Worn volume, m3, at which the resonance has shifted to the target, within a step whose end has reached it."""
+        wanted, way = self.target.value, math.copysign(1.0, _shift(end, course))
+        volumes = [self._worn(node.report.wear_depth) for node in (start, end)]
+        shifts = [way * _shift(node, course) for node in (start, end)]
+        if not shifts[1] > shifts[0]:
+            return volumes[0]
+        slope = (volumes[1] - volumes[0]) / (shifts[1] - shifts[0])
+        line = volumes[0] + max(wanted - shifts[0], 0.0) * slope
+        place = int(np.searchsorted(course.cycles, start.cycle)) - 1
+        if straight or place < 0:
+            return line
+        volume = self._worn(course.depths[place])
+        shift = way * (course.resonances[place] / course.resonances[0] - 1.0)
+        if not (volume < volumes[0] < volumes[1] and shift < shifts[0] < wanted):
+            return line
+        # Newton's form of the volume as a function of the shift, which has to rise
+        bend = (slope - (volumes[0] - volume) / (shifts[0] - shift)) / (shifts[1] - shift)
+        found = line + bend * (wanted - shifts[0]) * (wanted - shifts[1])
+        return found if volumes[0] < found < volumes[1] else line
+
+    def _worn(self, depth: FloatArray) -> float:
+        """Wear to compare with the target, from depths (n_contact,), m: the largest depth, m, or the volume, m3."""
+        if self.target.quantity == "wear_depth":
+            return float(depth.max(initial=0.0))
+        return float(depth @ self.area)
+
+
+def _shift(node: Node, course: Course) -> float:
+    """Relative change of the resonance since the first state of a course; above 0 where it rises."""
+    return node.report.resonance / course.resonances[0] - 1.0
