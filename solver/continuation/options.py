@@ -53,9 +53,12 @@ class ContinuationOptions:
     relief: tuple[float, ...] = (0.1, 0.4)
     """Fractions of the static friction forces that are removed where the excitation cannot be raised with the full
     forces. Other fractions lead to other states that friction allows: 5 % for a mass that ratchets."""
-    moderate_friction: float = 1.0
-    """Friction coefficient up to which one static state was found for all joints, from any start. With 0.5 the states
-    of the dovetail are unchanged; with 2 they take 60 iterations more."""
+    viscosity_cut: float = 0.2
+    """Factor on the viscosity of a static state after a step in time."""
+    viscosity_rise: float = 10.0
+    """Factor on this viscosity after a step that was not found."""
+    viscous_steps: int = 60
+    """Most steps in time on the way to a static state."""
 
     # relaxation in time; a change is the norm of the change of the amplitudes over the larger norm of two motions
     search_iterations: int = 800
