@@ -65,7 +65,10 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, b
         if result.converged:
             state, last = result.evaluation, balance
         else:
+            used = budget.iterations
             settled = _settle(balance, point.evaluation, solver, tolerance, budget)
+            # every search needs a static state, whose steps have a limit of their own
+            budget.limit += budget.iterations - used
             if isinstance(settled, Outcome):
                 return settled
             state, last = settled
@@ -89,24 +92,25 @@ def _settle(
     balance: Balance, before: Evaluation, solver: JacobianSolver, tolerance: float, budget: Budget
 ) -> tuple[Evaluation, Balance] | Outcome:
     """Static state to which viscous pairs come from the state `before`, and its balance, or why there is none."""
-    most, viscosity, moved = CONTINUATION.near_iterations, 1.0, np.zeros_like(before.displacement_h)
+    most, viscosity, begun, moved = CONTINUATION.near_iterations, 1.0, before.displacement_h, []
     for _ in range(CONTINUATION.viscous_steps):
         viscous = replace(balance, joint=viscous_joint(balance.joint, viscosity, before.displacement_h))
         ahead = solve_balance(viscous, viscous.predict(*_motion(before)), solver, tolerance, budget, most)
-        if budget.exhausted:
-            break
         if not ahead.converged:
             viscosity *= CONTINUATION.viscosity_rise
             continue
-        moved, before = ahead.evaluation.displacement_h - before.displacement_h, ahead.evaluation
+        before = ahead.evaluation
+        moved.append(before.displacement_h - begun)
         balance = replace(balance, history=final_history(viscous, before))
         end = solve_balance(balance, balance.predict(*_motion(before)), solver, tolerance, budget, most)
         if end.converged:
             return end.evaluation, balance
         if viscosity < COMMON.negligible:
-            return _unheld(moved)
+            break
         viscosity *= CONTINUATION.viscosity_cut
-    return Outcome.STATIC_FAILED
+    # the first step is about as long as the joint is deformed
+    endless = len(moved) > 1 and np.abs(moved[-1]).max() > CONTINUATION.runaway * np.abs(moved[0]).max()
+    return _unheld(moved[-1]) if endless else Outcome.STATIC_FAILED
 
 
 def _motion(at: Evaluation) -> tuple[FloatArray, FloatArray]:
@@ -115,6 +119,6 @@ def _motion(at: Evaluation) -> tuple[FloatArray, FloatArray]:
 
 
 def _unheld(moved: FloatArray) -> Outcome:
-    """Why a joint has no static state, from the last displacements (n_contact, 3, 1), m, of a motion without end."""
-    opened, slid = -moved[:, 0], np.linalg.norm(moved[:, 1:], axis=1)
-    return Outcome.STATIC_OPEN if opened.max() > slid.max() else Outcome.STATIC_SLIDING
+    """Why a joint has no static state, from the displacements (n_contact, 3, 1), m, of its motion without end."""
+    opened, slid = -moved[:, 0].min(initial=0.0), np.linalg.norm(moved[:, 1:], axis=1).max(initial=0.0)
+    return Outcome.STATIC_OPEN if opened > slid else Outcome.STATIC_SLIDING

@@ -22,8 +22,7 @@ class NewtonOptions:
     shortest_step: float = 1.0 / 128.0
     """Shortest step as a fraction of the full step: seven halvings. With six a random scene (`THROWN_OFF` in
     `tests/solver/test_homotopy.py`) gets no accurate state. Also the shortest natural step over the range to the target
-    (where a shorter one is needed, the branch is assumed to fold), the shortest relaxation step in periods, and the
-    least friction of a homotopy over the moderate one."""
+    (where a shorter one is needed, the branch is assumed to fold), and the shortest relaxation step in periods."""
 
     # GMRES and Arnoldi's method
     forcing: float = 1e-3
