@@ -70,8 +70,7 @@ COMPLETE = frozenset(outcome for outcome in Outcome if outcome.complete)
 _SENTENCES = {
     Outcome.CONVERGED: "The point was computed to the end. error_estimate is the error of its worn volume,"
     " response_error that of its vibration.",
-    Outcome.STATIC_FAILED: "The static contact state was not found, although the static load moves no part without"
-    " end: check static load, gaps and supports.",
+    Outcome.STATIC_FAILED: "The static contact state was not found: check static load, gaps and supports.",
     Outcome.START_FAILED: "No periodic vibration was found at the start of the sweep, even with the excitation raised"
     " gradually.",
     Outcome.BRANCH_LOST: "The sweep could not follow the vibration to this frequency.",

@@ -6,11 +6,14 @@ the friction coefficient (0.01 to 1.2), and a load over four decades that presse
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import linprog
 
+from solver.harmonic_balance.converged import PathPoint
 from solver.model import FloatArray, ReducedModel
+from solver.structure.joint import Joint
 from studies.finite_element.elements.solid_mesh import Material
 from studies.finite_element.joint.pairing import ContactSurfaces
 from studies.finite_element.joint.surfaces import surface_of_faces
@@ -20,7 +23,7 @@ from tests.random_scenes import log_uniform
 from tests.studies.fe_models.sectors import faces_where
 from tests.studies.fe_models.solid_meshes import block, joined
 
-SALT = 1936  # Signorini's problem was posed in 1933 and solved later
+SALT = 1785  # year of Coulomb's "Théorie des machines simples": other seeds of the tests have nothing to do with these
 DIRECTIONS = 64  # of the polygons that stand for a friction disc
 
 
@@ -52,10 +55,10 @@ def random_deck(seed: int) -> RandomDeck:
         mesh = joined(mesh, own)
         of_block.append(np.full(own.n_nodes, number))
     owner = np.concatenate(of_block)
-    x, y, z = mesh.coordinates.T
+    x, _, z = mesh.coordinates.T
     level = z - tilt * x
     contacts, touching = [], np.zeros(mesh.n_nodes, bool)
-    for number, (below, above) in enumerate(zip(blocks[:-1], blocks[1:], strict=True)):
+    for number, (below, above) in enumerate(pairwise(blocks)):
         lower = (owner == number) & (np.abs(level - below.origin[2] - below.size[2]) < 1e-9)
         over = (x > below.origin[0] - 1e-9) & (x < below.origin[0] + below.size[0] + 1e-9)
         upper = (owner == number + 1) & (np.abs(level - above.origin[2]) < 1e-9) & over
@@ -169,3 +172,33 @@ def equilibrium_possible(stiffness: FloatArray, force: FloatArray, friction: flo
     if balanced(0.98 * friction):
         return True
     return None if balanced(1.02 * friction) else False
+
+
+def law_errors(joint: Joint, point: PathPoint) -> dict[str, float]:
+    """How far a static state is off each law, from its displacements, forces and history alone, relative.
+
+    Lengths are relative to the largest displacement or gap, forces to the largest force.
+    """
+    at = point.evaluation
+    force, moved, friction = at.force_h[:, :, 0], at.displacement_h[:, :, 0], joint.friction_coefficient
+    gap = joint.contact.gap + at.wear_depth
+    condensed = joint.structure
+    largest_force = max(np.abs(force).max(), np.abs(condensed.static_force).max(), 1e-300)
+    length = max(np.abs(moved).max(), np.abs(gap).max(), 1e-300)
+    normal, tangential = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
+    slip = moved[:, 1:] - at.history
+    slid, limit = np.linalg.norm(slip, axis=1), friction * normal
+    closed = normal > 0.0
+    out_of_balance = condensed.static_stiffness @ moved.ravel() + force.ravel() - condensed.static_force
+    # an open pair may slide; a closed one slides at its limit alone, along the friction force
+    off_limit = np.where(closed, slid * (limit - tangential), 0.0)
+    off_direction = np.where(closed, slid * tangential - np.einsum("ij,ij->i", slip, force[:, 1:]), 0.0)
+    return {
+        "tension": float(max(-normal.min(), 0.0) / largest_force),
+        "penetration": float(max((moved[:, 0] - gap).max(), 0.0) / length),
+        "force across a gap": float((normal * np.abs(moved[:, 0] - gap)).max() / largest_force / length),
+        "friction beyond its limit": float(max((tangential - limit).max(), 0.0) / largest_force),
+        "slip below the limit": float(np.abs(off_limit).max() / largest_force / length),
+        "slip in another direction": float(np.abs(off_direction).max() / largest_force / length),
+        "equilibrium": float(np.abs(out_of_balance).max() / largest_force),
+    }

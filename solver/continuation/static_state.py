@@ -92,7 +92,8 @@ def _settle(
     balance: Balance, before: Evaluation, solver: JacobianSolver, tolerance: float, budget: Budget
 ) -> tuple[Evaluation, Balance] | Outcome:
     """Static state to which viscous pairs come from the state `before`, and its balance, or why there is none."""
-    most, viscosity, begun, moved = CONTINUATION.near_iterations, 1.0, before.displacement_h, []
+    most, viscosity, begun = CONTINUATION.near_iterations, 1.0, before.displacement_h
+    far, moved = float((balance.joint.contact.gap + balance.wear_depth).max()), np.zeros_like(begun)
     for _ in range(CONTINUATION.viscous_steps):
         viscous = replace(balance, joint=viscous_joint(balance.joint, viscosity, before.displacement_h))
         ahead = solve_balance(viscous, viscous.predict(*_motion(before)), solver, tolerance, budget, most)
@@ -100,17 +101,18 @@ def _settle(
             viscosity *= CONTINUATION.viscosity_rise
             continue
         before = ahead.evaluation
-        moved.append(before.displacement_h - begun)
         balance = replace(balance, history=final_history(viscous, before))
         end = solve_balance(balance, balance.predict(*_motion(before)), solver, tolerance, budget, most)
         if end.converged:
             return end.evaluation, balance
-        if viscosity < COMMON.negligible:
+        if not moved.any():
+            # the first step is about as long as the load deforms the joint
+            far = max(far, CONTINUATION.runaway * float(np.abs(before.displacement_h - begun).max()))
+        moved = before.displacement_h - begun
+        if viscosity < COMMON.negligible and np.abs(moved).max() > far:
             break
         viscosity *= CONTINUATION.viscosity_cut
-    # the first step is about as long as the joint is deformed
-    endless = len(moved) > 1 and np.abs(moved[-1]).max() > CONTINUATION.runaway * np.abs(moved[0]).max()
-    return _unheld(moved[-1]) if endless else Outcome.STATIC_FAILED
+    return _unheld(moved) if np.abs(moved).max() > far else Outcome.STATIC_FAILED
 
 
 def _motion(at: Evaluation) -> tuple[FloatArray, FloatArray]:
