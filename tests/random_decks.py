@@ -152,8 +152,8 @@ def equilibrium_possible(stiffness: FloatArray, force: FloatArray, friction: flo
     """Whether contact forces within Coulomb's cones can balance a load on the parts that nothing else holds.
 
     stiffness (3n, 3n), force (3n,): condensed on the relative displacements, pair by pair normal and two tangents.
-    True with polygons inside the friction discs, False without a balance even with polygons around them, None between.
-    The motions without stiffness are those of rigid parts: a linear programme in the contact forces.
+    The motions without stiffness are those of rigid parts: a linear programme in the contact forces. True with all
+    forces within the cones, False without a balance even in wider cones, None between (a load just above an edge).
     """
     values, vectors = np.linalg.eigh(stiffness)
     rigid = vectors[:, values < 1e-9 * values[-1]]
@@ -162,16 +162,17 @@ def equilibrium_possible(stiffness: FloatArray, force: FloatArray, friction: flo
     angle = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     scale = np.abs(force).max()
 
-    def balanced(radius: float) -> bool:
+    def balanced(radius: float, least: float) -> bool:
         # each pair: non-negative shares of the forces (1, mu cos, mu sin) on the edges of its cone
         edges = np.stack([np.ones(DIRECTIONS), radius * np.cos(angle), radius * np.sin(angle)])
         n_pairs = len(force) // 3
         shares = np.einsum("pcr,cd->rpd", rigid.reshape(n_pairs, 3, -1), edges).reshape(rigid.shape[1], -1)
-        return linprog(np.ones(shares.shape[1]), A_eq=shares, b_eq=rigid.T @ force / scale).status == 0
+        weights, bounds = np.ones(shares.shape[1]), (least, None)
+        return linprog(weights, A_eq=shares, b_eq=rigid.T @ force / scale, bounds=bounds).status == 0
 
-    if balanced(0.98 * friction):
+    if balanced(0.98 * friction, 1e-5):
         return True
-    return None if balanced(1.02 * friction) else False
+    return None if balanced(1.02 * friction, 0.0) else False
 
 
 def law_errors(joint: Joint, point: PathPoint) -> dict[str, float]:

@@ -110,7 +110,7 @@ def test_the_dovetail_has_a_static_state_under_any_friction(friction):
 
 
 @pytest.mark.parametrize("force", [1.0, 1000.0])
-@pytest.mark.parametrize("friction", [0.0, 0.001, 0.01, 0.1, 0.4, 1.0])
+@pytest.mark.parametrize("friction", [0.0, 0.01, 0.1, 0.4, 1.0])
 def test_a_free_block_on_a_cantilever_has_a_static_state(friction, force):
     forces = check_laws(stacked(force), friction)
     assert forces[:, 0].sum() == pytest.approx(force, rel=1e-6)
@@ -143,7 +143,7 @@ def test_a_joint_without_a_static_state_says_why(direction, edge, expected):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_random_decks_have_a_static_state_where_the_forces_can_balance(seed):
     exists, outcome, errors, _ = run_deck(random_deck(seed))
     assert (outcome is Outcome.CONVERGED) is (exists == "possible")
