@@ -35,11 +35,18 @@ class Outcome(IntEnum):
     CONTACT_CUT_OFF = 18
     UNSETTLED = 19
     RESONANCE_LOST = 20
+    STATIC_SLIDING = 21
+    STATIC_OPEN = 22
 
     @property
     def complete(self) -> bool:
         """Whether the point was computed to the end. Its values are then results, each with an estimated error."""
         return self in (Outcome.CONVERGED, Outcome.INACCURATE, Outcome.SENSITIVE)
+
+    @property
+    def static(self) -> bool:
+        """Whether there is no static state, so that no vibration was sought."""
+        return self in (Outcome.STATIC_FAILED, Outcome.STATIC_SLIDING, Outcome.STATIC_OPEN)
 
     @property
     def meaning(self) -> str:
@@ -89,6 +96,11 @@ _SENTENCES = {
     " the whole joint slips or opens. More static load, friction or damping, or less excitation, would help.",
     Outcome.RESONANCE_LOST: "The excitation follows the resonance, but there was no resonance in the range, or the"
     " resonance left the range: message says where. The values before are valid.",
+    Outcome.STATIC_SLIDING: "The joint has no static state: the static load pushes a part along its contacts with more"
+    " force than friction can bear, and nothing else holds the part. More friction or normal force, less load along the"
+    " contacts, or a support would hold it.",
+    Outcome.STATIC_OPEN: "The joint has no static state: the static load lifts or tips a part off its contacts, and"
+    " nothing else holds the part. Check direction and place of the static load, gaps and supports.",
     Outcome.TIME_LIMIT: "The computation took longer than its time limit and was stopped.",
     Outcome.EXCEPTION: "The computation ended with an unexpected error; see the variable message.",
     Outcome.CRASHED: "The process that computed this point crashed; see the variable message.",

@@ -1,13 +1,13 @@
-"""The first states of a joint: the static state, and the periodic state that is reached from the static one."""
+"""The first periodic state of a joint, from its static state."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from solver.continuation.arc_length import Arc, follow_arc
-from solver.continuation.homotopy import solve_from_less_friction
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
+from solver.continuation.static_state import predicted_at_rest, solve_static_state
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
@@ -16,60 +16,8 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.stability.hill import is_stable_at
-from solver.structure.fourier import change_orders, from_complex
-from solver.structure.joint import Case, Joint, static_joint
-
-
-def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, budget: Budget) -> PathPoint | None:
-    """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
-
-    The state depends on the history of the load. So the load is raised in equal steps, and each step starts from the
-    tangential state of the step before. In the first evaluation all pairs stick. Where Newton's method fails, a
-    homotopy in the friction coefficient finds the state.
-
-    Parameters
-    ----------
-    joint : Joint
-        The joint; its excitation is left out.
-    wear_depth : array (n_contact,)
-        Wear depth, m, held.
-    tolerance, budget
-        As in `solve_balance`.
-
-    Returns
-    -------
-    PathPoint or None
-        The parameter of the point is the load factor, 1. None where no state is found.
-    """
-    solver, n_steps = JacobianSolver(), CONTINUATION.load_steps
-
-    def balance_at(load_factor: float, history: FloatArray) -> Balance:
-        return Balance.frozen(static_joint(joint, load_factor), history, wear_depth)
-
-    history = np.zeros((joint.contact.n_contact, 2))
-    first = balance_at(1.0 / n_steps, history)
-    start = first.joint.structure.force_h()
-    found = solve_from_less_friction(first, start, solver, tolerance, budget)
-    if found is None:
-        return None
-    point = PathPoint(1.0 / n_steps, found.evaluation, final_history(first, found.evaluation))
-    for step in range(2, n_steps + 1):
-        load_factor = step / n_steps
-        whole = balance_at(load_factor, point.history)
-        # without gaps and wear the state grows in proportion to its load; high friction also allows other states
-        grown = point.evaluation.predicted_h * (step / (step - 1.0))
-        result = solve_balance(whole, grown, solver, tolerance, budget, CONTINUATION.near_iterations)
-        if result.converged:
-            point = PathPoint(load_factor, result.evaluation, final_history(whole, result.evaluation))
-            continue
-        point, arrived = follow_naturally(balance_at, point, load_factor, solver, tolerance, budget)
-        if not arrived:
-            whole = balance_at(load_factor, point.history)
-            found = solve_from_less_friction(whole, point.evaluation.predicted_h, solver, tolerance, budget)
-            if found is None:
-                return None
-            point = PathPoint(load_factor, found.evaluation, final_history(whole, found.evaluation))
-    return point
+from solver.structure.fourier import from_complex
+from solver.structure.joint import Case, Joint
 
 
 def solve_first_state(
@@ -104,15 +52,15 @@ def solve_first_state(
     Returns
     -------
     outcome : Outcome
-        CONVERGED, STATIC_FAILED, START_FAILED, UNSTABLE, UNSETTLED or ADRIFT.
+        CONVERGED, START_FAILED, UNSTABLE, UNSETTLED, ADRIFT, or an outcome of `solve_static_state`.
     point : PathPoint or None
         The state; its parameter is the load factor of the excitation, 1.
     """
     tolerance = case.settings.tolerance
     quiet = case.joint(omega, 0.0)
     static = solve_static_state(quiet, wear_depth, tolerance, budget)
-    if static is None:
-        return Outcome.STATIC_FAILED, None
+    if isinstance(static, Outcome):
+        return static, None
 
     def balance_at(load_factor: float, history: FloatArray) -> Balance:
         return Balance.frozen(case.joint(omega, load_factor * excitation_amplitude), history, wear_depth)
@@ -126,7 +74,7 @@ def solve_first_state(
         unstable = unstable or not stable
         return stable
 
-    start = _at_rest(case, quiet, static, wear_depth)
+    start = predicted_at_rest(case, quiet, static, wear_depth)
     rest = _solved(balance_at(0.0, static.history), start, 0.0, solver, tolerance, budget)
     if rest is None:
         return Outcome.START_FAILED, None
@@ -157,18 +105,6 @@ def solve_first_state(
         if reached is not None:
             return Outcome.CONVERGED, reached
     return Outcome.UNSTABLE if unstable else why, None
-
-
-def _at_rest(case: Case, quiet: Joint, static: PathPoint, wear_depth: FloatArray) -> FloatArray:
-    """Predicted force (n_rel, 2H+1), N, of the static state with the harmonics of a case, none of which vibrates.
-
-    quiet: the joint without excitation, at the harmonics of the case.
-    """
-    displacement_h, force_h = (
-        change_orders(part, (), case.resolution.orders)
-        for part in (static.evaluation.displacement_h, static.evaluation.force_h)
-    )
-    return Balance.frozen(quiet, static.history, wear_depth).predict(displacement_h, force_h)
 
 
 def _solved(

@@ -1,13 +1,6 @@
-"""Homotopies in the friction coefficient and in the harmonics, to states that Newton's method does not find directly.
+"""Homotopy in the harmonics, to states that Newton's method does not find directly.
 
-*Friction.* A static state under low friction is found from any start: where a pair slips, its friction force is bound
-to the normal force. With a friction coefficient of 2 and more most pairs stick, and several states may exist. The first
-iterations then do not show which pairs slip, and in which direction: they cycle among sets of slipping pairs, or end in
-one of the several states. With less friction the joint has one state, which takes a few iterations. From this state the
-friction coefficient is raised in steps of its logarithm. Pairs stop slipping one by one; in the limit all closed pairs
-are glued.
-
-*Harmonics.* A balance of H harmonics equals a balance of more harmonics in which the structure answers to the new
+A balance of H harmonics equals a balance of more harmonics in which the structure answers to the new
 harmonics as the penalty E_n does. With the compliance G_n = 1 / Z_n replaced by 1 / E_n the predicted forces
 (1 - E_n G_n) lambda_n of the new harmonics are zero (`solver.structure.penalty`). The homotopy is
 
@@ -25,63 +18,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.continuation.natural import follow_naturally
-from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.prolongation import carried_history
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.settings import Resolution
 from solver.structure.fourier import build_basis, change_orders, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Case, Joint
-
-
-def solve_from_less_friction(
-    balance: Balance, start: FloatArray, solver: JacobianSolver, tolerance: float, budget: Budget
-) -> PathPoint | None:
-    """State of a balance, by a homotopy from less friction where friction is high or Newton's method fails.
-
-    The tangential history of the balance is held, because the states on the homotopy are no states of the joint.
-
-    Parameters
-    ----------
-    balance : Balance
-        The balance to be solved.
-    start : array (n_rel, m)
-        First predicted force, N.
-    solver, tolerance, budget
-        As in `solve_balance`.
-
-    Returns
-    -------
-    PathPoint or None
-        The state; its parameter is the largest friction coefficient. The friction coefficients of all pairs are raised
-        in proportion. None where no state is found.
-    """
-    target = balance.joint.friction_coefficient
-    largest = float(target.max(initial=0.0))
-
-    def balance_at(logarithm: float, _: FloatArray) -> Balance:
-        friction = target if logarithm == 0.0 else target * float(np.exp(logarithm))
-        return replace(balance, joint=replace(balance.joint, friction_coefficient=friction))
-
-    friction = min(largest, CONTINUATION.moderate_friction)
-    least = NEWTON.shortest_step * friction
-    while True:
-        logarithm = float(np.log(friction / largest)) if friction < largest else 0.0
-        less = balance_at(logarithm, balance.history)
-        result = solve_balance(less, start, solver, tolerance, budget)
-        if result.converged:
-            lower = PathPoint(logarithm, result.evaluation, balance.history)
-            point, arrived = follow_naturally(balance_at, lower, 0.0, solver, tolerance, budget, keep_history=True)
-            if arrived:
-                return PathPoint(largest, point.evaluation, point.history)
-        friction *= 0.5
-        if friction <= least:
-            return None
 
 
 def add_harmonics(

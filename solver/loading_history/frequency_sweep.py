@@ -344,9 +344,9 @@ class FrequencySweep:
                 return case, point
             # the reason comes from the first attempt
             why = outcome if attempt == 0 else why
-            if outcome is Outcome.STATIC_FAILED:
+            if outcome.static:
                 why = outcome
-            if outcome is Outcome.STATIC_FAILED or budget.exhausted:
+            if outcome.static or budget.exhausted:
                 break
         self.nodes.state = replace(self.nodes.state, failure=why)
         return self.nodes.case, None

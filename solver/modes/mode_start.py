@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, friction_limit
-from solver.continuation.first_state import relieved_history, solve_static_state
+from solver.continuation.first_state import relieved_history
 from solver.continuation.options import CONTINUATION
+from solver.continuation.static_state import predicted_at_rest, solve_static_state
 from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.options import LOADING
@@ -21,7 +22,7 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
-from solver.structure.fourier import change_orders, from_complex
+from solver.structure.fourier import from_complex
 from solver.structure.joint import Case, build_case, friction_of_pairs
 
 
@@ -58,8 +59,8 @@ def find_rest(
     # with the spring on the modal coordinate: without the spring the held structure is singular at its own frequency
     case = build_case(modal_model(model, first, 0.0), friction_coefficient, first.omega, settings)
     static = solve_static_state(case.joint(first.omega, 0.0), np.zeros(closed.size), settings.tolerance, budget)
-    if static is None:
-        return Outcome.STATIC_FAILED, ""
+    if isinstance(static, Outcome):
+        return static, ""
     closed = static.evaluation.status_t[:, 0] != SEPARATED
     mode, glued = linear_mode(model, number, closed, friction), True
     if mode is None:
@@ -69,24 +70,20 @@ def find_rest(
     case = build_case(modal_model(model, mode, 0.0), friction_coefficient, first.omega, settings)
     problem = ModeProblem(model, mode, case)
     point = _at_rest(case, mode, settings, budget)
-    return (Outcome.STATIC_FAILED, "") if point is None else Rest(problem, glued, point)
+    return (point, "") if isinstance(point, Outcome) else Rest(problem, glued, point)
 
 
-def _at_rest(case: Case, mode: LinearMode, settings: SolverSettings, budget: Budget) -> PathPoint | None:
-    """The static state with the harmonics of a case; None where it is not found."""
+def _at_rest(case: Case, mode: LinearMode, settings: SolverSettings, budget: Budget) -> PathPoint | Outcome:
+    """The static state with the harmonics of a case, or why there is none."""
     quiet, idle = case.joint(mode.omega, 0.0), np.zeros(case.model.contact.n_contact)
     static = solve_static_state(quiet, idle, settings.tolerance, budget)
-    if static is None:
-        return None
-    still = Balance.frozen(quiet, static.history, idle)
-    start = still.predict(
-        *(
-            change_orders(part, (), case.resolution.orders)
-            for part in (static.evaluation.displacement_h, static.evaluation.force_h)
-        )
-    )
+    if isinstance(static, Outcome):
+        return static
+    still, start = Balance.frozen(quiet, static.history, idle), predicted_at_rest(case, quiet, static, idle)
     result = solve_balance(still, start, JacobianSolver(), settings.tolerance, budget)
-    return PathPoint(0.0, result.evaluation, final_history(still, result.evaluation)) if result.converged else None
+    if not result.converged:
+        return Outcome.STATIC_FAILED
+    return PathPoint(0.0, result.evaluation, final_history(still, result.evaluation))
 
 
 def first_amplitude(rest: Rest) -> float:

@@ -17,13 +17,12 @@ class NewtonOptions:
     """Most iterations of one solve. Prototypes took 2 to 5 from a warm start, up to 40 from a cold one near a
     resonance."""
     full_steps: int = 6
-    """Full steps in a row without a new lowest residual before steps are halved. Twice as many find equal states. With
-    three the dovetail gets another static state at a friction coefficient of 1000."""
+    """Full steps in a row without a new lowest residual before steps are halved. Twice as many find equal states; with
+    three, too, the static states of the dovetail are equal."""
     shortest_step: float = 1.0 / 128.0
     """Shortest step as a fraction of the full step: seven halvings. With six a random scene (`THROWN_OFF` in
     `tests/solver/test_homotopy.py`) gets no accurate state. Also the shortest natural step over the range to the target
-    (where a shorter one is needed, the branch is assumed to fold), the shortest relaxation step in periods, and the
-    least friction of a homotopy over the moderate one."""
+    (where a shorter one is needed, the branch is assumed to fold), and the shortest relaxation step in periods."""
 
     # GMRES and Arnoldi's method
     forcing: float = 1e-3

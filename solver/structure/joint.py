@@ -287,3 +287,20 @@ def static_joint(joint: Joint, load_factor: float) -> Joint:
     # a static state has no velocity: each pair is taken at displacement level
     penalty = static_penalty(joint.penalty)
     return replace(joint, excitation_amplitude=0.0, structure=held, basis=build_basis((), 1), penalty=penalty)
+
+
+def viscous_joint(joint: Joint, viscosity: float, before: FloatArray) -> Joint:
+    """The joint of a static state, with a force `-c (u - u_before)` on each relative displacement u.
+
+    viscosity: c over the penalty of the pair. before (n_contact, 3, 1): displacements u_before, m.
+    """
+    coefficient, structure, penalty = viscosity * joint.relative_penalty, joint.structure, joint.penalty
+    viscous = replace(
+        structure,
+        static_stiffness=structure.static_stiffness + np.diag(coefficient),
+        static_force=structure.static_force + coefficient * joint.to_relative(before)[:, 0],
+    )
+    # the penalty remains that of a pair which moves alone
+    growth = 1.0 + viscosity
+    penalty = replace(penalty, normal=growth * penalty.normal, tangential=growth * penalty.tangential)
+    return replace(joint, structure=viscous, penalty=penalty)

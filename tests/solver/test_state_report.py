@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver.accuracy.certificate import certify
-from solver.continuation.first_state import solve_static_state
+from solver.continuation.static_state import solve_static_state
 from solver.newton.solve_balance import Budget
 from solver.results.state_report import periodic_state, report_state
 from solver.settings import RESOLUTION, SolverSettings, all_orders

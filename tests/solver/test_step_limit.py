@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.continuation.first_state import solve_static_state
+from solver.continuation.static_state import solve_static_state
 from solver.newton.solve_balance import Budget
 from solver.outcome import Outcome
 from solver.settings import SolverSettings

@@ -8,8 +8,8 @@ from scipy.linalg import expm
 
 from solver.continuation import transient
 from solver.continuation.arc_length import Arc, follow_arc
-from solver.continuation.first_state import solve_static_state
 from solver.continuation.options import CONTINUATION
+from solver.continuation.static_state import solve_static_state
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance

@@ -96,7 +96,8 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path):
         assert opened.outcome.values[point] == 6
         assert opened.outcome.attrs["flag_meanings"].split(maxsplit=6)[6] == (
             "inaccurate certificate_failed unstable adrift time_limit exception crashed not_computed period_doubled"
-            " sensitive step_too_long no_final_state contact_cut_off unsettled resonance_lost"
+            " sensitive step_too_long no_final_state contact_cut_off unsettled resonance_lost static_sliding"
+            " static_open"
         )
         for name, (dimensions, _) in CONTRACT.items():
             if "cycle" in dimensions:

@@ -1,0 +1,150 @@
+"""Static states: found from any start and under any friction, or the reason why there is none."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from solver.continuation.static_state import solve_static_state
+from solver.newton.solve_balance import Budget
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from solver.structure.condensation import condense
+from solver.structure.joint import build_case
+from studies.finite_element.elements.solid_mesh import Material
+from studies.finite_element.joint.pairing import ContactSurfaces
+from studies.finite_element.joint.surfaces import surface_of_faces
+from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
+from studies.finite_element.reduced_joint import build_fe_scene
+from tests.benchmarks.random_decks import run_deck
+from tests.random_decks import equilibrium_possible, law_errors, random_deck
+from tests.solver.models import dovetail
+from tests.studies.fe_models.sectors import faces_where
+from tests.studies.fe_models.solid_meshes import block, joined
+
+SETTINGS = SolverSettings(harmonics=3, samples=64)
+OMEGA = 2.0 * np.pi * 211.5
+PAIRS = 16
+PRESS = 200.0  # N on each pair: with it the glued dovetail pulls nowhere
+
+
+@lru_cache
+def pressed_dovetail():
+    """The coarse dovetail with so much more load on its flanks that all pairs of the glued structure are pressed."""
+    model = dovetail()
+    linear = model.linear[0]
+    load = linear.load_static.copy()
+    load[model.contact.dofs[:, 0]] += PRESS
+    return replace(model, linear={0: replace(linear, load_static=load)})
+
+
+def glued_force(model):
+    """Contact force (n_contact, 3), N, of the static load with all relative displacements held."""
+    linear = model.linear[0]
+    condensed = condense(np.real(linear.stiffness), model.contact.dofs.ravel(), linear.load_static)
+    return np.real(condensed.force).reshape(-1, 3)
+
+
+def static_point(model, friction):
+    case = build_case(model, friction, OMEGA, SETTINGS)
+    point = solve_static_state(case.joint(OMEGA, 0.0), np.zeros(model.contact.n_contact), 1e-9, Budget())
+    assert not isinstance(point, Outcome), f"no static state at a friction coefficient of {friction}"
+    return point
+
+
+def check_laws(model, friction):
+    """All laws of contact hold in the static state; returns the contact forces (n_contact, 3), N."""
+    point = static_point(model, friction)
+    errors = law_errors(build_case(model, friction, OMEGA, SETTINGS).joint(OMEGA, 0.0), point)
+    assert max(errors.values()) < 1e-7, errors
+    return point.evaluation.force_h[:, :, 0]
+
+
+def stacked(force, direction=(0.0, 0.0, -1.0), interference=None, edge=False):
+    """A block of steel, 40 x 10 x 5 mm, that is held at one end, and a second one on top of it.
+
+    force: N, on the top, or with `edge` on one of its long edges, along a direction. With an interference, m, bottom
+    and top are held instead, and the material does not bulge.
+    """
+    steel = Material(210e9, 0.3 if interference is None else 0.0, 7850.0)
+    size, above = np.array([0.04, 0.01, 0.005]), 0.005 - (interference or 0.0)
+    divisions = (4, 2, 1 if interference is None else 2)
+    low, _ = block("C3D8", divisions, lambda points: points * size, steel)
+    up, _ = block("C3D8", divisions, lambda points: points * size + [0.0, 0.0, above], steel)
+    mesh = joined(low, up)
+    x, y, z = mesh.coordinates.T
+    upper = np.arange(mesh.n_nodes) >= low.n_nodes
+    inside = (upper & (np.abs(z - above) < 1e-9), ~upper & (np.abs(z - 0.005) < 1e-9))
+    faces = [surface_of_faces(mesh, name, *faces_where(mesh, one)) for name, one in zip("UL", inside, strict=True)]
+    held, top = np.zeros((mesh.n_nodes, 3), bool), upper & (z > above + 0.0049)
+    held[(z < 1e-9) | top if interference is not None else ~upper & (x < 1e-9)] = True
+    pressed = SetMotion(np.flatnonzero(top & (y < 1e-9) if edge else top), np.array(direction))
+    tip = SetMotion(np.flatnonzero(upper & (x > 0.0399)), np.array([0.0, 1.0, 0.0]))
+    contact = ContactSurfaces(*faces, tolerance=1e-3, with_gaps=interference is not None)
+    joint = JointDefinition((contact,), held, tip, {"tip": tip})
+    model = MeshModel(mesh, preload=pressed.row(mesh.n_nodes) * force)
+    return build_fe_scene(model, joint, ReductionOptions(n_modes=10), 1).model
+
+
+def needed_friction(model):
+    """Friction coefficient from which the glued structure slips nowhere."""
+    force = glued_force(model)
+    assert force[:, 0].min() > 0.0
+    return float((np.hypot(force[:, 1], force[:, 2]) / force[:, 0]).max())
+
+
+def test_beyond_the_friction_that_holds_all_pairs_the_static_state_is_the_glued_one():
+    model = pressed_dovetail()
+    needed, force = needed_friction(model), glued_force(model)
+    assert 1.5 < needed < 100.0, "the test means nothing"
+    for friction in (1.01 * needed, 5.0 * needed, 1000.0):
+        evaluation = static_point(model, friction).evaluation
+        assert np.abs(evaluation.force_h[:, :, 0] - force).max() < 1e-7 * force.max()
+    assert np.abs(static_point(model, 0.7 * needed).evaluation.force_h[:, :, 0] - force).max() > 1e-3 * force.max()
+
+
+@pytest.mark.parametrize("friction", [0.3, 0.5, 1.0, 2.0, 5.0, 30.0, 1000.0])
+def test_the_dovetail_has_a_static_state_under_any_friction(friction):
+    check_laws(dovetail(), friction)
+
+
+@pytest.mark.parametrize("force", [1.0, 1000.0])
+@pytest.mark.parametrize("friction", [0.0, 0.01, 0.1, 0.4, 1.0])
+def test_a_free_block_on_a_cantilever_has_a_static_state(friction, force):
+    forces = check_laws(stacked(force), friction)
+    assert forces[:, 0].sum() == pytest.approx(force, rel=1e-6)
+
+
+def test_interference_presses_as_the_closed_form_says():
+    interference = 1e-6
+    # two bars in a row, 5 mm each, between rigid walls
+    pressure = 210e9 * interference / (0.01 - interference)
+    forces = check_laws(stacked(0.0, interference=interference), 0.1)
+    assert forces[:, 0].sum() == pytest.approx(pressure * 0.04 * 0.01, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("direction", "edge", "expected"),
+    [
+        ((0.0, 0.12, -1.0), False, Outcome.STATIC_SLIDING),
+        ((0.0, 0.08, -1.0), False, None),
+        ((0.0, 0.0, 1.0), False, Outcome.STATIC_OPEN),
+        ((0.0, -0.05, -1.0), True, Outcome.STATIC_OPEN),
+    ],
+)
+def test_a_joint_without_a_static_state_says_why(direction, edge, expected):
+    model = stacked(100.0, direction, edge=edge)
+    joint = build_case(model, 0.1, OMEGA, SETTINGS).joint(OMEGA, 0.0)
+    exists = equilibrium_possible(joint.structure.static_stiffness, joint.structure.static_force, 0.1)
+    assert exists is (expected is None)
+    found = solve_static_state(joint, np.zeros(joint.contact.n_contact), 1e-9, Budget())
+    assert (found if isinstance(found, Outcome) else None) is expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6))
+def test_random_decks_have_a_static_state_where_the_forces_can_balance(seed):
+    exists, outcome, errors, _ = run_deck(random_deck(seed))
+    assert (outcome is Outcome.CONVERGED) is (exists == "possible")
+    assert max(errors.values(), default=0.0) < 1e-7
