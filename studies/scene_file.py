@@ -34,16 +34,7 @@ from solver.model import (
     Matrix,
     ReducedModel,
 )
-from studies.guards.hdf5_guard import (
-    LARGEST_FILE,
-    LARGEST_RESULT,
-    find_datasets,
-    find_group,
-    is_number,
-    open_hdf5,
-    read_attribute,
-    read_texts,
-)
+from studies.hdf5 import find_datasets, is_number, open_hdf5, read_attribute, read_texts
 from studies.model_check import check_model, check_sector
 from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
@@ -64,9 +55,6 @@ def write_scene(
     path = Path(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        # that of a process with the same number, which was killed, is taken over; no link is written through
-        unfinished.unlink(missing_ok=True)
-        os.close(os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
         with h5py.File(unfinished, "w") as file:
             file.attrs.update({**scene_attributes(model), **(origin or {})})
             for key, values in scene_datasets(model, mesh):
@@ -103,7 +91,7 @@ def read_origin(path: str | Path) -> dict[str, str]:
 
     Raises what `read_scene` raises.
     """
-    with open_hdf5(Path(path), LARGEST_RESULT) as file:
+    with open_hdf5(Path(path)) as file:
         values = {name: read_attribute(file, name) for name in ORIGIN}
         found = {name: value.item() for name, value in values.items() if value is not None}
     texts = {
@@ -118,34 +106,16 @@ def has_mesh(path: str | Path, group: str = "") -> bool:
         return _has_mesh(datasets)
 
 
-def read_through(path: str | Path, group: str = "") -> None:
-    """Reads all that a scene file holds and forgets it, dataset by dataset. Raises what `read_scene` raises."""
-    with _open_scene(Path(path), group) as (root, datasets):
-        for name in ATTRIBUTES:
-            read_attribute(root, name)
-        for name in ORIGIN:
-            read_attribute(root.file, name)
-        for key, dataset in datasets.items():
-            if is_number(dataset.dtype):
-                _read_numbers(datasets, key)
-            else:
-                read_texts(dataset, key)
-
-
 @contextmanager
 def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, dict[str, h5py.Dataset]]]:
-    """Group and datasets of a scene, found and looked at, but not read; damage that shows in use is a SceneError."""
-    with open_hdf5(path, LARGEST_RESULT if group else LARGEST_FILE) as file:
-        try:
-            root = find_group(file, group) if group else file
-            datasets = find_datasets(root, path.stat().st_size)
-            _refuse_unknown(datasets, _is_grouped(datasets))
-            yield root, datasets
-        except SceneError:
-            raise
-        except (OSError, RuntimeError, ValueError, TypeError, KeyError, OverflowError, MemoryError) as error:
-            # the library has no one way to say that bytes make no sense
-            raise SceneError("model", f"{path.name} is damaged", "write the scene file again") from error
+    """Group and datasets of a scene, found and looked at, but not read."""
+    with open_hdf5(path) as file:
+        root = file.get(group) if group else file
+        if not isinstance(root, h5py.Group):
+            raise SceneError(group, "missing", f"give a file with a group {group}")
+        datasets = find_datasets(root)
+        _refuse_unknown(datasets, _is_grouped(datasets))
+        yield root, datasets
 
 
 def _is_grouped(datasets: Iterable[str]) -> bool:

@@ -37,7 +37,7 @@ def read_toml(content: bytes, source: str) -> dict[str, object]:
     if len(content) > _LARGEST:
         raise wrong(f"give a study file of at most {_LARGEST / 2**20:g} MiB; an axis can be {{start, stop, num}}")
     try:
-        text = content.decode("utf-8")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise wrong("give a text file in UTF-8") from None
     # the parser takes a time that grows with the third power of the parts of a dotted key

@@ -16,8 +16,6 @@ from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
 from tests.mpi.launching import results
 
-pytestmark = pytest.mark.usefixtures("reader")
-
 COARSE = ("scene.mesh=1", "axes.frequency=[211.5, 212.0]", "axes.scheme=implicit", "slow_time.cycles=500")
 OUTPUTS = ("slow_time.outputs=2", 'outputs.variables=["default"]', "outputs.loops=[3]", "solver.rtol=0.1")
 WAVE = ("scene.nodal_diameter=3", "scene.n_sectors=20", "solver.harmonics=2", "solver.samples=64")

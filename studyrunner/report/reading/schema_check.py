@@ -262,6 +262,8 @@ def _check_variable(dataset: xr.Dataset, name: str, entry: Variable, dimensions:
     variable = dataset.variables[name]
     if variable.dims != dimensions:
         raise _WrongError(name, f"dimensions {', '.join(map(str, variable.dims))}")
+    if {"scale_factor", "add_offset"} & set(variable.encoding):
+        raise _WrongError(name, "packed values")
     if entry.is_text or entry.dtype == "str" or name == "contact_surface":
         return _texts(variable, name)
     if variable.dtype.kind not in ("iuf" if entry.dtype.startswith("float") else "iu"):

@@ -1,15 +1,14 @@
 """Files that other libraries read; skipped where the library is not installed."""
 
 import importlib.util
+import sys
 
 import numpy as np
 import pytest
 
-from studies.fe_models.libraries import process
 from studies.fe_models.libraries.meshes import read_library_mesh
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.mesh_files import read_mesh_file
-from studies.guards import limited_process
 from studies.scene_error import SceneError
 from tests.studies.fe_models.meshes import GMSH_22, GMSH_41
 from tests.studies.fe_models.mutations import mutate
@@ -44,6 +43,30 @@ def test_gmsh_41(tmp_path):
     assert [(block.kind, block.nodes.tolist()) for block in deck.blocks] == [("C3D4", [[1, 2, 3, 4], [2, 3, 4, 5]])]
     assert deck.node_sets["UNDER"].tolist() == [1, 2, 3]
     assert deck.element_sets["BLOCK"].tolist() == [1, 2]
+
+
+@needs_meshio
+def test_gmsh_saved_whole(tmp_path):
+    """Mesh.SaveAll: entities without a physical group are in the file as well."""
+    text = GMSH_41.replace('2\n2 1 "under"\n3 2 "block"', '1\n3 2 "block"')
+    assert text != GMSH_41
+    deck = read_library_mesh(write(tmp_path, text.replace(*UNTAGGED)))
+    assert [block.nodes.tolist() for block in deck.blocks] == [[[1, 2, 3, 4], [2, 3, 4, 5]]]
+    assert set(deck.node_sets) == {"BLOCK"}
+
+
+@needs_meshio
+def test_elements_of_two_groups_are_there_once(tmp_path):
+    """Format 2.2 writes an element once for each of its groups."""
+    text = GMSH_22.replace('"block"', '"block"\n3 7 "upper"').replace("$PhysicalNames\n3", "$PhysicalNames\n4")
+    lines = text.split("\n")
+    at = next(n for n, line in enumerate(lines) if line.startswith("5 4 2 2 1"))
+    lines.insert(at + 1, lines[at].replace("5 4 2 2 1", "6 4 2 7 1"))
+    count = lines.index("$Elements") + 1
+    lines[count] = str(int(lines[count]) + 1)
+    deck = read_library_mesh(write(tmp_path, "\n".join(lines)))
+    assert {block.kind: block.numbers.tolist() for block in deck.blocks} == {"C3D8I": [1], "C3D4": [2, 3]}
+    assert {name: numbers.tolist() for name, numbers in deck.element_sets.items()} == {"BLOCK": [1, 2, 3], "UPPER": [3]}
 
 
 @needs_meshio
@@ -88,33 +111,41 @@ def test_meshes_by_their_ending(tmp_path):
         read_mesh_file(tmp_path / "none.cdb")
 
 
-def test_missing_library(tmp_path, monkeypatch):
-    monkeypatch.setattr(process, "_READERS", {"gmsh": ("no_such_library", "meshio"), "full": ("none.at.all", "ansys")})
-    with pytest.raises(SceneError) as wrong:
-        read_library_mesh(write(tmp_path, GMSH_22))
-    assert str(wrong.value) == (
-        "model: mesh.msh needs the library no_such_library, which is not installed;"
-        " install the library: pip install meshio."
-    )
+@pytest.mark.parametrize("library", ["meshio", "ansys.mapdl.reader"])
+def test_missing_library(tmp_path, monkeypatch, library):
+    monkeypatch.setitem(sys.modules, library, None)
+    if library == "meshio":
+        with pytest.raises(
+            SceneError, match=r"msh needs the library meshio, .* install the library: pip install meshio"
+        ):
+            read_library_mesh(write(tmp_path, GMSH_22))
+        return
+    monkeypatch.setitem(sys.modules, "ansys.mapdl", None)
     (tmp_path / "job.full").write_bytes(b"1")
-    with pytest.raises(SceneError, match="pip install ansys"):
+    with pytest.raises(SceneError, match="pip install ansys-mapdl-reader"):
         read_matrices(tmp_path / "job")
 
 
 def test_library_that_does_not_load(tmp_path, monkeypatch):
     (tmp_path / "meshio.py").write_text("import no_such_module_at_all")
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "meshio", raising=False)
     with pytest.raises(SceneError, match=r"reads mesh\.msh does not load: No module named 'no_such_module_at_all'"):
         read_library_mesh(write(tmp_path, GMSH_22))
 
 
-def test_process_that_ends_badly(tmp_path, monkeypatch):
-    path = write(tmp_path, GMSH_22)
-    monkeypatch.setattr(process, "_is_installed", lambda _: True)
-    for end in ("import os; os.abort()", "import sys; sys.exit(0)", "raise SystemExit", "x = bytearray(2 ** 60)"):
-        monkeypatch.setattr(limited_process, "_START", end)
-        with pytest.raises(SceneError, match=r"mesh.msh is damaged: meshio cannot read it"):
-            read_library_mesh(path)
+@needs_meshio
+def test_a_library_that_ends_the_process(tmp_path, monkeypatch, capsys):
+    import meshio
+
+    def read(*_, **__):
+        print("ERROR: Couldn't read file")
+        sys.exit(1)
+
+    monkeypatch.setattr(meshio, "read", read)
+    with pytest.raises(SceneError, match=r"kind that meshio does not know \(ERROR: Couldn't read file\)"):
+        read_library_mesh(write(tmp_path, GMSH_22))
+    assert capsys.readouterr().out == ""
 
 
 # edges of the mid-side nodes, from corners counted from 0, by the manuals of Gmsh and of CalculiX
