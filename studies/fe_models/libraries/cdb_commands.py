@@ -31,7 +31,7 @@ WITHOUT_INFLUENCE = _short(
     "MAT TYPE REAL SECNUM TSHAP R RMORE RLBLOCK SECTYPE SECDATA SECOFFSET SECCONTROL SECCONTROLS SECBLOCK SECMODIF "
     "MP MPTEMP MPDATA MPDE UIMP TREF "
     # how an analysis is run and what it writes
-    "ANTYPE MODOPT MXPAND EQSLV LUMPM NLGEOM NROPT KBC TIME TIMINT NSUBST DELTIM AUTOTS NCNV NEQIT CNVTOL CUTCONTROL "
+    "ANTYPE MODOPT MODCONTROL QRDOPT MXPAND EQSLV LUMPM NLGEOM NROPT KBC TIME TIMINT NSUBST DELTIM AUTOTS NCNV NEQIT CNVTOL CUTCONTROL "
     "OUTRES OUTPR ERESX RESCONTROL RATE CRPLIM LNSRCH PRED KUSE IRLF LSCLEAR EXTOPT SOLCONTROL WRFULL HBMAT HROPT "
     "HROUT HARFRQ TRNOPT BUCOPT SUBOPT RIGID THOPT CGLOC ALPHAD BETAD DMPRAT DMPSTR MDAMP"
 )
@@ -127,8 +127,8 @@ def _is_skipped(command: str, fields: list[str]) -> bool:
         return True
     if command in ("PSTR", "SSTI"):
         return fields[1:2] in (["OFF"], ["0"])
-    if command == "N":  # the end of a block of nodes
-        return "LOC" in fields and fields[-1 if fields[-1] else -2] == "-1"
+    if command in ("N", "EN"):  # the end of a block
+        return fields[-1 if fields[-1] else -2] == "-1"
     # _TINY is the number that stands for no temperature
     values = [field for field in fields[1:] if _PLAIN_NUMBER.fullmatch(field)]
     return command in _WHERE_ZERO and not any(float(value.replace("D", "E")) for value in values)
