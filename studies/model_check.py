@@ -21,6 +21,9 @@ SYMMETRY_TOLERANCE = 1e-8
 """Largest difference of two entries that should mirror each other, relative to the geometric mean of the two diagonal
 entries that bound them in a positive semidefinite matrix. Differences below 1e-12 of the largest entry never count."""
 
+TRANSPOSED = ": MATLAB and Fortran write columns first, so transpose every matrix of the file"
+"""End of the remedy where a matrix has the right shape once it is transposed."""
+
 _NEGATIVE_MASS = 1e-9  # of the largest entry: a negative eigenvalue of that size is round-off
 _REAL = 1e-9  # imaginary part at nodal diameter 0, relative to the largest entry, that is round-off
 
@@ -90,9 +93,10 @@ def _check_names(names: tuple[str, ...], key: str) -> None:
 def _check_contact(contact: ContactInterface, n: int) -> None:
     dofs = contact.dofs
     if dofs.ndim != 2 or dofs.shape[1] != 3 or len(dofs) == 0:
-        raise SceneError(
-            "contact/dofs", f"shape {dofs.shape}", "give one row of 3 indices for each pair, at least one row"
-        )
+        remedy = "give one row of 3 indices for each pair, at least one row"
+        if dofs.ndim == 2 and dofs.shape[0] == 3:
+            remedy += TRANSPOSED
+        raise SceneError("contact/dofs", f"shape {dofs.shape}", remedy)
     n_contact = len(dofs)
     shapes: dict[str, tuple[Any, tuple[int, ...]]] = {
         "area": (contact.area, (n_contact,)),
@@ -196,7 +200,8 @@ def _check_static(linear: LinearModel, contact: ContactInterface, prefix: str) -
 
 def _check_shape(key: str, values: NDArray[Any], shape: tuple[int, ...]) -> None:
     if values.shape != shape:
-        raise SceneError(key, f"shape {values.shape}", f"give shape {shape}")
+        turned = TRANSPOSED if len(shape) == 2 and values.shape == shape[::-1] else ""
+        raise SceneError(key, f"shape {values.shape}", f"give shape {shape}{turned}")
 
 
 def _check_finite(key: str, values: NDArray[Any], *, nan_allowed: bool = False) -> None:

@@ -6,6 +6,9 @@ following anything out of them: external and soft links, external storage and vi
 other than `n_sectors` and `nodal_diameter` are the user's own. `damping` may be two numbers, 1/s and s: coefficients
 of mass and stiffness. `contact/edge` is 1 for pairs beyond which the bodies go on without pairs, 0 for the others.
 
+Programs that store columns first (MATLAB, Fortran) write matrices transposed, which their shapes show. `contact/dofs`
+of three pairs is square: where no other array of the file shows the order, it needs the attribute rows = "pairs".
+
 For pictures a file may hold outer faces of the mesh, without influence on the model or its hash: `mesh/x`, `mesh/y`,
 `mesh/z` (n_nodes,), m; `mesh/quad` (n_faces, 4), nodes anticlockwise from outside, of a triangle the last one twice;
 `mesh/part` (n_faces,), labels. Bodies are told apart by sharing no node. Faces whose corners all stand where contact
@@ -40,6 +43,8 @@ from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scene_layout import ATTRIBUTES, CONTACT, LINEAR, MESH, ORIGIN, scene_attributes, scene_datasets
 
+_ROWS, _PAIRS = "rows", "pairs"  # attribute of contact/dofs, and its value
+
 
 def write_scene(
     model: ReducedModel, path: str | Path, mesh: SurfaceMesh | None = None, origin: Mapping[str, str] | None = None
@@ -60,6 +65,7 @@ def write_scene(
             for key, values in scene_datasets(model, mesh):
                 kind = h5py.string_dtype("utf-8") if values.dtype.kind == "U" else values.dtype
                 file.create_dataset(key, data=values.astype(object) if values.dtype.kind == "U" else values, dtype=kind)
+            file["contact/dofs"].attrs[_ROWS] = _PAIRS
         os.replace(unfinished, path)
     finally:
         unfinished.unlink(missing_ok=True)
@@ -76,7 +82,11 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
     """
     with _open_scene(Path(path), group) as (root, datasets):
         model = _read_model(root, datasets)
+        # results are written here
+        shows_order = bool(group) or _shows_order(datasets)
     check_model(model, n_harmonics, grouped=_is_grouped(datasets))
+    if not shows_order:
+        _check_order(model.contact)
     return model
 
 
@@ -273,6 +283,31 @@ def _read_contact(datasets: Mapping[str, h5py.Dataset]) -> ContactInterface:
         friction_coefficient=_read_real(datasets, friction) if friction in datasets else None,
         edge=_flags("contact/edge", _read_numbers(datasets, "contact/edge")) if "contact/edge" in datasets else None,
     )
+
+
+def _shows_order(datasets: Mapping[str, h5py.Dataset]) -> bool:
+    """Whether the file shows that its arrays are not transposed: by the attribute, or by an array that is not square.
+
+    Such an array would be refused for its shape.
+    """
+    given = read_attribute(datasets["contact/dofs"], _ROWS)
+    if given is not None and given.item() in (_PAIRS, _PAIRS.encode()):
+        return True
+    shapes = [dataset.shape for key, dataset in datasets.items() if key.endswith(("response/dofs", "mesh/quad"))]
+    return any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes)
+
+
+def _check_order(contact: ContactInterface) -> None:
+    """Raises SceneError where `contact/dofs` (3, 3) may as well be transposed."""
+    dofs, turned = contact.dofs, contact.dofs.T
+    if dofs.shape != (3, 3) or np.array_equal(dofs, turned):
+        return
+    if not (turned < 0).all(axis=1).any() and (contact.normal_load[turned[:, 0] < 0] > 0).all():
+        raise SceneError(
+            "contact/dofs",
+            "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction",
+            f'write one row for each pair, and give the dataset the attribute {_ROWS} = "{_PAIRS}"',
+        )
 
 
 def _flags(key: str, values: NDArray[Any]) -> BoolArray:
