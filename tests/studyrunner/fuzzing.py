@@ -119,7 +119,7 @@ FILES = {
 }
 """What is mutated of each kind."""
 PATIENCE = 20
-"""s until an input counts as one that hangs; those that are answered take at most 2 s of a whole processor."""
+"""CPU seconds until an input counts as one that hangs, by SIGPROF; those that are answered take at most 8."""
 _ROOT = str(Path(__file__).parents[2])
 
 
@@ -282,7 +282,7 @@ def answer_in_a_fork(kind: str, name: str, whole: Mapping[str, bytes], chance: r
     receive, send = os.pipe()
     child = os.fork()
     if child == 0:
-        signal.alarm(PATIENCE)
+        signal.setitimer(signal.ITIMER_PROF, PATIENCE)
         try:
             # what is made of a file may crash the library that makes it
             _mutate(kind, whole, chance)

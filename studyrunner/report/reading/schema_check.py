@@ -3,7 +3,7 @@
 Names and sentences of the file are cleaned: they contain no markup, no control characters and no line breaks, and have
 at most the length of a label. Variables that the report does not draw are left out.
 
-By hand: `xarray-schema` has no limits for what is read, and leaves texts as they are.
+By hand: `xarray-schema` has no limits of sizes, and leaves texts as they are.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str
     Raises
     ------
     UserError
-        Where reading the study would do harm.
+        Where the study is no text in UTF-8, too long, or nested too deeply.
     """
     text = str(attributes.get("study", ""))
     try:
