@@ -105,7 +105,7 @@ def read_texts(dataset: h5py.Dataset, key: str) -> tuple[str, ...]:
         raise SceneError(key, "text that is not UTF-8", "write it in UTF-8") from error
 
 
-def read_attribute(group: h5py.Group, name: str) -> NDArray[np.generic] | None:
+def read_attribute(group: h5py.HLObject, name: str) -> NDArray[np.generic] | None:
     """A number or text that is an attribute, of shape () or (1,), None where there is none. Raises SceneError."""
     if name not in group.attrs or name in _OF_NETCDF:
         return None
@@ -114,6 +114,20 @@ def read_attribute(group: h5py.Group, name: str) -> NDArray[np.generic] | None:
     if attribute.shape not in ((), (1,)) or (h5py.check_string_dtype(kind) is None and kind.kind not in "iuf"):
         raise SceneError(name, f"type {kind} of shape {attribute.shape}", "give a single value as the attribute")
     return np.asarray(group.attrs[name])
+
+
+def read_text_attribute(group: h5py.HLObject, name: str) -> str:
+    """A text that is an attribute, "" where there is none. Raises SceneError where it is no text in UTF-8."""
+    value = read_attribute(group, name)
+    text = "" if value is None else value.item()
+    if isinstance(text, bytes):
+        try:
+            text = text.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise SceneError(name, "text that is not UTF-8", "write it in UTF-8") from error
+    if not isinstance(text, str):
+        raise SceneError(name, str(text), "give a text")
+    return text
 
 
 def _open(group: h5py.Group, key: str) -> h5py.HLObject:

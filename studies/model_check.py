@@ -21,6 +21,9 @@ SYMMETRY_TOLERANCE = 1e-8
 """Largest difference of two entries that should mirror each other, relative to the geometric mean of the two diagonal
 entries that bound them in a positive semidefinite matrix. Differences below 1e-12 of the largest entry never count."""
 
+PAIRS_ARE_ROWS = ("rows", "pairs")
+"""Name and value of an attribute of the dataset `contact/dofs` that is not transposed."""
+
 TRANSPOSED = ": MATLAB and Fortran write columns first, so transpose every matrix of the file"
 """End of the remedy where a matrix has the right shape once it is transposed."""
 
@@ -76,6 +79,20 @@ def check_harmonics(model: ReducedModel, n_harmonics: int) -> None:
                 few = f", or use fewer than {harmonic} harmonics" if harmonic > 1 else ""
                 wave = f"harmonic {harmonic} of a wave of nodal diameter {model.nodal_diameter}"
                 raise SceneError(f"nd/{k}", "missing", f"give this group, which {wave} needs{few}")
+
+
+def check_order(contact: ContactInterface) -> None:
+    """Raise SceneError where `contact/dofs`, checked before, may as well be transposed: of three pairs it is square."""
+    dofs, turned = contact.dofs, contact.dofs.T
+    if dofs.shape != (3, 3) or np.array_equal(dofs, turned):
+        return
+    if not (turned < 0).all(axis=1).any() and (contact.normal_load[turned[:, 0] < 0] > 0).all():
+        name, value = PAIRS_ARE_ROWS
+        raise SceneError(
+            "contact/dofs",
+            "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction",
+            f'write one row for each pair, and give the dataset the attribute {name} = "{value}"',
+        )
 
 
 def _check_names(names: tuple[str, ...], key: str) -> None:

@@ -37,13 +37,11 @@ from solver.model import (
     Matrix,
     ReducedModel,
 )
-from studies.hdf5 import find_datasets, is_number, open_hdf5, read_attribute, read_texts
-from studies.model_check import check_model, check_sector
+from studies.hdf5 import find_datasets, is_number, open_hdf5, read_attribute, read_text_attribute, read_texts
+from studies.model_check import PAIRS_ARE_ROWS, check_model, check_order, check_sector
 from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scene_layout import ATTRIBUTES, CONTACT, LINEAR, MESH, ORIGIN, scene_attributes, scene_datasets
-
-_ROWS, _PAIRS = "rows", "pairs"  # attribute of contact/dofs, and its value
 
 
 def write_scene(
@@ -65,7 +63,7 @@ def write_scene(
             for key, values in scene_datasets(model, mesh):
                 kind = h5py.string_dtype("utf-8") if values.dtype.kind == "U" else values.dtype
                 file.create_dataset(key, data=values.astype(object) if values.dtype.kind == "U" else values, dtype=kind)
-            file["contact/dofs"].attrs[_ROWS] = _PAIRS
+            file["contact/dofs"].attrs.update([PAIRS_ARE_ROWS])
         os.replace(unfinished, path)
     finally:
         unfinished.unlink(missing_ok=True)
@@ -86,7 +84,7 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
         shows_order = bool(group) or _shows_order(datasets)
     check_model(model, n_harmonics, grouped=_is_grouped(datasets))
     if not shows_order:
-        _check_order(model.contact)
+        check_order(model.contact)
     return model
 
 
@@ -102,12 +100,7 @@ def read_origin(path: str | Path) -> dict[str, str]:
     Raises what `read_scene` raises.
     """
     with open_hdf5(Path(path)) as file:
-        values = {name: read_attribute(file, name) for name in ORIGIN}
-        found = {name: value.item() for name, value in values.items() if value is not None}
-    texts = {
-        name: value.decode(errors="replace") if isinstance(value, bytes) else value for name, value in found.items()
-    }
-    return {name: value for name, value in texts.items() if isinstance(value, str)}
+        return {name: text for name in ORIGIN if (text := read_text_attribute(file, name))}
 
 
 def has_mesh(path: str | Path, group: str = "") -> bool:
@@ -290,24 +283,11 @@ def _shows_order(datasets: Mapping[str, h5py.Dataset]) -> bool:
 
     Such an array would be refused for its shape.
     """
-    given = read_attribute(datasets["contact/dofs"], _ROWS)
-    if given is not None and given.item() in (_PAIRS, _PAIRS.encode()):
+    name, value = PAIRS_ARE_ROWS
+    if read_text_attribute(datasets["contact/dofs"], name) == value:
         return True
     shapes = [dataset.shape for key, dataset in datasets.items() if key.endswith(("response/dofs", "mesh/quad"))]
     return any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes)
-
-
-def _check_order(contact: ContactInterface) -> None:
-    """Raises SceneError where `contact/dofs` (3, 3) may as well be transposed."""
-    dofs, turned = contact.dofs, contact.dofs.T
-    if dofs.shape != (3, 3) or np.array_equal(dofs, turned):
-        return
-    if not (turned < 0).all(axis=1).any() and (contact.normal_load[turned[:, 0] < 0] > 0).all():
-        raise SceneError(
-            "contact/dofs",
-            "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction",
-            f'write one row for each pair, and give the dataset the attribute {_ROWS} = "{_PAIRS}"',
-        )
 
 
 def _flags(key: str, values: NDArray[Any]) -> BoolArray:
