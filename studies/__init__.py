@@ -7,8 +7,8 @@ For use in Python, from this package itself:
 - `SceneError`: what both raise, in one sentence.
 
 `scenes` makes reduced models, one file a scene; `scene_file` reads and writes scene files (`scene_layout` their
-datasets, `model_check` what they must obey, `sandboxed_read` and `guards` what they may not do); `scene_answers` what
-scenes tell beside the model. The `.toml` files are the bundled studies, `notebooks` read their results.
+datasets, `model_check` what they must obey, `hdf5` how datasets are read); `scene_answers` what scenes tell beside the
+model. The `.toml` files are the bundled studies, `notebooks` read their results.
 """
 
 from __future__ import annotations

@@ -21,6 +21,12 @@ SYMMETRY_TOLERANCE = 1e-8
 """Largest difference of two entries that should mirror each other, relative to the geometric mean of the two diagonal
 entries that bound them in a positive semidefinite matrix. Differences below 1e-12 of the largest entry never count."""
 
+PAIRS_ARE_ROWS = ("rows", "pairs")
+"""Name and value of an attribute of the dataset `contact/dofs` that is not transposed."""
+
+TRANSPOSED = ": MATLAB and Fortran write columns first, so transpose every matrix of the file"
+"""End of the remedy where a matrix has the right shape once it is transposed."""
+
 _NEGATIVE_MASS = 1e-9  # of the largest entry: a negative eigenvalue of that size is round-off
 _REAL = 1e-9  # imaginary part at nodal diameter 0, relative to the largest entry, that is round-off
 
@@ -75,6 +81,20 @@ def check_harmonics(model: ReducedModel, n_harmonics: int) -> None:
                 raise SceneError(f"nd/{k}", "missing", f"give this group, which {wave} needs{few}")
 
 
+def check_order(contact: ContactInterface) -> None:
+    """Raise SceneError where `contact/dofs`, checked before, may as well be transposed: of three pairs it is square."""
+    dofs, turned = contact.dofs, contact.dofs.T
+    if dofs.shape != (3, 3) or np.array_equal(dofs, turned):
+        return
+    if not (turned < 0).all(axis=1).any() and (contact.normal_load[turned[:, 0] < 0] > 0).all():
+        name, value = PAIRS_ARE_ROWS
+        raise SceneError(
+            "contact/dofs",
+            "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction",
+            f'write one row for each pair, and give the dataset the attribute {name} = "{value}"',
+        )
+
+
 def _check_names(names: tuple[str, ...], key: str) -> None:
     if not names:
         raise SceneError(key, "no name", "give at least one response")
@@ -90,9 +110,10 @@ def _check_names(names: tuple[str, ...], key: str) -> None:
 def _check_contact(contact: ContactInterface, n: int) -> None:
     dofs = contact.dofs
     if dofs.ndim != 2 or dofs.shape[1] != 3 or len(dofs) == 0:
-        raise SceneError(
-            "contact/dofs", f"shape {dofs.shape}", "give one row of 3 indices for each pair, at least one row"
-        )
+        remedy = "give one row of 3 indices for each pair, at least one row"
+        if dofs.ndim == 2 and dofs.shape[0] == 3:
+            remedy += TRANSPOSED
+        raise SceneError("contact/dofs", f"shape {dofs.shape}", remedy)
     n_contact = len(dofs)
     shapes: dict[str, tuple[Any, tuple[int, ...]]] = {
         "area": (contact.area, (n_contact,)),
@@ -196,7 +217,8 @@ def _check_static(linear: LinearModel, contact: ContactInterface, prefix: str) -
 
 def _check_shape(key: str, values: NDArray[Any], shape: tuple[int, ...]) -> None:
     if values.shape != shape:
-        raise SceneError(key, f"shape {values.shape}", f"give shape {shape}")
+        turned = TRANSPOSED if len(shape) == 2 and values.shape == shape[::-1] else ""
+        raise SceneError(key, f"shape {values.shape}", f"give shape {shape}{turned}")
 
 
 def _check_finite(key: str, values: NDArray[Any], *, nan_allowed: bool = False) -> None:

@@ -9,7 +9,6 @@ from pydantic import ValidationError
 
 from solver.model import ReducedModel
 from studies import scene_file, scenes
-from studies.sandboxed_read import check_scene_readable
 from studies.scene_error import SceneError, remedy_of
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE as OF_A_WAVE
 
@@ -58,7 +57,7 @@ def build_scene(name: str, /, *, n_harmonics: int = OF_A_WAVE, **parameters: obj
 
 
 def read_scene(path: str | Path, *, n_harmonics: int = 1) -> ReducedModel:
-    """Reduced model of a scene file, which a process of its own has read before without harm.
+    """Reduced model of a scene file.
 
     Parameters
     ----------
@@ -74,5 +73,4 @@ def read_scene(path: str | Path, *, n_harmonics: int = 1) -> ReducedModel:
     OSError
         Where there is no such file or it cannot be opened.
     """
-    check_scene_readable(Path(path))
     return scene_file.read_scene(path, n_harmonics)

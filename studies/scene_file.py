@@ -6,6 +6,9 @@ following anything out of them: external and soft links, external storage and vi
 other than `n_sectors` and `nodal_diameter` are the user's own. `damping` may be two numbers, 1/s and s: coefficients
 of mass and stiffness. `contact/edge` is 1 for pairs beyond which the bodies go on without pairs, 0 for the others.
 
+Programs that store columns first (MATLAB, Fortran) write matrices transposed, which their shapes show. `contact/dofs`
+of three pairs is square: where no other array of the file shows the order, it needs the attribute rows = "pairs".
+
 For pictures a file may hold outer faces of the mesh, without influence on the model or its hash: `mesh/x`, `mesh/y`,
 `mesh/z` (n_nodes,), m; `mesh/quad` (n_faces, 4), nodes anticlockwise from outside, of a triangle the last one twice;
 `mesh/part` (n_faces,), labels. Bodies are told apart by sharing no node. Faces whose corners all stand where contact
@@ -34,17 +37,8 @@ from solver.model import (
     Matrix,
     ReducedModel,
 )
-from studies.guards.hdf5_guard import (
-    LARGEST_FILE,
-    LARGEST_RESULT,
-    find_datasets,
-    find_group,
-    is_number,
-    open_hdf5,
-    read_attribute,
-    read_texts,
-)
-from studies.model_check import check_model, check_sector
+from studies.hdf5 import find_datasets, is_number, open_hdf5, read_attribute, read_text_attribute, read_texts
+from studies.model_check import PAIRS_ARE_ROWS, check_model, check_order, check_sector
 from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scene_layout import ATTRIBUTES, CONTACT, LINEAR, MESH, ORIGIN, scene_attributes, scene_datasets
@@ -64,14 +58,12 @@ def write_scene(
     path = Path(path)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        # that of a process with the same number, which was killed, is taken over; no link is written through
-        unfinished.unlink(missing_ok=True)
-        os.close(os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
         with h5py.File(unfinished, "w") as file:
             file.attrs.update({**scene_attributes(model), **(origin or {})})
             for key, values in scene_datasets(model, mesh):
                 kind = h5py.string_dtype("utf-8") if values.dtype.kind == "U" else values.dtype
                 file.create_dataset(key, data=values.astype(object) if values.dtype.kind == "U" else values, dtype=kind)
+            file["contact/dofs"].attrs.update([PAIRS_ARE_ROWS])
         os.replace(unfinished, path)
     finally:
         unfinished.unlink(missing_ok=True)
@@ -88,7 +80,11 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
     """
     with _open_scene(Path(path), group) as (root, datasets):
         model = _read_model(root, datasets)
+        # results are written here
+        shows_order = bool(group) or _shows_order(datasets)
     check_model(model, n_harmonics, grouped=_is_grouped(datasets))
+    if not shows_order:
+        check_order(model.contact)
     return model
 
 
@@ -103,13 +99,8 @@ def read_origin(path: str | Path) -> dict[str, str]:
 
     Raises what `read_scene` raises.
     """
-    with open_hdf5(Path(path), LARGEST_RESULT) as file:
-        values = {name: read_attribute(file, name) for name in ORIGIN}
-        found = {name: value.item() for name, value in values.items() if value is not None}
-    texts = {
-        name: value.decode(errors="replace") if isinstance(value, bytes) else value for name, value in found.items()
-    }
-    return {name: value for name, value in texts.items() if isinstance(value, str)}
+    with open_hdf5(Path(path)) as file:
+        return {name: text for name in ORIGIN if (text := read_text_attribute(file, name))}
 
 
 def has_mesh(path: str | Path, group: str = "") -> bool:
@@ -118,34 +109,16 @@ def has_mesh(path: str | Path, group: str = "") -> bool:
         return _has_mesh(datasets)
 
 
-def read_through(path: str | Path, group: str = "") -> None:
-    """Reads all that a scene file holds and forgets it, dataset by dataset. Raises what `read_scene` raises."""
-    with _open_scene(Path(path), group) as (root, datasets):
-        for name in ATTRIBUTES:
-            read_attribute(root, name)
-        for name in ORIGIN:
-            read_attribute(root.file, name)
-        for key, dataset in datasets.items():
-            if is_number(dataset.dtype):
-                _read_numbers(datasets, key)
-            else:
-                read_texts(dataset, key)
-
-
 @contextmanager
 def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, dict[str, h5py.Dataset]]]:
-    """Group and datasets of a scene, found and looked at, but not read; damage that shows in use is a SceneError."""
-    with open_hdf5(path, LARGEST_RESULT if group else LARGEST_FILE) as file:
-        try:
-            root = find_group(file, group) if group else file
-            datasets = find_datasets(root, path.stat().st_size)
-            _refuse_unknown(datasets, _is_grouped(datasets))
-            yield root, datasets
-        except SceneError:
-            raise
-        except (OSError, RuntimeError, ValueError, TypeError, KeyError, OverflowError, MemoryError) as error:
-            # the library has no one way to say that bytes make no sense
-            raise SceneError("model", f"{path.name} is damaged", "write the scene file again") from error
+    """Group and datasets of a scene, found and looked at, but not read."""
+    with open_hdf5(path) as file:
+        root = file.get(group) if group else file
+        if not isinstance(root, h5py.Group):
+            raise SceneError(group, "missing", f"give a file with a group {group}")
+        datasets = find_datasets(root)
+        _refuse_unknown(datasets, _is_grouped(datasets))
+        yield root, datasets
 
 
 def _is_grouped(datasets: Iterable[str]) -> bool:
@@ -303,6 +276,18 @@ def _read_contact(datasets: Mapping[str, h5py.Dataset]) -> ContactInterface:
         friction_coefficient=_read_real(datasets, friction) if friction in datasets else None,
         edge=_flags("contact/edge", _read_numbers(datasets, "contact/edge")) if "contact/edge" in datasets else None,
     )
+
+
+def _shows_order(datasets: Mapping[str, h5py.Dataset]) -> bool:
+    """Whether the file shows that its arrays are not transposed: by the attribute, or by an array that is not square.
+
+    Such an array would be refused for its shape.
+    """
+    name, value = PAIRS_ARE_ROWS
+    if read_text_attribute(datasets["contact/dofs"], name) == value:
+        return True
+    shapes = [dataset.shape for key, dataset in datasets.items() if key.endswith(("response/dofs", "mesh/quad"))]
+    return any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes)
 
 
 def _flags(key: str, values: NDArray[Any]) -> BoolArray:

@@ -16,7 +16,7 @@ from studyrunner.mpi.version_check import describe_machine
 from studyrunner.netcdf.creation_date import check_date
 from studyrunner.netcdf.existing_result import Target, check_result
 from studyrunner.netcdf.output import check_output
-from studyrunner.report.reading.opening import open_vetted
+from studyrunner.report.reading.opening import open_file
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors
 from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
 from studyrunner.scene_building import build_scenes
@@ -127,7 +127,7 @@ def open_result(path: str | Path) -> xr.Dataset:
     UserError
         Where there is no such file, it is no result of `run-study`, or it is damaged: one line.
     """
-    opened = open_vetted(path)
+    opened = open_file(path)
     try:
         with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
             check_dataset(opened, str(path))

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import studyrunner.system.own_modules_only  # noqa: F401 - where all others are looked for
-
-# isort: split
 import sys
 from collections.abc import Sequence
 

@@ -25,7 +25,6 @@ from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, f
 from studyrunner.plan.tasks import BranchTask, Joint, MarchTask
 from studyrunner.system.machine_faults import (
     MachineFaultError,
-    guard_kernel_cache,
     is_fault_of_machine,
     tells_of_machine,
 )
@@ -83,7 +82,6 @@ def build_evaluator(model: ReducedModel | None) -> Evaluate:
             models.add(task.scenes, tuple(map(_open_model, task.models)))
         elif not models.use(task.scenes):
             raise RuntimeError(f"no model of scene {task.scenes} for {task}")
-        guard_kernel_cache()
         of_task, own = replace(task, models=()), dict(zip(task.scenes, models[task.scenes], strict=True))
         if isinstance(of_task, MarchTask) and of_task.blocks:
             yield fly(own, of_task, keep)

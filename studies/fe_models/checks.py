@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from studies.fe_models.deck.mesh import Deck, FloatArray, IntArray
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.units import Units
+from studies.finite_element.elements.element_matrices import element_volumes
+from studies.finite_element.elements.kinds import ELEMENT_KINDS
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.scene_error import SceneError
 
@@ -45,6 +47,12 @@ _SPEED_AGREES = 1e-3
 
 _ROUNDING = 1e-13
 """Of an entry in a file: 14 digits, and what the code itself rounds."""
+
+_MASS_AGREES = 0.02
+"""Relative difference of two masses that are the same: a coarse mesh of curved bodies, point masses that are small."""
+
+_LEAST_SHARE = 0.1
+"""Of the mass that matrices without the fixed nodes have at least."""
 
 _LEAST_DENSITY, _LARGEST_DENSITY = 1e-2, 3e4
 """kg/m3 over the box around a model: from a blade thin and oblique in its box to solid metal."""
@@ -133,6 +141,32 @@ def mass_of(deck: Deck, matrices: Matrices) -> float:
     """Mass of the model in units of the file: the mean over the three directions."""
     motions = [translation(deck, matrices, axis) for axis in np.eye(3)]
     return float(np.mean([motion @ (matrices.mass @ motion) for motion in motions]))
+
+
+def mass_by_density(deck: Deck) -> float | None:
+    """Mass of the elements in units of the file, by their volumes; None where the deck lacks a density."""
+    mass = 0.0
+    for block in deck.blocks:
+        density = np.full(block.numbers.size, np.nan)
+        for section in deck.sections:
+            found = deck.materials.get(section.material)
+            if found is not None and found.density is not None:
+                density[np.isin(block.numbers, deck.element_sets[section.element_set])] = found.density
+        places = deck.coordinates[deck.rows_of_nodes(block.nodes)]
+        mass += float(density @ element_volumes(ELEMENT_KINDS[block.kind], places))
+    return None if math.isnan(mass) else mass
+
+
+def check_mass(deck: Deck, matrices: Matrices, units: Units) -> None:
+    """The matrices have the mass that density and volume of the deck give; less where they lack nodes of the deck."""
+    expected, found = mass_by_density(deck), mass_of(deck, matrices)
+    if expected is None:
+        return
+    whole = np.isin(np.concatenate([block.nodes.ravel() for block in deck.blocks]), matrices.node).all()
+    if not (1 - _MASS_AGREES if whole else _LEAST_SHARE) <= found / expected <= 1 + _MASS_AGREES:
+        masses = f"{found * units.mass:.3g} kg in the matrices, {expected * units.mass:.3g} kg by density and volume"
+        remedy = "give both of one run and in the same units, or a deck without *DENSITY"
+        raise SceneError("matrices", f"{matrices.files[0]} and {deck.path}: {masses}", remedy)
 
 
 def check_mesh_is_of_matrices(deck: Deck, matrices: Matrices) -> None:

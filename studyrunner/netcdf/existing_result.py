@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studies.sandboxed_read import check_scene_readable, is_hdf5
+from studies.hdf5 import is_hdf5, open_hdf5, read_attribute
 from studies.scene_error import SceneError
+from studies.scene_file import has_mesh
 from studyrunner.checkpoint.database import read_study
 from studyrunner.netcdf.output import progress_file
 from studyrunner.netcdf.provenance import POINTS_LEFT
-from studyrunner.study.study_of_result import SCENE_GROUP
 from studyrunner.study.toml_text import read_toml
 from studyrunner.user_error import UserError
 
@@ -83,13 +83,11 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
 
 def check_scene_file(option: str, path: Path) -> None:
     """Raises UserError where a file exists that is no scene file."""
-    from studies.guards.hdf5_guard import open_hdf5, read_attribute
-
     with contextlib.suppress(OSError, RuntimeError, ValueError, TypeError, KeyError, SceneError):
         if not path.exists() or path.stat().st_size == 0:
             return
         if is_hdf5(path):
-            check_scene_readable(path)
+            has_mesh(path)  # raises where there is anything but a scene
             with open_hdf5(path) as file:
                 if read_attribute(file, "study") is None:
                     return
@@ -104,14 +102,11 @@ def _read_note(target: Path) -> Label | None:
 
 def _read_result(option: str, path: Path) -> tuple[Label | None, bool]:
     """Identity of the study of an existing result, None without one, and whether the result is finished."""
-    from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5, read_attribute
-
     try:
         if not path.exists() or path.stat().st_size == 0:
             return None, False
         if is_hdf5(path):
-            check_scene_readable(path, SCENE_GROUP, ("study", POINTS_LEFT))
-            with open_hdf5(path, LARGEST_RESULT) as file:
+            with open_hdf5(path) as file:
                 text, left = read_attribute(file, "study"), read_attribute(file, POINTS_LEFT)
                 if text is not None:
                     return _label_in(text.item()), left is None or left.size != 1 or left.item() == 0

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import studyrunner.system.own_modules_only  # noqa: F401 - where all others are looked for
-
-# isort: split
 import argparse
 import os
-import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
-from studyrunner.system.endings import raise_ending
-from studyrunner.system.own_process import CRASHES, run_in_own_process
+from studyrunner.system.endings import raise_ending, take_endings
 from studyrunner.system.streams import keep_talking
-from studyrunner.user_error import UserError, Verbatim
+from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
     from rich.status import Status
@@ -120,19 +115,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments
-        The command line. Without them it is that of this process, and another process draws: of large variables only
-        parts are read before, and where a file is damaged behind these the libraries may crash.
+        The command line, None for that of this process.
     """
     keep_talking()
-    if arguments is None:
-        return _status_of(_report_in_own_process)
-    return _status_of(lambda: _report(parse_options(arguments)))
-
-
-def _status_of(work: Callable[[], int]) -> int:
-    """Exit status, with a line or a traceback where the work does not come to its end."""
+    take_endings()
     try:
-        return work()
+        return _report(parse_options(sys.argv[1:] if arguments is None else arguments))
     except UserError as error:
         print(f"study-report: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -145,20 +133,6 @@ def _status_of(work: Callable[[], int]) -> int:
         print("study-report: unexpected failure", file=sys.stderr)
         traceback.print_exc()
         return UNEXPECTED
-
-
-def _report_in_own_process() -> int:
-    options = parse_options(sys.argv[1:])
-    ended = run_in_own_process(lambda: _status_of(lambda: _report(options)))
-    if ended < 0 and sys.stderr.isatty():
-        # what shows the progress has hidden the cursor, and could not show it again
-        print("\x1b[?25h", end="", file=sys.stderr)
-    if -ended in CRASHES:
-        raise UserError(str(options.result), "the file", Verbatim("damaged"), "give a result file that is whole")
-    if ended < 0:
-        print(f"study-report: ended by signal {-ended} ({signal.strsignal(-ended)})", file=sys.stderr)
-        return UNEXPECTED
-    return ended
 
 
 def _report(options: Options) -> int:

@@ -9,7 +9,6 @@ from typing import Any, cast
 
 from pydantic import BaseModel
 
-from studies.sandboxed_read import check_scene_readable
 from studies.scene_error import SceneError
 from studies.scenes import scene_has, scene_parameters
 from studyrunner.study.checked_table import check_table
@@ -121,7 +120,5 @@ def _find_scene(model: str, source: str, path: Path, archived: Archived | None) 
             remedy = "there is no such file: give a path relative to the study file"
             raise UserError(source, "scene.model", model, remedy)
     with scene_errors(source, scene_path):
-        if not group:
-            check_scene_readable(scene_path)
         offers = ("mesh",) if has_mesh(scene_path, group) else ()
     return {"path": scene_path, "group": group, "offers": offers}

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.sandboxed_read import is_hdf5
+from studies.hdf5 import is_hdf5
 from studyrunner.study.checked_table import check_table
 from studyrunner.study.followed import take_followed
 from studyrunner.study.mission import OWN_AXES, MissionBlock, read_blocks

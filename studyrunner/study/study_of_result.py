@@ -6,15 +6,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from studies.sandboxed_read import check_result_readable, check_scene_readable, is_hdf5
+from studies.hdf5 import is_hdf5, open_hdf5, read_text_attribute
 from studies.scene_error import SceneError
-from studies.scene_layout import ORIGIN
 from studyrunner.user_error import UserError, Verbatim
-
-if TYPE_CHECKING:
-    import h5py
 
 SCENE_GROUP = "scene"
 """Group of a result file with the contents of a scene file."""
@@ -69,38 +64,19 @@ def _user_errors(name: str, prefix: str = "") -> Iterator[None]:
 
 def read_archived(path: Path, name: str) -> Archived:
     """Reads the attributes of a result file that the user calls `name`. Raises UserError."""
-    from studies.guards.hdf5_guard import LARGEST_RESULT, open_hdf5
-
-    with _user_errors(name, "the attribute "):
-        check_scene_readable(path, SCENE_GROUP, (*_ATTRIBUTES, *ORIGIN))
-        with open_hdf5(path, LARGEST_RESULT) as file:
-            found = {attribute: _read_text(file, attribute) for attribute in _ATTRIBUTES}
-            if not found["study"]:
-                remedy = "missing: give a study file (TOML) or a result file of run-study"
-                raise UserError(name, "the attribute study", None, remedy)
-            study, scene_sha256, solver_digest, versions = found.values()
-            return Archived(study, scene_sha256, solver_digest, versions, holds_scene=SCENE_GROUP in file)
+    with _user_errors(name, "the attribute "), open_hdf5(path) as file:
+        found = {attribute: read_text_attribute(file, attribute) for attribute in _ATTRIBUTES}
+        if not found["study"]:
+            remedy = "missing: give a study file (TOML) or a result file of run-study"
+            raise UserError(name, "the attribute study", None, remedy)
+        study, scene_sha256, solver_digest, versions = found.values()
+        return Archived(study, scene_sha256, solver_digest, versions, holds_scene=SCENE_GROUP in file)
 
 
 def check_result_file(path: Path, name: str) -> None:
-    """Raises UserError where a file that the user calls `name` is no result file or could do harm."""
+    """Raises UserError where a file that the user calls `name` is no result file."""
     with _user_errors(name):
         if not path.exists():
             raise UserError(name, "the file", None, "there is none of this name, give a result file of run-study")
         if not path.is_file() or not is_hdf5(path):
             raise UserError(name, "the file", None, "is no NetCDF file (NetCDF-4), give a result file of run-study")
-        check_result_readable(path)
-
-
-def _read_text(file: h5py.File, name: str) -> str:
-    from studies.guards.hdf5_guard import read_attribute
-
-    value = read_attribute(file, name)
-    if value is None:
-        return ""
-    text = value.item()
-    if isinstance(text, bytes):
-        text = text.decode("utf-8")
-    if not isinstance(text, str):
-        raise SceneError(name, str(value), "give a text")
-    return text

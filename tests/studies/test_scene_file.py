@@ -2,6 +2,7 @@
 
 from dataclasses import fields, replace
 
+import h5py
 import numpy as np
 import pytest
 
@@ -9,6 +10,7 @@ from solver.model import ContactInterface, LinearModel
 from studies.model_check import check_model
 from studies.scene_error import SceneError
 from studies.scene_file import read_scene, write_scene
+from studies.scene_layout import scene_datasets
 from tests.studies.scene_models import changed, drop, plain, put, sector
 
 
@@ -85,6 +87,78 @@ def test_optional_datasets_have_defaults(tmp_path):
     assert not model.contact.normal_load.any()
     assert np.isnan(model.contact.position).all()
     assert model.contact.surface == ("", "", "")
+
+
+def by_hand(path, model, turned=False):
+    """The file as a program with or without columns first writes it: all matrices are transposed, or none."""
+    with h5py.File(path, "w") as file:
+        for key, values in scene_datasets(model, None):
+            kind = h5py.string_dtype() if values.dtype.kind == "U" else None
+            values = values.astype(object) if kind else values
+            file.create_dataset(key, data=values.T if turned else values, dtype=kind)
+
+
+def of_three_pairs(response="matrix"):
+    model = plain()
+    contact = replace(model.contact, dofs=np.arange(9).reshape(3, 3))
+    generator = np.random.default_rng(0)
+    stiffness = generator.normal(size=(9, 9))
+    stiffness = stiffness @ stiffness.T + np.eye(9)
+    rows = np.eye(9)[: 9 if response == "square" else 2]
+    linear = LinearModel(np.eye(9), np.eye(9), stiffness, np.ones(9), np.ones(9, dtype=complex), rows)
+    names = tuple(f"u{n}" for n in range(len(rows)))
+    return replace(model, contact=contact, linear={0: linear}, response_names=names)
+
+
+def as_indices(path):
+    with h5py.File(path, "r+") as file:
+        put("response/dofs", np.array([0, 1]))(file)
+
+
+def test_three_pairs_written_columns_first_are_refused(tmp_path):
+    path = tmp_path / "scene.h5"
+    by_hand(path, of_three_pairs(), turned=True)
+    with pytest.raises(
+        SceneError, match=r"response/dofs: shape \(9, 2\); give shape \(2, 9\): MATLAB and Fortran .*every"
+    ):
+        read_scene(path)
+    for turned in (True, False):
+        by_hand(path, of_three_pairs(), turned=turned)
+        as_indices(path)
+        with pytest.raises(SceneError, match=r'contact/dofs: 3 pairs, and nothing shows .* attribute rows = "pairs"'):
+            read_scene(path)
+    with h5py.File(path, "r+") as file:
+        file["contact/dofs"].attrs["rows"] = "pairs"
+    assert read_scene(path).contact.dofs.tolist() == np.arange(9).reshape(3, 3).tolist()
+
+
+def test_what_shows_the_order_of_three_pairs(tmp_path):
+    path = tmp_path / "scene.h5"
+    by_hand(path, of_three_pairs())  # two responses of nine displacements
+    read_scene(path)
+    write_scene(of_three_pairs("square"), path)  # the attribute
+    read_scene(path)
+    by_hand(path, plain())
+    as_indices(path)
+    with h5py.File(path, "r+") as file:
+        # pairs without closing displacement: transposed, one would have no direction at all
+        put("contact/dofs", np.array([[-1, 0, 1], [-1, 2, 3], [-1, 4, 5]]))(file)
+        put("contact/normal_load", np.ones(3))(file)
+    assert read_scene(path).contact.dofs[0].tolist() == [-1, 0, 1]
+
+
+def test_dofs_of_more_pairs_written_columns_first(tmp_path):
+    model = of_three_pairs()
+    contact = replace(
+        model.contact, dofs=np.arange(6).reshape(2, 3), **{k: getattr(model.contact, k)[:2] for k in ("area", "gap")}
+    )
+    contact = replace(contact, normal_load=np.zeros(2), position=np.zeros((2, 3)), surface=("", ""))
+    by_hand(tmp_path / "scene.h5", replace(model, contact=contact), turned=True)
+    as_indices(tmp_path / "scene.h5")
+    with pytest.raises(
+        SceneError, match=r"dofs: shape \(3, 2\); give one row .*: MATLAB and Fortran write columns first"
+    ):
+        read_scene(tmp_path / "scene.h5")
 
 
 def test_responses_can_be_indices(tmp_path):

@@ -1,18 +1,8 @@
-"""A folder of its own, a stand-in for the solver, and a process that reads files of unknown origin."""
+"""A folder of its own, and a stand-in for the solver."""
 
 import pytest
 
-from studies import sandboxed_read
 from tests.studyrunner.faked_runs import Solver
-from tests.studyrunner.reading_process import reading_process
-
-
-@pytest.fixture(scope="module")
-def reader():
-    """Stands for the new process that reads each file otherwise."""
-    with reading_process() as process, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sandboxed_read, "run_sandbox", process.read)
-        yield process
 
 
 @pytest.fixture

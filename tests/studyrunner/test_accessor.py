@@ -206,10 +206,8 @@ def test_what_cannot_be_joined_is_refused(result):
         join_results([result, result], dim="gravity")
 
 
-@pytest.mark.parametrize(
-    "study", ["a." * 100_000 + "a = 1", "a = " + "[" * 50_000, "a = " + "9" * 6000, "= nonsense", "a = 1"]
-)
-def test_a_study_that_was_made_to_do_harm(study, result):
+@pytest.mark.parametrize("study", ["a = " + "[" * 50_000, "a = " + "9" * 6000, "= nonsense", "a = 1"])
+def test_a_study_that_is_none_is_not_joined(study, result):
     with pytest.raises(ValueError, match="study"):
         join_results([result.assign_attrs(study=study)], dim="friction_coefficient")
 

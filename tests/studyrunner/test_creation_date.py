@@ -11,7 +11,7 @@ from studyrunner.netcdf.creation_date import check_date
 from studyrunner.user_error import UserError
 from tests.studyrunner.faked_runs import SMALL
 
-pytestmark = pytest.mark.usefixtures("reader", "folder")
+pytestmark = pytest.mark.usefixtures("folder")
 
 
 def attributes(path="out.nc"):

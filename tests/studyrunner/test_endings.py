@@ -122,18 +122,6 @@ def test_an_ending_is_not_lost_where_something_else_is_raised(end, error):
         pass
 
 
-EARLY = """
-import os, signal, time
-from studyrunner.system.own_process import run_in_own_process
-
-fork = os.fork
-def interrupted_fork():
-    os.kill(os.getpid(), signal.SIGTERM)
-    return fork()
-
-os.fork = interrupted_fork
-print(run_in_own_process(lambda: time.sleep(600) or 0))
-"""
 BUSY = """
 import ctypes, os, signal, subprocess, sys, threading, time
 from studyrunner.system.mailbox import Mailbox
@@ -164,7 +152,6 @@ os._exit(0)
     ("program", "said"),
     [
         pytest.param(WRITER, "closed\n", marks=pytest.mark.slow, id="writer interrupted anywhere"),
-        pytest.param(EARLY, "1\n", id="signal before the other process is there"),
         pytest.param(BUSY, "waited True\n", marks=pytest.mark.slow, id="wait interrupted past its deadline"),
     ],
 )

@@ -13,7 +13,7 @@ from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
 from tests.mpi.launching import results
 
-pytestmark = pytest.mark.usefixtures("reader", "folder")
+pytestmark = pytest.mark.usefixtures("folder")
 
 SLIDER = ["sdof_slider", "--set", "axes.frequency=[150, 160]", "--set", "slow_time.cycles=2000"]
 SLIDER += ["--set", "slow_time.outputs=3", "--set", "outputs.variables=['default', 'exact']"]

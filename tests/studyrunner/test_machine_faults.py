@@ -1,16 +1,11 @@
 """Faults of the machine cost no point: the task is done again, elsewhere where there is a choice, or by a later run."""
 
-import os
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
-from studyrunner import run
 from studyrunner.cli import main
 from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.plan.cost_model import CostModel
@@ -109,40 +104,3 @@ def test_a_sick_rank_gets_no_more_tasks_unless_all_are():
     # where the others are lost a sick one is better than none
     dispatcher.add_lost([task for task, _ in dispatcher.lose(1)])
     assert {rank for rank, _ in dispatcher.assign()} == {2}
-
-
-KERNELS = """
-from studyrunner.system.machine_faults import guard_kernel_cache
-guard_kernel_cache()
-guard_kernel_cache()
-import kernel
-print(kernel.double(3.0), len(kernel.double.stats.cache_hits))
-"""
-
-
-@pytest.fixture
-def kernel(folder):
-    (folder / "kernel.py").write_text(
-        "from numba import njit\n@njit(cache=True)\ndef double(x):\n    return 2.0 * x\n", encoding="utf-8"
-    )
-
-    def call():
-        environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
-        environment["PYTHONPATH"] = os.pathsep.join([str(folder), str(Path(run.__file__).parents[1])])
-        done = subprocess.run(
-            [sys.executable, "-c", KERNELS], env=environment, capture_output=True, text=True, check=True
-        )
-        return done.stdout.strip()
-
-    return call
-
-
-@pytest.mark.slow
-def test_a_damaged_cache_of_kernels_is_built_anew(kernel, folder):
-    assert kernel() == "6.0 0"
-    assert kernel() == "6.0 1"
-    for suffix in ("*.nbi", "*.nbc"):
-        (path,) = (folder / "cache").rglob(suffix)
-        path.write_bytes(path.read_bytes()[:-20])
-        assert kernel() == "6.0 0"
-        assert kernel() == "6.0 1"

@@ -103,7 +103,7 @@ def test_from_deck_to_worn_volume(folder, capsys):
         (["scene.load.direction=[0,0,0]"], "scene.load.direction"),
         (["scene.frction=1"], "scene.frction = 1: unknown key, give"),
         (["scene.clamp=[]"], "scene.clamp: at nodal diameter 0 nothing holds the glued structure"),
-        (["scene.tolerance=1e-12", 'scene.contact=[["TIP","DISKS"]]'], "scene.contact ="),
+        (["scene.tolerance=1e-12", 'scene.contact=[["TIP","DISKS"]]'], "scene.contact: DISKS and TIP face"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_a_sentence(overrides, expected, folder):

@@ -72,7 +72,7 @@ def test_a_package_from_a_repository_says_its_commit(direct_url, expected, tmp_p
     assert describe_software("tool") == expected
 
 
-@pytest.mark.usefixtures("reader", "folder")
+@pytest.mark.usefixtures("folder")
 def test_it_stands_in_the_result_and_is_no_part_of_it(solver, monkeypatch):
     found = []
     there = {"software_url": URL, "software_commit": "b" * 40}

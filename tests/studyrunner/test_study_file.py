@@ -19,6 +19,12 @@ def write(folder, text):
     return str(path)
 
 
+def test_a_byte_order_mark_is_no_text(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + SMALLEST.replace("\n", "\r\n").encode())
+    assert read_study(str(path)).study.name == "s"
+
+
 def test_every_default_is_filled_in(tmp_path):
     study = read_study(write(tmp_path, SMALLEST))
     assert study.dimensions == {

@@ -7,7 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.linalg import eigh
 
+from solver import SolverSettings, march_wear
 from solver.model import FloatArray, LinearModel, ReducedModel
+from studies.contact_compliance import make_compliant
 from studies.fe_models.from_files.model import LoadedModel
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.scene import reduce_model
@@ -18,7 +20,7 @@ N_FREQUENCIES = 4
 """Natural frequencies that are shown."""
 
 _RPM = 30.0 / np.pi
-_ROUND_OFF = 1e-9  # of the size of a facet: a distance that is none
+_ROUND_OFF = 1e-9  # of the size of a facet, or of the largest force: a distance or a force that is none
 _FREE = 1e-9  # stiffness over the largest one of the relative displacements, below which nothing holds a motion
 
 
@@ -62,9 +64,10 @@ def describe_model(
     if held:
         verb = "motion is" if held == 1 else "motions are"
         rows.append(("warning", f"{held} {verb} held by friction alone: give retention_stiffness"))
-    pull = _static_pull(scene.model)
-    if pull is not None:
-        rows.append(("static", pull))
+    progress("state at rest")
+    friction = parameters.friction_coefficient
+    stiff = make_compliant(scene.model, parameters.contact_stiffness)
+    rows.append(("static", describe_rest(stiff, friction if isinstance(friction, float) else None)))
     rows += [("left out", text) for text in (*deck.skipped, *deck.notes)]
     return rows
 
@@ -121,15 +124,33 @@ def _contacts(scene: FeScene) -> Iterator[str]:
         )
 
 
-def _static_pull(model: ReducedModel) -> str | None:
-    """Sum of the normal forces that the static load has the glued pairs carry."""
-    dofs = model.contact.dofs[:, 0]
-    forces = model.linear[0].load_static[dofs[dofs >= 0]]
-    if not forces.any():
-        return "no static load: nothing presses the surfaces together"
-    n_pull = np.count_nonzero(forces < 0)
-    text = f"normal forces of the glued pairs: sum {forces.sum():.4g} N, {n_pull} of {len(forces)} pull"
-    return text + (": the joint opens, give a preload" if forces.sum() < 0 else "")
+def describe_rest(model: ReducedModel, friction_coefficient: float | None) -> str:
+    """Normal forces of the state at rest: that from which a run begins, with friction, gaps and interference.
+
+    friction_coefficient: None where the model has its own.
+    """
+    contact = model.contact
+    glued = model.linear[0].load_static[contact.dofs[contact.dofs[:, 0] >= 0, 0]]
+    if not model.linear[0].load_static.any() and (contact.gap >= -_ROUND_OFF * np.sqrt(contact.area)).all():
+        return "no static load and no interference: nothing presses the surfaces together"
+    one = SolverSettings(harmonics=1)
+    # without excitation: any frequency has the same state
+    found = march_wear(
+        model, 1.0, 0.0, friction_coefficient, 0.0, 0.0, scheme="explicit", step=1.0, sweep="ramp", settings=one
+    )
+    if not found.outcome.complete:
+        return f"{found.outcome.sentence} Normal forces of the glued pairs: sum {_sum(glued)} N"
+    forces = found.mean_pressure[0] * contact.area
+    pressed = forces > _ROUND_OFF * np.abs(model.linear[0].load_static).max(initial=forces.max())
+    if not pressed.any():
+        return "at rest no pair carries a force: the joint opens, give a preload"
+    return f"normal forces at rest: sum {_sum(forces)} N, {pressed.sum()} of {len(forces)} pairs closed"
+
+
+def _sum(forces: FloatArray) -> str:
+    """Sum of forces, N; 0 where it is round-off of the single ones."""
+    total = float(forces.sum())
+    return f"{total if abs(total) > _ROUND_OFF * np.abs(forces).sum() else 0.0:.4g}"
 
 
 def _held(loaded: LoadedModel) -> str:

@@ -11,6 +11,7 @@ from scipy import sparse
 from solver.model import FloatArray
 from studies.fe_models.checks import (
     check_contact_removed,
+    check_mass,
     check_mesh_is_of_matrices,
     check_nodes_have_dofs,
     check_speed,
@@ -104,6 +105,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         matrices = read_matrices(files.matrices[0])
         check_mesh_is_of_matrices(deck, matrices)
         check_units(deck, mass_of(deck, matrices), units)
+        check_mass(deck, matrices, units)
         _check_export(deck, matrices, mesh, surfaces, units)
         if rotation is not None:
             held_speed = _check_rotation(deck, matrices, rotation, parameters, units)

@@ -59,6 +59,7 @@ class Selections:
     def unknown(self, name: str, key: str, what: str, known: Iterable[str]) -> SceneError:
         """The error about a name that the deck does not have; it lists those that look like it."""
         names = sorted(set(known))
+        what = "physical group" if self.deck.path.lower().endswith(".msh") else what
         near = difflib.get_close_matches(name.strip().upper(), names, n=3, cutoff=0.5)
         shown = near or names[:_MOST_NAMED]
         more = ", ..." if not near and len(names) > _MOST_NAMED else ""

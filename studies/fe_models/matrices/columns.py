@@ -16,7 +16,9 @@ from studies.fe_models.text.read_errors import check_file, shown
 from studies.scene_error import SceneError
 
 _ROWS_AT_ONCE = 1_000_000
-_LONGEST_LINE = 1000
+LONGEST_LINE = 1000
+"""Characters of a line with numbers."""
+
 _BYTES_AT_ONCE = 2**24
 
 
@@ -74,7 +76,7 @@ def _check_lines(path: Path) -> None:
         while part := file.read(_BYTES_AT_ONCE):
             ends = np.flatnonzero(np.frombuffer(part, dtype=np.uint8) == ord("\n"))
             lengths = np.diff(np.concatenate(([-1 - open_bytes], ends, [len(part)])))
-            if lengths.max() > _LONGEST_LINE:
+            if lengths.max() > LONGEST_LINE:
                 number = n_lines + int(lengths.argmax()) + 1
                 wrong(path.name, f"line {number} is very long", "export it again, as text")
             n_lines, open_bytes = n_lines + ends.size, int(lengths[-1]) - 1
@@ -103,7 +105,7 @@ def _frames(file: IO[bytes], separator: str, kinds: tuple[type, ...], comment: s
 def _find_wrong_line(path: Path, separator: str, kinds: tuple[type, ...], comment: str | None) -> NoReturn:
     with path.open(encoding="latin-1") as file:
         number = 0
-        while text := file.readline(_LONGEST_LINE + 1):
+        while text := file.readline(LONGEST_LINE + 1):
             number += 1
             if comment is not None:
                 text = text.partition(comment)[0]

@@ -2,7 +2,8 @@
 
 A header "DMIG, name, 0, form, type" comes first, then for every column "DMIG, name, node, component" and four fields
 an entry: node, component, real part, imaginary part. Lines have fields of 8 characters, or with a star behind their
-first word of 16. A symmetric matrix (form 6) has one triangle.
+first word of 16. A symmetric matrix (form 6) has one triangle, a square one (form 1) both. Components are along the
+axes of the basic system, unless a GRID names another one.
 """
 
 from __future__ import annotations
@@ -22,17 +23,19 @@ from studies.fe_models.text.read_errors import check_file, shown
 _LONGEST_LINE = 1000
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([+-]\d{1,4})|[eEdD](\d{1,4}))?")
 _AT_ONCE = 100_000
+_CD = 5  # field of a GRID, counted behind its first word
 
 
 @dataclass
 class _Dmig:
     """A matrix while it is read.
 
-    name: in capitals. column: node and component of the present one. labels (m, 4), values (m,): entries that are done.
-    rows, numbers: those that are not packed yet.
+    name: in capitals. form: 6 symmetric, 1 square. column: node and component of the present one. labels (m, 4), values
+    (m,): entries that are done. rows, numbers: those that are not packed yet.
     """
 
     name: str
+    form: int
     column: tuple[int, int] = (0, 0)
     labels: list[np.ndarray] = field(default_factory=list)
     values: list[np.ndarray] = field(default_factory=list)
@@ -61,6 +64,8 @@ def read_nastran(path: Path) -> Matrices:
     found = _Reader(path).matrices()
     stiffness, mass = (_choose(found, letter, path.name) for letter in "KM")
     labels = [np.concatenate(item.labels) for item in (stiffness, mass)]
+    for item, of_item in zip((stiffness, mass), labels, strict=True):
+        _check_triangles(item, of_item, path.name)
     values = [np.concatenate(item.values) for item in (stiffness, mass)]
     rows = from_labels(labels[0], labels[1], values[0], values[1], (path.name,))
     if np.any(rows.node < 1):
@@ -75,6 +80,14 @@ def read_nastran(path: Path) -> Matrices:
             "nastran",
         )
     )
+
+
+def _check_triangles(item: _Dmig, labels: np.ndarray, file: str) -> None:
+    """Raises SceneError where a square matrix has entries (m, 4) of one triangle alone: it would not be symmetric."""
+    above = np.sign((labels[:, 0] - labels[:, 2]) * 16 + labels[:, 1] - labels[:, 3])
+    if item.form == 1 and len(np.unique(above[above != 0])) == 1:
+        remedy = "write form 6 into its header if it is symmetric, else both triangles"
+        wrong(file, f"{shown(item.name)} is square by its header (form 1), and has one triangle only", remedy)
 
 
 def _choose(found: dict[str, _Dmig], letter: str, file: str) -> _Dmig:
@@ -97,6 +110,7 @@ class _Reader:
         self.number = 0
         self.current: _Dmig | None = None
         self.fields: list[str] = []
+        self.grid: list[str] = []  # fields of a GRID that goes on in the next line
 
     def matrices(self) -> dict[str, _Dmig]:
         """All real symmetric matrices by name."""
@@ -122,6 +136,8 @@ class _Reader:
             self._entries()
             self._begin(_cut(text, 16 if first.endswith("*") else 8))
         elif text.startswith(("*", "+", "        ")) or not text:
+            if self.grid and text:
+                self._check_grid([*self.grid, *_cut(text, 16)])
             if self.current is None or not text:
                 return
             if text[0] == "*" and not self.fields and self._plain_entry(text):
@@ -136,6 +152,19 @@ class _Reader:
                 self._wrong("is a DMIG with commas")
             self._entries()
             self.current = None
+            word = first.split(",")[0]
+            if word in ("GRID", "GRDSET"):
+                self._check_grid(text.split(",")[1:] if "," in text else _cut(text, 8))
+            elif word in ("GRID*", "GRDSET*"):
+                self.grid = _cut(text, 16)
+
+    def _check_grid(self, fields: list[str]) -> None:
+        """fields: number, system of the position, position (3), system of the displacements, and more."""
+        self.grid = []
+        if len(fields) > _CD and fields[_CD].strip() not in ("", "0"):
+            of = f"GRID {shown(fields[0])}" if fields[0].strip() else "GRDSET"
+            found = f"line {self.number}: {of} has displacements in the coordinate system {shown(fields[_CD])} (CD)"
+            wrong(self.file, found, "write the matrices with all displacements in the basic system: CD blank")
 
     def _plain_lines(self, lines: list[str]) -> bool:
         """Takes lines that are all columns and entries of one matrix in large fields; False where one of them is not.
@@ -208,7 +237,7 @@ class _Reader:
                 self._wrong(f"says that {shown(name)} is of form {form}, neither 6 (symmetric) nor 1 (square)")
             if len(self.found) >= 1000:
                 self._wrong("is one matrix too many")
-            self.found[name] = _Dmig(name)
+            self.found[name] = _Dmig(name, form)
             self.current = None
             return
         if name not in self.found:

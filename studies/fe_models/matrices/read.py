@@ -13,6 +13,7 @@ from studies.fe_models.matrices.nastran import read_nastran
 from studies.scene_error import SceneError
 
 _PUNCHED = (".pch", ".dmig", ".bdf", ".dat")
+_PUNCH = "punch the matrices: PARAM,EXTOUT,DMIGPCH"
 
 
 def find_matrix_files(path: Path) -> tuple[Path, ...]:
@@ -39,6 +40,8 @@ def find_matrix_files(path: Path) -> tuple[Path, ...]:
         return folder / f"{match[1]}_STIF{match[3]}.mtx", folder / f"{match[1]}_MASS{match[3]}.mtx"
     if suffix in (".full", *_PUNCHED):
         return (path,)
+    if suffix == ".op4":
+        raise SceneError("matrices", f"{path.name} is an OP4 file of Nastran, which is not read", _PUNCH)
     name = path.name
     found: list[tuple[Path, ...]] = []
     if (folder / f"{name}.sti").is_file():
@@ -48,6 +51,8 @@ def find_matrix_files(path: Path) -> tuple[Path, ...]:
         numbers = sorted(int(match[1]) for item in folder.iterdir() if (match := pattern.fullmatch(item.name)))
         found += [(folder / f"{name}_STIF{n}.mtx", folder / f"{name}_MASS{n}.mtx") for n in numbers]
     found += [(folder / f"{name}{end}",) for end in (".full", *_PUNCHED[:2]) if (folder / f"{name}{end}").is_file()]
+    if not found and (folder / f"{name}.op4").is_file():
+        raise SceneError("matrices", f"{name}.op4 is an OP4 file of Nastran, which is not read", _PUNCH)
     if not found:
         looked_for = f"{name}.sti, {name}_STIF1.mtx, {name}.full or {name}.pch"
         raise SceneError("matrices", f"there is no {looked_for}", "give the name that the files have in common")

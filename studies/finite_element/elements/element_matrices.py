@@ -24,6 +24,11 @@ def smallest_jacobians(kind: ElementKind, coordinates: FloatArray) -> FloatArray
     return np.asarray(np.linalg.det(_jacobians(kind, coordinates)).min(axis=1))
 
 
+def element_volumes(kind: ElementKind, coordinates: FloatArray) -> FloatArray:
+    """Volume (n_elements,) of elements; coordinates (n_elements, n_local, 3)."""
+    return np.asarray(np.linalg.det(_jacobians(kind, coordinates)) @ kind.rule.weights)
+
+
 def _jacobians(kind: ElementKind, coordinates: FloatArray) -> FloatArray:
     """dx/dxi (n_elements, n_points, 3 reference directions, 3 directions)."""
     derivatives = np.swapaxes(kind.reference.derivatives(kind.rule.points), 1, 2)

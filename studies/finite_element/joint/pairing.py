@@ -15,6 +15,12 @@ from studies.scene_error import SceneError
 
 _TOLERANCE = 0.05  # largest distance of the nodes of a pair over the size of a facet, where none is given
 
+_OVERLAP = 0.5
+"""Largest overlap of two bodies over the depth of their elements. Interference takes thousandths of it, flat facets on
+curved surfaces hundredths; between both faces of one body it is 1 or more."""
+
+_STRAIGHT = 0.7  # part of the way to the closest point that is along the normal, where the way goes through material
+
 
 @dataclass(frozen=True)
 class ContactSurfaces:
@@ -102,9 +108,10 @@ def build_contact_pairs(
     Raises
     ------
     SceneError
-        Where nodes find no point of the other surface, or belong to two pairs.
+        Where nodes find no point of the other surface, do not face it, or find it behind their own body, and where
+        nodes belong to two pairs.
     """
-    parts = [_pair(coordinates, contact, place, along) for place, contact in enumerate(contacts)]
+    parts = [_pair(coordinates, numbers, contact, place, along) for place, contact in enumerate(contacts)]
     joined = _joined(parts)
     unique, count = np.unique(joined.moving, return_counts=True)
     if (count > 1).any():
@@ -151,7 +158,81 @@ def local_frames(normals: FloatArray, along: FloatArray) -> FloatArray:
     return np.stack([normals, first, np.cross(normals, first)], axis=1)
 
 
-def _pair(coordinates: FloatArray, contact: ContactSurfaces, place: int, along: FloatArray) -> ContactPairs:
+@dataclass(frozen=True)
+class _Match:
+    """Nodes of one surface, and the closest points of the other.
+
+    weights (n, n_nodes): of the points. area, normals (n,), (n, 3): of the nodes. apart (n,): to the facets, m.
+    distance (n,): along the normals, m. facing (n,): cosine between the normals of node and point. depth (n,): of the
+    elements below node or point, the smaller one, m.
+    """
+
+    moving: Surface
+    opposite: Surface
+    weights: sparse.csr_matrix
+    area: FloatArray
+    normals: FloatArray
+    apart: FloatArray
+    distance: FloatArray
+    facing: FloatArray
+    depth: FloatArray
+
+
+def _match(coordinates: FloatArray, moving: Surface, opposite: Surface) -> _Match:
+    found = closest_points(coordinates[moving.nodes], opposite, coordinates)
+    area, normals = moving.areas_and_normals(coordinates)
+    point, corner = np.nonzero(found.weights)
+    entries = (found.weights[point, corner], (point, found.nodes[point, corner]))
+    weights = sparse.csr_matrix(entries, shape=(len(moving.nodes), len(coordinates)))
+    facing, depth = np.zeros_like(coordinates), np.zeros(len(coordinates))
+    facing[opposite.nodes] = opposite.areas_and_normals(coordinates)[1]
+    depth[opposite.nodes] = opposite.depth
+    offset = weights @ coordinates - coordinates[moving.nodes]
+    return _Match(
+        moving=moving,
+        opposite=opposite,
+        weights=weights,
+        area=area,
+        normals=normals,
+        apart=found.distance,
+        distance=np.einsum("ij,ij->i", offset, normals),
+        facing=np.einsum("ij,ij->i", weights @ facing, normals),
+        depth=np.minimum(moving.depth, weights @ depth),
+    )
+
+
+def _check_match(match: _Match, numbers: IntArray, facet: float) -> None:
+    """Raises SceneError where no tolerance makes pairs of these nodes. facet: size of the larger facets, m."""
+    names, n = (match.moving.name, match.opposite.name), len(match.apart)
+    if (match.facing > 0.0).all():
+        raise SceneError("contact", f"{names[0]} and {names[1]} face the same way", "give faces that touch")
+    inside = (match.distance < -_OVERLAP * match.depth) & (match.distance < -_STRAIGHT * match.apart)
+    if inside.any():
+        deepest = np.argmin(match.distance)
+        raise SceneError(
+            "contact",
+            f"between {names[0]} and {names[1]} there is material: at {inside.sum()} of {n} nodes {names[1]} is up to"
+            f" {-match.distance[deepest]:.3g} m below {names[0]}, whose elements are {match.depth[deepest]:.3g} m deep",
+            "give two surfaces that face each other in the same sector",
+        )
+    away = match.apart > facet
+    if away.any():
+        raise SceneError(
+            "contact",
+            f"{away.sum()} of {n} nodes of {names[0]} are farther from {names[1]} than a facet ({facet:.3g} m);"
+            f" the farthest is at {match.apart.max():.3g} m",
+            "give surfaces that touch, one of which covers the other: a larger tolerance is no remedy",
+        )
+    aside = np.flatnonzero(match.facing > 0.0)
+    if len(aside):
+        node = numbers[match.moving.nodes[aside[0]]]
+        found = f"{len(aside)} of {n} nodes of {names[0]} do not face {names[1]}, as node {node}"
+        raise SceneError("contact", found, "leave them out of the surface")
+
+
+def _pair(
+    coordinates: FloatArray, numbers: IntArray, contact: ContactSurfaces, place: int, along: FloatArray
+) -> ContactPairs:
     first, second = contact.first, contact.second
     shared = np.intersect1d(first.nodes, second.nodes)
     if len(shared):
@@ -163,42 +244,33 @@ def _pair(coordinates: FloatArray, contact: ContactSurfaces, place: int, along: 
     sizes = first.facet_size(coordinates), second.facet_size(coordinates)
     moving, opposite = (second, first) if sizes[1] < (1.0 - 1e-6) * sizes[0] else (first, second)
     tolerance = _TOLERANCE * max(sizes) if contact.tolerance is None else contact.tolerance
-    found = closest_points(coordinates[moving.nodes], opposite, coordinates)
-    far = found.distance > tolerance
+    match = _match(coordinates, moving, opposite)
+    far = match.apart > tolerance
     if far.any():
         # a coarse surface may lie inside a finer one that goes on
-        other = closest_points(coordinates[opposite.nodes], moving, coordinates)
-        if (other.distance > tolerance).any():
+        other = _match(coordinates, opposite, moving)
+        if (other.apart > tolerance).any():
+            _check_match(match, numbers, max(sizes))
             raise SceneError(
                 "contact",
                 f"{np.count_nonzero(far)} of {len(far)} nodes of {moving.name} are farther than {tolerance:g} m"
                 f" from {opposite.name}",
-                f"give a larger tolerance (the farthest is at {found.distance.max():.3g} m), or surfaces of which one"
+                f"give a larger tolerance (the farthest is at {match.apart.max():.3g} m), or surfaces of which one"
                 " covers the other",
             )
-        moving, opposite, found = opposite, moving, other
-    nodes = moving.nodes
-    area, normals = moving.areas_and_normals(coordinates)
-    n, n_nodes = len(nodes), len(coordinates)
-    point, corner = np.nonzero(found.weights)
-    entries = (found.weights[point, corner], (point, found.nodes[point, corner]))
-    weights = sparse.csr_matrix(entries, shape=(n, n_nodes))
-    facing = np.zeros_like(coordinates)
-    facing[opposite.nodes] = opposite.areas_and_normals(coordinates)[1]
-    if np.einsum("ij,ij->", weights @ facing, normals * area[:, None]) > 0.0:
-        raise SceneError("contact", f"{moving.name} and {opposite.name} face the same way", "give faces that touch")
-    offset = weights @ coordinates - coordinates[nodes]
-    distance = np.einsum("ij,ij->i", offset, normals)
+        match = other
+    _check_match(match, numbers, max(sizes))
+    nodes, n = match.moving.nodes, len(match.area)
     return ContactPairs(
         moving=nodes,
-        opposite=weights,
-        frames=local_frames(normals, along),
+        opposite=match.weights,
+        frames=local_frames(match.normals, along),
         present=np.ones((n, 3), dtype=np.bool_),
-        area=area,
+        area=match.area,
         position=coordinates[nodes],
-        distance=distance,
-        gap=distance if contact.with_gaps else np.zeros(n),
+        distance=match.distance,
+        gap=match.distance if contact.with_gaps else np.zeros(n),
         surface=np.full(n, place),
-        moving_name=(moving.name,),
-        opposite_name=(opposite.name,),
+        moving_name=(match.moving.name,),
+        opposite_name=(match.opposite.name,),
     )

@@ -85,7 +85,7 @@ class Surface:
     triangles (n_triangles, 3), quads (n_quads, 4): facets, rows of `SolidMesh.coordinates`, anticlockwise as seen from
     outside the body. faces (n_triangles + n_quads, 8): nodes of the element face that each facet is of, -1 after the
     last. places (n_triangles + n_quads, 4, 2): reference coordinates on that face of the corners of the facet, of a
-    triangle the last one twice.
+    triangle the last one twice. depth (n_nodes,): how deep the elements are below each of `nodes`, the least one, m.
     """
 
     name: str
@@ -93,6 +93,7 @@ class Surface:
     quads: IntArray
     faces: IntArray
     places: FloatArray
+    depth: FloatArray
 
     @cached_property
     def nodes(self) -> IntArray:
@@ -132,10 +133,12 @@ class Surface:
 class OuterFaces:
     """Faces of a mesh that belong to one element only.
 
-    loops: nodes of each face, corners anticlockwise from outside, then mid-side nodes. parts: label of its body.
+    loops: nodes of each face, corners anticlockwise from outside, then mid-side nodes. elements: all nodes of its
+    element. parts: label of its body.
     """
 
     loops: tuple[IntArray, ...]
+    elements: tuple[IntArray, ...]
     parts: tuple[str, ...]
 
 
@@ -147,6 +150,7 @@ def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntA
     Raises SceneError where there is no such element or face.
     """
     loops: list[IntArray] = []
+    behind: list[IntArray] = []
     left = np.ones(len(elements), dtype=np.bool_)
     for group in mesh.groups:
         table = ELEMENT_KINDS[group.kind].faces
@@ -161,11 +165,12 @@ def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntA
                     f"surface {name} names face S{faces[chosen]} of element {elements[chosen]} ({group.kind})",
                     f"give faces S1 to S{len(table)}",
                 )
-            loops.append(group.nodes[order[place[chosen]]][list(table[faces[chosen] - 1])])
+            behind.append(group.nodes[order[place[chosen]]])
+            loops.append(behind[-1][list(table[faces[chosen] - 1])])
     if left.any():
         number = elements[left][0]
         raise SceneError("contact", f"surface {name} names element {number}", "there is no such element")
-    return _surface(name, loops)
+    return _surface(mesh, name, loops, behind)
 
 
 def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
@@ -175,7 +180,11 @@ def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
     """
     inside = np.zeros(mesh.n_nodes, dtype=np.bool_)
     inside[nodes] = True
-    surface = _surface(name, [loop for loop in outer_faces(mesh).loops if inside[loop].all()])
+    outer = outer_faces(mesh)
+    chosen = [place for place, loop in enumerate(outer.loops) if inside[loop].all()]
+    surface = _surface(
+        mesh, name, [outer.loops[place] for place in chosen], [outer.elements[place] for place in chosen]
+    )
     lonely = np.setdiff1d(nodes, surface.nodes)
     if len(lonely):
         raise SceneError(
@@ -190,6 +199,7 @@ def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
 def outer_faces(mesh: SolidMesh) -> OuterFaces:
     """All outer faces of a mesh."""
     loops: list[IntArray] = []
+    elements: list[IntArray] = []
     keys: list[IntArray] = []
     parts: list[str] = []
     for group in mesh.groups:
@@ -199,11 +209,12 @@ def outer_faces(mesh: SolidMesh) -> OuterFaces:
             key = np.full((len(nodes), 4), -1)
             key[:, :n_corners] = nodes[:, :n_corners]
             loops += list(nodes)
+            elements += list(group.nodes)
             keys.append(np.sort(key, axis=1))
             parts += [group.part] * len(nodes)
     _, first, count = np.unique(np.concatenate(keys), axis=0, return_index=True, return_counts=True)
     outer = np.sort(first[count == 1])
-    return OuterFaces(tuple(loops[place] for place in outer), tuple(parts[place] for place in outer))
+    return OuterFaces(*(tuple(each[place] for place in outer) for each in (loops, elements, parts)))
 
 
 def describe_mesh(mesh: SolidMesh) -> SurfaceMesh:
@@ -214,13 +225,19 @@ def describe_mesh(mesh: SolidMesh) -> SurfaceMesh:
     return SurfaceMesh(nodes=mesh.coordinates[used], quads=quads.reshape(corners.shape), parts=outer.parts)
 
 
-def _surface(name: str, loops: list[IntArray]) -> Surface:
+def _surface(mesh: SolidMesh, name: str, loops: list[IntArray], behind: list[IntArray]) -> Surface:
+    """behind: nodes of the element of each face."""
     if not loops:
         raise SceneError("contact", f"surface {name} has no face", "give at least one face of an element")
     facets: dict[int, list[IntArray]] = {3: [], 4: []}
     faces: dict[int, list[IntArray]] = {3: [], 4: []}
     places: dict[int, list[FloatArray]] = {3: [], 4: []}
-    for loop in loops:
+    depth = np.full(mesh.n_nodes, np.inf)
+    for loop, element in zip(loops, behind, strict=True):
+        first, second, third = mesh.coordinates[loop[:3]]
+        normal = np.cross(second - first, third - first)
+        below = (first - mesh.coordinates[element]) @ (normal / np.linalg.norm(normal))
+        depth[loop] = np.minimum(depth[loop], below.max())
         shape = FACE_SHAPES[len(loop)]
         padded = np.append(loop, np.full(8 - len(loop), -1))
         for facet in shape.facets:
@@ -233,4 +250,5 @@ def _surface(name: str, loops: list[IntArray]) -> Surface:
         np.array(facets[4], dtype=np.int64).reshape(-1, 4),
         np.array(faces[3] + faces[4]),
         np.array(places[3] + places[4]),
+        depth[np.isfinite(depth)],
     )

@@ -1,4 +1,4 @@
-"""Opening a result file that may do harm."""
+"""Opens a result file."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from studyrunner.report.reading.schema_check import reading_errors
 from studyrunner.user_error import UserError
 
 
-def open_vetted(path: Path | str) -> xr.Dataset:
-    """Open a file as it is, once a process of its own has read it without harm. Raises UserError."""
+def open_file(path: Path | str) -> xr.Dataset:
+    """The file as it is, read lazily. Raises UserError."""
     # the report itself knows nothing of studies and scenes
     from studyrunner.study.study_of_result import check_result_file
 

@@ -17,7 +17,7 @@ from studyrunner.report.reading.chosen import find_values
 from studyrunner.report.reading.endings import Ending, read_endings
 from studyrunner.report.reading.measured import Profile, read_profile
 from studyrunner.report.reading.missions import as_history
-from studyrunner.report.reading.opening import open_vetted
+from studyrunner.report.reading.opening import open_file
 from studyrunner.report.reading.sample_statistics import SAMPLE, statistics_of
 from studyrunner.report.reading.schema_check import check_dataset, reading_errors, study_tables
 from studyrunner.report.reading.units import show_cycles, show_value
@@ -353,7 +353,7 @@ def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None, m
         Where there is no such file, it is no result of `run-study`, or it has no such point.
     """
     profile = None if measured is None else read_profile(measured)
-    opened = open_vetted(path)
+    opened = open_file(path)
     with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
         dataset, blocks = as_history(check_dataset(opened, str(path)))
         values = find_values(dataset, chosen or {})

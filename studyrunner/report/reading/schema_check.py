@@ -3,7 +3,7 @@
 Names and sentences of the file are cleaned: they contain no markup, no control characters and no line breaks, and have
 at most the length of a label. Variables that the report does not draw are left out.
 
-By hand: `xarray-schema` has no limits for what is read, and leaves texts as they are.
+By hand: `xarray-schema` has no limits of sizes, and leaves texts as they are.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str
     Raises
     ------
     UserError
-        Where reading the study would do harm.
+        Where the study is no text in UTF-8, too long, or nested too deeply.
     """
     text = str(attributes.get("study", ""))
     try:
@@ -263,6 +263,8 @@ def _check_variable(dataset: xr.Dataset, name: str, entry: Variable, dimensions:
     variable = dataset.variables[name]
     if variable.dims != dimensions:
         raise _WrongError(name, f"dimensions {', '.join(map(str, variable.dims))}")
+    if {"scale_factor", "add_offset"} & set(variable.encoding):
+        raise _WrongError(name, "packed values")
     if entry.is_text or entry.dtype == "str" or name == "contact_surface":
         return _texts(variable, name)
     if variable.dtype.kind not in ("iuf" if entry.dtype.startswith("float") else "iu"):

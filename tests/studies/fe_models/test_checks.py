@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from studies.fe_models.checks import (
     check_contact_removed,
+    check_mass,
     check_mesh_is_of_matrices,
     check_nodes_have_dofs,
     check_speed,
@@ -45,6 +46,26 @@ def sector(tmp_path_factory):
 
 
 @needs_ccx
+@pytest.mark.parametrize("factor", [1e-3, 0.97, 1.03])
+def test_matrices_of_another_mass(sector, factor):
+    """As where the deck is in SI and the matrices are not."""
+    deck, matrices = sector
+    mass = mass_of(deck, matrices)
+    words = rf"sector.sti and sector.inp: {factor * mass:.3g} kg in the matrices, {mass:.3g} kg by density and volume"
+    with pytest.raises(SceneError, match=words):
+        check_mass(deck, replace(matrices, mass=factor * matrices.mass), SI)
+    check_mass(replace(deck, materials={}), replace(matrices, mass=factor * matrices.mass), SI)
+
+
+@needs_ccx
+def test_matrices_without_the_fixed_nodes_have_less_mass(sector):
+    deck, matrices = sector
+    rows = np.flatnonzero(~np.isin(matrices.node, deck.node_sets["BLADEC"]))
+    mass, stiffness = (part[rows][:, rows] for part in (matrices.mass, matrices.stiffness))
+    check_mass(deck, Matrices(stiffness, mass, matrices.node[rows], matrices.direction[rows], ("j",), "calculix"), SI)
+
+
+@needs_ccx
 def test_whole_export(sector):
     deck, matrices = sector
     blades, disks = deck.node_sets["BLADEC"], deck.node_sets["DISKC"]
@@ -52,6 +73,7 @@ def test_whole_export(sector):
     check_nodes_have_dofs(matrices, blades, "BLADES")
     check_contact_removed(deck, matrices, (blades, disks), ("BLADES", "DISKS"), SI)
     check_units(deck, mass_of(deck, matrices), SI)
+    check_mass(deck, matrices, SI)
     rotation = check_speed(deck, matrices, SI)
     assert (rotation.omega_squared, rotation.axis.tolist()) == (250000.0, [0, 0, 1])
     assert omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)

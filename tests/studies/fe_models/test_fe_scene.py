@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy import linalg, sparse
 
+from studies.fe_models.from_files.check import describe_rest
 from studies.fe_models.nodal_matrices import order_by_nodes
 from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness, spin_softening
-from studies.finite_element.elements.solid_mesh import Rotation
+from studies.finite_element.elements.solid_mesh import Material, Rotation
 from studies.finite_element.joint import ordering, reduction
 from studies.finite_element.joint.cut_faces import find_cut_faces
 from studies.finite_element.joint.pairing import ContactSurfaces
@@ -217,6 +218,43 @@ def test_plain_assembly_without_cyclic_symmetry():
     sign = 1.0 if pairs.moving_name == ("UP",) else -1.0
     assert shift @ linear.mass @ shift == pytest.approx(mass * motion @ motion, rel=1e-8)
     assert linear.response @ shift == pytest.approx([sign * motion[2]], abs=1e-8)
+
+
+def bars(lift, load=0.0):
+    """Two bars of unit section and length in a row, each held at its far end, which overlap or are apart by `lift`."""
+    soft = Material(1e9, 0.0, 1000.0)
+    first, a = block("C3D8", (2, 2, 2), material=soft)
+    second, b = block("C3D8", (2, 2, 3), lambda points: points + [0.0, 0.0, 1.0 + lift], material=soft)
+    mesh = joined(first, second)
+    z = np.append(a[:, 2], 10.0 + b[:, 2])
+    surfaces = (surface_of_faces(mesh, name, *faces_where(mesh, z == at)) for name, at in (("LOW", 1.0), ("UP", 10.0)))
+    held = np.repeat(((z == 0.0) | (z == 11.0))[:, None], 3, axis=1)
+    end = SetMotion(np.flatnonzero(z == 10.0), -Z)
+    joint = JointDefinition((ContactSurfaces(*surfaces, 0.1, with_gaps=True),), held, end, {"end": end})
+    preload = load * end.row(mesh.n_nodes) if load else None
+    return build_fe_scene(MeshModel(mesh, preload=preload), joint, ReductionOptions(n_modes=6), 1).model
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_the_force_at_rest_of_bars_that_overlap(friction):
+    """Without Poisson's effect it is the stiffness of both in a row times the overlap."""
+    model = bars(-1e-4)
+    force = float(describe_rest(model, friction).removeprefix("normal forces at rest: sum ").split(" N")[0])
+    assert force == pytest.approx(0.5e9 * 1e-4, rel=1e-3)  # four digits
+    assert describe_rest(model, friction).endswith("9 of 9 pairs closed")
+
+
+@pytest.mark.parametrize(
+    ("lift", "load", "sentence"),
+    [
+        (0.0, 0.0, "no static load and no interference: nothing presses the surfaces together"),
+        (1e-4, 1e3, "at rest no pair carries a force: the joint opens, give a preload"),
+        (0.0, -1e3, "at rest no pair carries a force: the joint opens, give a preload"),
+        (0.0, 1e3, "normal forces at rest: sum 500 N, 9 of 9 pairs closed"),
+    ],
+)
+def test_the_force_at_rest_of_bars_that_are_loaded(lift, load, sentence):
+    assert describe_rest(bars(lift, load), 0.3) == sentence
 
 
 def test_ties_are_glued_for_good():

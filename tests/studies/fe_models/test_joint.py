@@ -125,6 +125,36 @@ def test_a_coarse_surface_inside_a_finer_one_moves():
     assert pairs.area.sum() == pytest.approx(0.25)
 
 
+@pytest.mark.parametrize(("layers", "tolerance"), [(1, None), (1, 0.5), (4, 0.5), (4, None)])
+def test_no_pair_goes_through_a_body(layers, tolerance):
+    """Both faces of one plate, which is thin beside its facets, so that they are within the usual tolerance."""
+    mesh, reference = block("C3D8", (2, 2, layers), lambda points: points * [1.0, 1.0, 0.02])
+    top, bottom = (
+        surface_of_faces(mesh, name, *faces_where(mesh, reference[:, 2] == z)) for name, z in (("A", 1.0), ("B", 0.0))
+    )
+    with pytest.raises(
+        SceneError, match=r"between A and B there is material: at 9 of 9 nodes B is up to 0.02 m below A"
+    ):
+        build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(top, bottom, tolerance)], Z)
+
+
+def test_interference_is_no_material():
+    mesh, low, up = blocks_on_each_other("C3D8", "C3D10", (2, 2, 1), (3, 3, 1), lift=-1e-3)
+    pairs = build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up, with_gaps=True)], Z)
+    assert np.allclose(pairs.gap, -1e-3)
+
+
+@pytest.mark.parametrize("tolerance", [None, 3.0])
+def test_no_larger_tolerance_is_advised_where_it_would_be_wrong(tolerance):
+    mesh, low, up = blocks_on_each_other("C3D8", "C3D8", (2, 2, 1), (3, 3, 1), lift=0.6)
+    with pytest.raises(SceneError) as wrong:
+        build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up, tolerance)], Z)
+    assert str(wrong.value) == (
+        "contact: 16 of 16 nodes of UP are farther from LOW than a facet (0.5 m); the farthest is at 0.6 m;"
+        " give surfaces that touch, one of which covers the other: a larger tolerance is no remedy."
+    )
+
+
 def test_wrong_surfaces_are_named():
     mesh, low, up = blocks_on_each_other("C3D8", "C3D8", (2, 2, 1), (3, 3, 1), lift=0.02)
     with pytest.raises(SceneError, match=r"16 of 16 nodes of UP are farther than 0\.01 m from LOW"):

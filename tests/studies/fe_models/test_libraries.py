@@ -1,19 +1,19 @@
 """Files that other libraries read; skipped where the library is not installed."""
 
 import importlib.util
+import sys
 
 import numpy as np
 import pytest
 
-from studies.fe_models.libraries import process
 from studies.fe_models.libraries.meshes import read_library_mesh
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.mesh_files import read_mesh_file
-from studies.guards import limited_process
 from studies.scene_error import SceneError
 from tests.studies.fe_models.meshes import GMSH_22, GMSH_41
 from tests.studies.fe_models.mutations import mutate
 
+needs_ansys = pytest.mark.skipif(importlib.util.find_spec("ansys") is None, reason="ansys-mapdl-reader is not there")
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
 
 
@@ -44,6 +44,29 @@ def test_gmsh_41(tmp_path):
     assert [(block.kind, block.nodes.tolist()) for block in deck.blocks] == [("C3D4", [[1, 2, 3, 4], [2, 3, 4, 5]])]
     assert deck.node_sets["UNDER"].tolist() == [1, 2, 3]
     assert deck.element_sets["BLOCK"].tolist() == [1, 2]
+
+
+@needs_meshio
+def test_gmsh_saved_whole(tmp_path):
+    """Mesh.SaveAll: entities without a physical group are in the file as well."""
+    text = GMSH_41.replace("1 0 0 0 1 1 0 1 1 0", "1 0 0 0 1 1 0 0 0")
+    assert text != GMSH_41
+    deck = read_library_mesh(write(tmp_path, text))
+    assert [block.nodes.tolist() for block in deck.blocks] == [[[1, 2, 3, 4], [2, 3, 4, 5]]]
+    assert set(deck.node_sets) == {"BLOCK"}
+
+
+@needs_meshio
+def test_elements_of_two_groups_are_there_once(tmp_path):
+    """Format 2.2 writes an element once for each of its groups."""
+    text = GMSH_22.replace('"Block"', '"Block"\n3 7 "upper"').replace("$PhysicalNames\n3", "$PhysicalNames\n4")
+    lines = text.split("\n")
+    lines.insert(lines.index("5 4 2 2 1 5 7 8 9") + 1, "6 4 2 7 1 5 7 8 9")
+    count = lines.index("$Elements") + 1
+    lines[count] = str(int(lines[count]) + 1)
+    deck = read_library_mesh(write(tmp_path, "\n".join(lines)))
+    assert {block.kind: block.numbers.tolist() for block in deck.blocks} == {"C3D8I": [1], "C3D4": [2, 3]}
+    assert {name: numbers.tolist() for name, numbers in deck.element_sets.items()} == {"BLOCK": [1, 2, 3], "UPPER": [3]}
 
 
 @needs_meshio
@@ -78,6 +101,71 @@ def test_mutated_gmsh(tmp_path, seed):
     assert said.isprintable()
 
 
+def write_cdb(folder, commands="", types="ET,        1,185\n"):
+    """A cube with two components, as CDWRITE writes it."""
+    corners = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    nodes = [f"{n:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13E}" for v in at) for n, at in enumerate(corners, 1)]
+    element = "".join(f"{v:9d}" for v in (1, 1, 1, 1, 0, 0, 0, 0, 8, 0, 5, *range(1, 9)))
+    lines = [
+        *("/COM,ANSYS RELEASE 2023 R1", "/PREP7", "*IF,_CDRDOFF,EQ,1,THEN", "_CDRDOFF=", "*ENDIF", "DOF,DELETE"),
+        *(types.rstrip("\n"), "NBLOCK,6,SOLID,        8,        8", "(3i9,6e21.13e3)", *nodes, "N,R5.3,LOC,       -1,"),
+        *("EBLOCK,19,SOLID,        1,        1", "(19i9)", element, "       -1"),
+        *(
+            "CMBLOCK,FOOT    ,NODE,        2",
+            "(8i10)",
+            f"{1:10d}{-4:10d}",
+            "TREF,  0.00000000    ",
+            "ACEL,  0.0,0.0,0.0",
+        ),
+        *("BFUNIF,TEMP,_TINY", "PSTRES,OFF", *commands.splitlines(), "FINISH"),
+    ]
+    path = folder / "mesh.cdb"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+ETBLOCK = (
+    "ETBLOCK,        1,        1\n(2i9,19a9)\n" + "".join(f"{v:9d}" for v in (1, 185, *[0] * 19)) + "\n       -1\n"
+)
+
+
+@needs_ansys
+@pytest.mark.parametrize("types", ["ET,1,185\n", "ET,1,SOLID185\n", ETBLOCK])
+def test_cdb(tmp_path, types):
+    deck = read_library_mesh(write_cdb(tmp_path, "D,      1,UX  ,  0.0    ,  0.0\nD,2,ALL\nKEYOPT,1,2,3", types))
+    (block,) = deck.blocks
+    assert (block.kind, block.numbers.tolist(), block.nodes.tolist()) == ("C3D8I", [5], [list(range(1, 9))])
+    assert deck.node_sets["FOOT"].tolist() == [1, 2, 3, 4]
+    held = [(each.nodes.tolist(), each.first_dof, each.last_dof, each.value) for each in deck.boundaries]
+    assert held == [([1], 1, 1, 0.0), ([2], 1, 3, 0.0)]
+
+
+@needs_ansys
+@pytest.mark.parametrize(
+    ("commands", "types", "sentence"),
+    [
+        ("CE,R5.0,DEFI, 2, 1", "", r"line 33: CE may change the model.*; export without constraint equations: CEDELE"),
+        ("cp,R5.0,DEFI,1,2,UX", "", "line 33: CP may change the model"),
+        ("PSTRES,ON", "", "PSTRES may change the model.*; delete it, and give `rotation_speed`"),
+        ("OMEGA,0,0,300.", "", "OMEGA may change the model.*`rotation_speed` and `axis`"),
+        ("BFUNIF,TEMP,300", "", "BFUNIF may change the model.*`preload`"),
+        ("SFE,1,1,PRES,1,R5.0", "", "SFE may change the model.*`preload`"),
+        ("D,FOOT,UX,0", "", r"D of FOOT, UX = 0; delete it, and give `clamp` in the study"),
+        ("D,1,TEMP,0", "", "D of 1, TEMP = 0"),
+        ("EBLOCK,10,,,1", "", "EBLOCK without SOLID"),
+        ("KEYOPT,1,3,1", "", "elements of layers"),
+        ("CYCLIC,STATUS", "", "CYCLIC may change the model.*`n_sectors`"),
+        ("UNHEARD,1", "", "UNHEARD may change the model, and is not acted upon; delete it if it does not"),
+        ("", "ET,1,174\n", r"line 7: contact elements \(CONTA174\); delete these elements .*`contact`"),
+        ("", "ET,1,21\n", "line 7: elements of type 21; use solid elements"),
+        ("", "ET,2,185\n", "elements of the type 1, which neither ET nor ETBLOCK gives"),
+    ],
+)
+def test_commands_that_change_the_model(tmp_path, commands, types, sentence):
+    with pytest.raises(SceneError, match=sentence):
+        read_library_mesh(write_cdb(tmp_path, commands, types or ETBLOCK))
+
+
 def test_meshes_by_their_ending(tmp_path):
     path = tmp_path / "mesh.inp"
     path.write_text("*NODE\n1,0,0,0\n")
@@ -88,33 +176,41 @@ def test_meshes_by_their_ending(tmp_path):
         read_mesh_file(tmp_path / "none.cdb")
 
 
-def test_missing_library(tmp_path, monkeypatch):
-    monkeypatch.setattr(process, "_READERS", {"gmsh": ("no_such_library", "meshio"), "full": ("none.at.all", "ansys")})
-    with pytest.raises(SceneError) as wrong:
-        read_library_mesh(write(tmp_path, GMSH_22))
-    assert str(wrong.value) == (
-        "model: mesh.msh needs the library no_such_library, which is not installed;"
-        " install the library: pip install meshio."
-    )
+@pytest.mark.parametrize("library", ["meshio", "ansys.mapdl.reader"])
+def test_missing_library(tmp_path, monkeypatch, library):
+    monkeypatch.setitem(sys.modules, library, None)
+    if library == "meshio":
+        with pytest.raises(
+            SceneError, match=r"msh needs the library meshio, .* install the library: pip install meshio"
+        ):
+            read_library_mesh(write(tmp_path, GMSH_22))
+        return
+    monkeypatch.setitem(sys.modules, "ansys.mapdl", None)
     (tmp_path / "job.full").write_bytes(b"1")
-    with pytest.raises(SceneError, match="pip install ansys"):
+    with pytest.raises(SceneError, match="pip install ansys-mapdl-reader"):
         read_matrices(tmp_path / "job")
 
 
 def test_library_that_does_not_load(tmp_path, monkeypatch):
     (tmp_path / "meshio.py").write_text("import no_such_module_at_all")
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "meshio", raising=False)
     with pytest.raises(SceneError, match=r"reads mesh\.msh does not load: No module named 'no_such_module_at_all'"):
         read_library_mesh(write(tmp_path, GMSH_22))
 
 
-def test_process_that_ends_badly(tmp_path, monkeypatch):
-    path = write(tmp_path, GMSH_22)
-    monkeypatch.setattr(process, "_is_installed", lambda _: True)
-    for end in ("import os; os.abort()", "import sys; sys.exit(0)", "raise SystemExit", "x = bytearray(2 ** 60)"):
-        monkeypatch.setattr(limited_process, "_START", end)
-        with pytest.raises(SceneError, match=r"mesh.msh is damaged: meshio cannot read it"):
-            read_library_mesh(path)
+@needs_meshio
+def test_a_library_that_ends_the_process(tmp_path, monkeypatch, capsys):
+    import meshio
+
+    def read(*_, **__):
+        print("ERROR: Couldn't read file")
+        sys.exit(1)
+
+    monkeypatch.setattr(meshio, "read", read)
+    with pytest.raises(SceneError, match=r"kind that meshio does not know \(ERROR: Couldn't read file\)"):
+        read_library_mesh(write(tmp_path, GMSH_22))
+    assert capsys.readouterr().out == ""
 
 
 # edges of the mid-side nodes, from corners counted from 0, by the manuals of Gmsh and of CalculiX

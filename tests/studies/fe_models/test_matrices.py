@@ -11,6 +11,7 @@ from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import SECTOR
 from tests.studies.fe_models.matrix_files import chain, needs_ccx, run_ccx, write_abaqus, write_calculix, write_nastran
+from tests.studies.fe_models.mutations import mutate
 
 
 def check(read, nodes, rtol):
@@ -116,12 +117,133 @@ def test_wrong_files_of_abaqus(tmp_path, old, new, sentence):
         (r"\*(\s+)1(\s+)1 ", r"*\g<1>1\g<2>4 ", "node 1 has the dof 4"),
         ("D[+]10", "D+10         1.0D+10", "has an imaginary part"),
         ("MAAX", "BAAX", "no matrix MAAX but KAAX, PAX, BAAX"),
+        (
+            "KAAX           0       6",
+            "KAAX           0       1",
+            r"KAAX is square .* \(form 1\), and has one triangle only",
+        ),
+        (
+            "GRID,1,,0.,0.,0.",
+            "GRID,1,,0.,0.,0.,3",
+            r"line 2: GRID 1 has displacements in the coordinate system 3 \(CD\)",
+        ),
+        ("GRID,1,,0.,0.,0.", f"{'GRID':8}{7:8d}{'':8}{'0.':8}{'0.':8}{'0.':8}{3:8d}", "line 2: GRID 7 has displ"),
+        (
+            "GRID,1,,0.,0.,0.",
+            f"{'GRID*':8}{7:16d}{'':16}{'0.':16}{'0.':16}\n{'*':8}{'0.':16}{3:16d}",
+            "line 3: GRID 7 has displacements in the coordinate system 3",
+        ),
+        ("GRID,1,,0.,0.,0.", "GRDSET,,,,,,12", "line 2: GRDSET has displacements in the coordinate system 12"),
     ],
 )
 def test_wrong_files_of_nastran(tmp_path, old, new, sentence):
     job = write_nastran(tmp_path)
     edit(job.with_suffix(".pch"), old, new, 0 if "AAX" in old and "AX " not in old else 1)
     with pytest.raises(SceneError, match=sentence):
+        read_matrices(job)
+
+
+@pytest.mark.parametrize("form", [1, 6])
+def test_a_square_matrix_of_nastran(tmp_path, form):
+    """Both triangles under form 1 are one matrix; a diagonal matrix has no triangle."""
+    job = write_nastran(tmp_path)
+    stiffness, mass, node, direction = chain()
+    lines = []
+    for title, matrix in (("KAAX", stiffness), ("MAAX", np.diag(np.diag(mass)))):
+        lines.append(f"{'DMIG':8}{title:8}{0:8d}{form if title == 'MAAX' else 1:8d}{2:8d}{0:8d}")
+        for column in range(len(matrix)):
+            lines.append(f"{'DMIG*':8}{title:16}{node[column]:16d}{direction[column]:16d}")
+            for row in np.flatnonzero(matrix[:, column]):
+                lines.append(f"{'*':8}{node[row]:16d}{direction[row]:16d}{matrix[row, column]:16.9E}")
+    job.with_suffix(".pch").write_text("\n".join(lines) + "\n")
+    read = read_matrices(job)
+    np.testing.assert_allclose(read.stiffness.toarray(), stiffness, rtol=1e-8)
+    np.testing.assert_allclose(read.mass.toarray(), np.diag(np.diag(mass)), rtol=1e-8)
+
+
+@pytest.mark.parametrize("line", ["1 1 2.5e9\n", "  1,  1,  2.5e9\n", "** a matrix\n12 3 1.0\n"])
+def test_matrices_of_abaqus_without_nodes(tmp_path, line):
+    job = write_abaqus(tmp_path)
+    (tmp_path / "job_MASS1.mtx").write_text(line)
+    with pytest.raises(SceneError, match=r"job_MASS1.mtx: line . has a row.*COORDINATE.*; write .*FORMAT=MATRIX INPUT"):
+        read_matrices(job)
+
+
+@pytest.mark.parametrize("name", ["job", "job.op4"])
+def test_op4_is_named(tmp_path, name):
+    (tmp_path / "job.op4").write_bytes(b"1")
+    with pytest.raises(
+        SceneError, match=r"job.op4 is an OP4 file of Nastran.*; punch the matrices: PARAM,EXTOUT,DMIGPCH"
+    ):
+        read_matrices(tmp_path / name)
+
+
+WRITERS = {
+    "job.sti": write_calculix,
+    "job.mas": write_calculix,
+    "job.dof": write_calculix,
+    "job_STIF1.mtx": write_abaqus,
+    "job_MASS1.mtx": write_abaqus,
+    "job.pch": write_nastran,
+}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_damaged_matrices(tmp_path, monkeypatch, name):
+    """What is read is symmetric and finite; what is not ends in a sentence that names the file."""
+    monkeypatch.setattr(nastran, "_AT_ONCE", 5)
+    job = WRITERS[name](tmp_path)
+    good = (tmp_path / name).read_bytes()
+    said: list[str] = []
+    for seed in range(40):
+        (tmp_path / name).write_bytes(mutate(good, seed))
+        try:
+            read = read_matrices(job)
+        except SceneError as error:
+            said.append(str(error))
+            continue
+        for matrix in (read.stiffness, read.mass):
+            assert matrix.shape == (read.node.size,) * 2
+            assert np.isfinite(matrix.data).all()
+            assert abs(matrix - matrix.T).max() == 0
+        assert set(read.direction) <= {0, 1, 2}
+    assert len(said) > 5
+    assert all(sentence.startswith("matrices: job") and sentence.isprintable() for sentence in said)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("job.sti", b"", "job.sti: the file is empty"),
+        ("job.sti", b"1 " * 500_000, "job.sti: line 1 is very long"),
+        ("job.sti", b"999999999999999999 1 1.0\n", "job.sti: 999999999999999999 rows for 9 dofs"),
+        ("job_STIF1.mtx", b"-9223372036854775808,1,1,1,1.0\n", "job_STIF1.mtx: "),
+        ("job.pch", b"DMIG" * 100_000, "job.pch: line 1 is no text, or very long"),
+        ("job.pch", b"DMIG    KAAX           0       6       2\n" * 2, "job.pch: line 2 begins KAAX again"),
+        ("job.pch", b"$\n", "job.pch: no matrix KAAX but none"),
+    ],
+)
+def test_files_without_a_matrix(tmp_path, name, content, sentence):
+    job = WRITERS[name](tmp_path)
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(SceneError, match=sentence) as wrong:
+        read_matrices(job)
+    assert len(str(wrong.value)) < 300
+
+
+def test_too_many_entries(tmp_path, monkeypatch):
+    for module in ("columns", "nastran"):
+        monkeypatch.setattr(f"studies.fe_models.matrices.{module}.LARGEST_ENTRIES", 20)
+    for folder, write in (("calculix", write_calculix), ("abaqus", write_abaqus), ("nastran", write_nastran)):
+        (tmp_path / folder).mkdir()
+        with pytest.raises(SceneError, match="more than 20 entries; reduce the model"):
+            read_matrices(write(tmp_path / folder))
+
+
+def test_missing_file(tmp_path):
+    job = write_calculix(tmp_path)
+    (tmp_path / "job.mas").unlink()
+    with pytest.raises(SceneError, match=r"matrices: job.mas: there is no such file"):
         read_matrices(job)
 
 

@@ -1,0 +1,132 @@
+"""Study, scene and result files that are damaged, too large or of another kind: status 2 and one line."""
+
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from studyrunner.cli import main
+from studyrunner.report import cli as report
+from tests.studies.scene_models import poke, put
+
+STUDY = """
+[study]
+name = "s"
+[scene]
+model = "scene.h5"
+friction_coefficient = 0.5
+[axes]
+frequency = [150.0]
+[slow_time]
+cycles = 0
+outputs = 1
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The slider's scene file, and a result of it."""
+    folder = tmp_path_factory.mktemp("made")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(["sdof_slider", "--write-scene", "scene.h5"]) == 0
+        Path("study").write_text(STUDY, encoding="utf-8")
+        assert main(["study", "-o", "result"]) == 0
+        Path("result.progress").unlink()
+    return folder
+
+
+@pytest.fixture
+def folder(made, tmp_path, monkeypatch):
+    for name in ("scene.h5", "study", "result"):
+        shutil.copy(made / name, tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def refused(capsys):
+    def run(arguments, command=main):
+        assert command(arguments) == 2
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        (line,) = captured.err.splitlines()
+        assert line.isprintable()
+        return line
+
+    return run
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9])
+@pytest.mark.parametrize("place", ["scene.h5", "result"])
+def test_a_truncated_file(share, place, folder, refused):
+    content = (folder / place).read_bytes()
+    (folder / place).write_bytes(content[: int(share * len(content))])
+    assert f"{place}: " in refused(["result" if place == "result" else "study", "--plan"])
+    if place == "result":
+        assert "result: " in refused(["result"], report.main)
+
+
+@pytest.mark.parametrize("command", [main, report.main])
+def test_a_file_that_claims_to_be_hdf5(command, folder, refused):
+    (folder / "result").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    assert "result: " in refused(["result"], command)
+
+
+def test_a_result_that_is_none(folder, refused):
+    (folder / "result").write_bytes(b"CDF\x01" + bytes(100))
+    assert "is no NetCDF file (NetCDF-4)" in refused(["result"], report.main)
+    assert "there is no such file" in refused(["none.nc"], report.main)
+
+
+def huge(file):
+    del file["mass"]
+    file.create_dataset("mass", (10**7, 10**7), "f8", chunks=(100, 100))
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (huge, "mass: shape (10000000, 10000000) is too large: reduce the model: all datasets together may take 2 GiB"),
+        (poke("stiffness", (0, 0), np.nan), "stiffness"),
+        (put("response/names", ["\x1b[31mred", "\x1b[31mred"]), r"\x1b[31mred"),
+    ],
+)
+def test_a_scene_that_is_none(change, sentence, folder, refused):
+    with h5py.File("scene.h5", "r+") as file:
+        change(file)
+    line = refused(["study"])
+    assert line.startswith("run-study: scene.h5: ")
+    assert sentence in line
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        np.random.default_rng(0).bytes(100_000),
+        b"#" * 3_000_000,
+        b"a = " + b"[" * 100_000,
+        STUDY.encode() + b'"\\u001b]0;x\\u0007" = 1\n',
+        STUDY.replace("[150.0]", "1e999999999").encode(),
+        STUDY.replace("scene.h5", "./study").encode(),
+        STUDY.replace(
+            "[150.0]", "{start = 1, stop = 2, num = 1000000}\nstep = {start = 1, stop = 2, num = 9}"
+        ).encode(),
+    ],
+    ids=["random bytes", "too long", "nested", "escape sequence", "huge exponent", "scene that is none", "many points"],
+)
+def test_a_study_that_is_none(text, folder, refused):
+    (folder / "study").write_bytes(text)
+    refused(["study", "--plan"])
+
+
+def test_names_of_files_do_not_reach_the_terminal_raw(folder, refused, capsys):
+    name = "\x1b[2J\udcff.toml"
+    Path(name).write_text("[study", encoding="utf-8")
+    assert r"\x1b[2J\udcff.toml" in refused([name])
+    assert r"\x1b[2J" in refused(["study", "--set", "axes.step=\x1b[2J"])
+    (folder / "study").write_text(STUDY.replace('name = "s"', 'name = "s"\ntitle = "\\u001b[2J"'), encoding="utf-8")
+    assert main(["study", "--plan"]) == 0
+    assert "\x1b" not in capsys.readouterr().out
