@@ -165,9 +165,9 @@ def _start(case: BlockCase) -> tuple[StartState, StartState | None]:
         near = begin_again(block, case.depth, case.begun, case.settings)
         if near is not None:
             return near, case.begun
-    sweep: Sweep = case.mission.first if block.begin == "continue" else block.begin
+    sweep: Sweep = case.mission.first if block.way == "continue" else block.way
     _, start = next(follow_line(case.line(sweep), np.array([block.steady[0]])))
-    return start, None if block.begin == "continue" or start.state is None else start
+    return start, None if block.way == "continue" or start.state is None else start
 
 
 def _slope(work: WearingJoint, ended: Ended, case: BlockCase, growth: FloatArray) -> FloatArray:
