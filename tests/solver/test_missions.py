@@ -573,7 +573,10 @@ def test_the_next_passage_begins_with_the_frequencies_that_count(monkeypatch):
         ({"frequency": Passage(2.0, 2.0, 1.0), "cycles": None}, r"blocks.*: frequency.stop: give another"),
         ({"frequency": Passage(2.0, 3.0, -1.0), "cycles": None}, r"blocks.*: frequency.rate: give values above 0"),
         ({"frequency": Passage(2.0, 3.0, 1.0)}, r"blocks.*: cycles: the cycles of a passage follow"),
-        ({"frequency": Passage(2.0, 3.0, 1.0), "cycles": None, "begin": "down"}, r'blocks.*: begin: this passage goes up: give "up"'),
+        (
+            {"frequency": Passage(2.0, 3.0, 1.0), "cycles": None, "begin": "down"},
+            r'blocks.*: begin: this passage goes up: give "up"',
+        ),
         ({"cycles": None}, r"blocks.*: cycles: missing"),
         ({"frequency": np.nan}, r"blocks\[1\]: frequency: give finite numbers"),
         ({"excitation_amplitude": -1.0}, r"blocks\[1\]: excitation_amplitude: give values of at least 0"),
