@@ -162,7 +162,7 @@ def _start(case: BlockCase) -> tuple[StartState, StartState | None]:
     if case.carried is not None:
         return continue_block(block, case.depth, case.carried, case.settings), None
     if case.begun is not None:
-        near = begin_again(block, case.depth, case.begun, case.settings)
+        near = begin_again(block, case.depth, case.begun, case.settings, case.every)
         if near is not None:
             return near, case.begun
     sweep: Sweep = case.mission.first if block.way == "continue" else block.way

@@ -24,6 +24,7 @@ from solver.outcome import Outcome, describe_error
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
 from solver.settings import Resolution, SolverSettings
+from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
 
 _NO_RESOLUTION = Resolution((1,), 4)
@@ -56,12 +57,14 @@ def continue_block(block: Block, depth: FloatArray, carried: StartState, setting
     return replace(found, run_time=computing_time() - began)
 
 
-def begin_again(block: Block, depth: FloatArray, begun: StartState, settings: SolverSettings) -> StartState | None:
+def begin_again(
+    block: Block, depth: FloatArray, begun: StartState, settings: SolverSettings, every: bool
+) -> StartState | None:
     """The state to which the ramp or the sweep of a block leads, from that in a mission before, without its way.
 
     Where each pair slips or opens within the period, the tangential history of the way is forgotten, and the state
     follows from the depths alone. None where a pair sticks all the time, where the way has jumped over a fold, where
-    there is no near state, or where the vibration has changed so much that the way may lead to another branch.
+    there is no near stable state, or where the vibration has changed so much that the way may lead to another branch.
 
     Parameters
     ----------
@@ -73,6 +76,8 @@ def begin_again(block: Block, depth: FloatArray, begun: StartState, settings: So
         State to which the way has led in a mission before.
     settings
         Numerical settings, with the time that is left.
+    every
+        For which states stability is tested, as in `find_instability`.
 
     Raises
     ------
@@ -90,7 +95,10 @@ def begin_again(block: Block, depth: FloatArray, begun: StartState, settings: So
         return None
     if vibration_change(before.evaluation, found.evaluation) > CONTINUATION.smooth_change:
         return None
-    state = periodic_state(path.joint_at(1.0), found)
+    joint = path.joint_at(1.0)
+    if find_instability(path.case, joint, found.evaluation, budget, every):
+        return None
+    state = periodic_state(joint, found)
     return replace(begun, state=state, reference=None, newton_iterations=budget.iterations)
 
 

@@ -528,11 +528,12 @@ def test_stability_is_tested_in_the_first_mission_and_in_the_last(monkeypatch):
     def unstable(_case, _joint, _at, _budget, every=True):
         tested.append(every)
 
-    monkeypatch.setattr("solver.loading_history.frequency_sweep.find_instability", unstable)
+    for place in ("loading_history.frequency_sweep", "missions.block_start"):
+        monkeypatch.setattr(f"solver.{place}.find_instability", unstable)
     blocks = (Block(scene("sdof_slider"), 161.0, 10.0, FRICTION, 500.0),)
     history = integrate(blocks, 3, largest_step=1)
     assert history.outcome is Outcome.CONVERGED
-    # three missions, and three of the reference solution
+    # a ramp and two states without one, and three of the reference solution
     assert tested == [True, False, True, False, False, False]
 
 
