@@ -250,6 +250,15 @@ seconds = 10
     assert find_scenes(study).of_blocks == ((0, 1), (0, 2))
 
 
+def test_missions_whose_blocks_give_all_need_no_axes(tmp_path):
+    path = tmp_path / "no_axes.toml"
+    path.write_text(STEADY.replace("[axes]\nfrequency = 160\n", "") + "frequency = 160\n", encoding="utf-8")
+    study = read_study(path)
+    assert tuple(study.dimensions) == ("wear_coefficient", "sweep")
+    path.write_text(format_study(study), encoding="utf-8")
+    assert read_study(path).dimensions == study.dimensions
+
+
 @pytest.mark.parametrize(
     ("changes", "key", "said"),
     [
