@@ -87,11 +87,11 @@ def integrate_mission(
 def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -> Block:
     """The block with its numbers checked; errors name it by its number and its name."""
     try:
-        check_word("begin", block.begin, get_args(Begin))
+        check_word("begin", block.way, get_args(Begin))
         frequency, cycles = _checked_times(block)
         load, friction = check_case(block.model, block.excitation_amplitude, block.friction_coefficient, "up", settings)
         wearing_work(law, block.model.contact, friction_of_pairs(block.model, friction))
-        if block.begin == "continue":
+        if block.way == "continue":
             # the way from another amplitude is a ramp of this one
             check_number("excitation_amplitude", load, above=0.0)
     except ValueError as error:
@@ -114,7 +114,7 @@ def _checked_times(block: Block) -> tuple[float | Passage, float | None]:
         raise ValueError("frequency.stop: give another frequency than start")
     if block.cycles is not None:
         raise ValueError("cycles: the cycles of a passage follow from its rate: leave them out")
-    if block.begin != passage.sweep:
+    if block.way != passage.sweep:
         raise ValueError(f'begin: this passage goes {passage.sweep}: give "{passage.sweep}"')
     return passage, None
 
@@ -127,7 +127,7 @@ def _check_neighbours(before: Block, block: Block, place: int) -> None:
         raise ValueError(f"{_called(place, block)}: model: give equal contact pairs to all blocks")
     if before.model.response_names != block.model.response_names:
         raise ValueError(f"{_called(place, block)}: model: give equal responses to all blocks")
-    if block.begin != "continue":
+    if block.way != "continue":
         return
     if before.excitation_amplitude == 0.0:
         raise ValueError(f"{_called(place, block)}: begin: the block before does not vibrate: begin with a ramp")

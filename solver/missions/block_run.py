@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+from solver.accuracy.options import ACCURACY
 from solver.clock import computing_time
 from solver.contact.wear_law import WearLaw
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.start_states import follow_line
 from solver.loading_history.sweep_start import Sweep
-from solver.missions.block_start import continue_block
+from solver.missions.block_start import begin_again, continue_block
 from solver.missions.blocks import Block, Mission, worn
 from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
@@ -40,7 +41,7 @@ class BlockRun:
     response (2, n_response): complex first harmonic, m.
     peak (2, n_response): largest magnitude over a period, m.
     response_error: estimated relative error of both.
-    growth_error: estimated relative error of the growth by harmonics, samples and the way to the start state.
+    growth_error: estimated relative error of the growth by harmonics, samples, the way to the start state and steps.
     inaccurate: largest relative error of a state above rtol, 0 where there is none.
     held: whether the mean position of a joint that slides as a whole was held.
     cut_off: whether a pair at an edge of the modelled contact carries load or has worn.
@@ -49,6 +50,7 @@ class BlockRun:
     iterations: Newton iterations, start state included.
     sweep_rate: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.delay`; 0 for steady vibration.
     frequencies: with which a passage of the next mission begins, ascending, Hz.
+    begun: state to which the ramp or the sweep of the block has led; None for other blocks.
     """
 
     failure: Failure
@@ -66,6 +68,7 @@ class BlockRun:
     iterations: int = 0
     sweep_rate: float = 0.0
     frequencies: tuple[float, ...] = ()
+    begun: StartState | None = None
 
     @property
     def completed(self) -> bool:
@@ -83,6 +86,7 @@ class BlockCase:
     with_slope: whether the slope of the growth is asked for.
     settings: with the time that is left.
     frequencies: with which a passage begins, ascending, Hz; none for the first one.
+    begun: state to which the ramp or the sweep of the block has led in a mission before.
     every: for which states stability is tested, as in `find_instability`.
     """
 
@@ -93,6 +97,7 @@ class BlockCase:
     with_slope: bool
     settings: SolverSettings
     frequencies: tuple[float, ...] = ()
+    begun: StartState | None = None
     every: bool = True
 
     @property
@@ -120,11 +125,7 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
     A failure is a value. With `like`, of the same block in the history, the reference solution is integrated.
     """
     began, block = computing_time(), case.block
-    sweep: Sweep = case.mission.first if block.begin == "continue" else block.begin
-    if case.carried is None:
-        _, start = next(follow_line(case.line(sweep), np.array([block.steady[0]])))
-    else:
-        start = continue_block(block, case.depth, case.carried, case.settings)
+    start, begun = _start(case)
     if start.state is None:
         return not_flown(case, Failure(start.outcome, start.message), start.newton_iterations)
     left = replace(case.settings, time_limit=case.settings.time_limit - (computing_time() - began))
@@ -134,7 +135,7 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
         "adaptive",
         counts,
         law=case.law,
-        ends_at_last=case.mission.continued_by(case.place),
+        ends_at_last=True,
     )
     of_block = build_case(model, block.friction_coefficient, start.penalty_omega, left, start.resolution)
     solutions = Solutions(of_block, start, asked)
@@ -150,8 +151,23 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
     if case.with_slope:
         work = WearingJoint.of(of_block, start.state, asked.wear_coefficient, asked.law)
         flown = replace(flown, slope=_slope(work, ended, case, flown.growth))
+    flown = replace(flown, begun=begun)
     # as read from a file: an interrupted mission goes on with equal bits
     return in_rows(flown)
+
+
+def _start(case: BlockCase) -> tuple[StartState, StartState | None]:
+    """The state at the begin of a block, and `BlockRun.begun`."""
+    block = case.block
+    if case.carried is not None:
+        return continue_block(block, case.depth, case.carried, case.settings), None
+    if case.begun is not None:
+        near = begin_again(block, case.depth, case.begun, case.settings, case.every)
+        if near is not None:
+            return near, case.begun
+    sweep: Sweep = case.mission.first if block.way == "continue" else block.way
+    _, start = next(follow_line(case.line(sweep), np.array([block.steady[0]])))
+    return start, None if block.way == "continue" or start.state is None else start
 
 
 def _slope(work: WearingJoint, ended: Ended, case: BlockCase, growth: FloatArray) -> FloatArray:
@@ -167,15 +183,19 @@ def _read(case: BlockCase, ended: Ended, values: dict[str, Any], start: StartSta
     """The result of a block that was flown to its end."""
     state, course, end = ended.state, ended.output.course, case.block.steady[1]
     assert state is not None
+    growth = values["wear_depth"][-1]
+    volume = float(growth @ case.mission.area)
+    # the errors of the first steps of the blocks have one sign and add up over the missions
+    by_steps = ACCURACY.history_safety * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
     cut = first_cut_off(case.block.model.contact, np.array([0.0, end]), values["mean_pressure"], values["wear_depth"])
     return BlockRun(
         failure=ended.failure,
-        growth=values["wear_depth"][-1],
+        growth=growth,
         slope=None,
         response=values["response"],
         peak=values["response_peak"],
         response_error=float(np.fmax.reduce(values["response_error"])),
-        growth_error=float(values["wear_rate_error"][0]),
+        growth_error=float(values["wear_rate_error"][0]) + by_steps,
         inaccurate=state.worst.largest if state.inaccurate_from <= end else 0.0,
         held=state.held_from <= end,
         cut_off=not math.isnan(cut),

@@ -1,25 +1,30 @@
-"""The state with which a block begins that continues the block before."""
+"""The state with which a block begins that continues the block before, or that keeps nothing of its way."""
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
 from solver.clock import computing_time
-from solver.harmonic_balance.converged import PathPoint, final_history
-from solver.harmonic_balance.dlft import Balance
+from solver.contact.coulomb import STICK
+from solver.continuation.options import CONTINUATION
+from solver.harmonic_balance.converged import PathPoint, final_history, vibration_change
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
+from solver.loading_history.path_step import LoadingPath
 from solver.loading_history.sweep_start import Sweep
 from solver.missions.blocks import Block, worn
 from solver.model import FloatArray
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import OutOfTimeError, solve_balance
+from solver.newton.solve_balance import Budget, OutOfTimeError, solve_balance
 from solver.outcome import Outcome, describe_error
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
 from solver.settings import Resolution, SolverSettings
+from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
 
 _NO_RESOLUTION = Resolution((1,), 4)
@@ -50,6 +55,69 @@ def continue_block(block: Block, depth: FloatArray, carried: StartState, setting
         # an error spoils one mission only: the study goes on
         found = replace(lost, outcome=Outcome.EXCEPTION, message=describe_error(error))
     return replace(found, run_time=computing_time() - began)
+
+
+def begin_again(
+    block: Block, depth: FloatArray, begun: StartState, settings: SolverSettings, every: bool
+) -> StartState | None:
+    """The state to which the ramp or the sweep of a block leads, from that in a mission before, without its way.
+
+    Where each pair slips or opens within the period, the tangential history of the way is forgotten, and the state
+    follows from the depths alone. None where a pair sticks all the time, where the way has jumped over a fold, where
+    there is no near stable state, or where the vibration has changed so much that the way may lead to another branch.
+
+    Parameters
+    ----------
+    block
+        The block.
+    depth
+        (n_contact,), m, worn before the block.
+    begun
+        State to which the way has led in a mission before.
+    settings
+        Numerical settings, with the time that is left.
+    every
+        For which states stability is tested, as in `find_instability`.
+
+    Raises
+    ------
+    OutOfTimeError
+        The time is over.
+    """
+    budget = Budget(deadline=computing_time() + settings.time_limit)
+    path, before = _evaluated(block, depth, begun, settings)
+    if begun.branch > 0 or not _forgets(before.evaluation):
+        return None
+    found = None
+    with contextlib.suppress(np.linalg.LinAlgError):
+        found = path.solve((before,), 1.0, JacobianSolver(), budget)
+    if found is None or not _forgets(found.evaluation):
+        return None
+    if vibration_change(before.evaluation, found.evaluation) > CONTINUATION.smooth_change:
+        return None
+    joint = path.joint_at(1.0)
+    if find_instability(path.case, joint, found.evaluation, budget, every):
+        return None
+    state = periodic_state(joint, found)
+    return replace(begun, state=state, reference=None, newton_iterations=budget.iterations)
+
+
+def _evaluated(
+    block: Block, depth: FloatArray, begun: StartState, settings: SolverSettings
+) -> tuple[LoadingPath, PathPoint]:
+    """The joint with these depths, and the vibration of a state in it."""
+    state, model = begun.state, worn(block.model, depth)
+    assert state is not None
+    case = build_case(model, block.friction_coefficient, begun.penalty_omega, settings, begun.resolution)
+    path = LoadingPath(case, state.excitation_amplitude, state.omega)
+    balance = path.balance_at(1.0, state.start_history)
+    at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
+    return path, PathPoint(1.0, at, state.start_history)
+
+
+def _forgets(at: Evaluation) -> bool:
+    """Whether each pair slips or opens within the period."""
+    return not (at.status_t == STICK).all(axis=1).any()
 
 
 class _Continuation:

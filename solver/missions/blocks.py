@@ -40,14 +40,15 @@ class Block:
     """A part of a mission: steady vibration for a number of cycles, or a passage (`solver.missions.passage`).
 
     - model: the joint, e.g. at the speed of the block. All blocks of a mission have equal contact pairs.
-    - frequency: Hz, or a passage, which begins with a sweep of its own direction.
+    - frequency: Hz, or a passage.
     - excitation_amplitude: N.
     - friction_coefficient: one number, (n_contact,) for each pair, or None for the model's own.
     - cycles: of the block in one mission, above 0; None for a passage, whose cycles follow from its rate.
     - begin: "ramp", "up" and "down": from the static state of the model with the depths worn so far, as `sweep` of
       `solver.march_wear`. "continue": from the last state of the block before (before the first block: of the last
       block of the mission before), whose tangential history is kept. Amplitude and frequency then change slowly, one
-      after the other, the frequency at the smaller of both amplitudes.
+      after the other, the frequency at the smaller of both amplitudes. By default "ramp"; a passage begins with a sweep
+      of its own direction.
     - name: of the block, for messages.
     """
 
@@ -56,8 +57,14 @@ class Block:
     excitation_amplitude: float
     friction_coefficient: float | FloatArray | None
     cycles: float | None = None
-    begin: Begin = "ramp"
+    begin: Begin | None = None
     name: str = ""
+
+    @property
+    def way(self) -> Begin:
+        """How the block begins."""
+        default: Begin = self.frequency.sweep if isinstance(self.frequency, Passage) else "ramp"
+        return self.begin or default
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -112,7 +119,7 @@ class Mission:
 
     def continued_by(self, place: int) -> bool:
         """Whether the block behind a block begins from its last state."""
-        return self.blocks[(place + 1) % len(self.blocks)].begin == "continue"
+        return self.blocks[(place + 1) % len(self.blocks)].way == "continue"
 
 
 def worn(model: ReducedModel, wear_depth: FloatArray) -> ReducedModel:

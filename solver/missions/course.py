@@ -28,12 +28,12 @@ class MissionNode:
     mission: missions flown so far.
     growth (n_block, n_contact): depth worn by each block so far, m.
     rate (n_block, n_contact): depth worn by each block in the last mission, m; in the first node in the first mission.
-    local (n_contact,): sum of the local errors of the steps so far, m.
+    local (n_contact,): sum of the local errors of the steps and of the errors of the blocks so far, m.
     values: `RESPONSES` of the last mission, with the relative errors `response_error` and `growth_error` (n_block,) of
         its blocks by their states.
     likes: of each block, for the reference solution.
     carried: state at the end of the last block, for a first block that continues; of the last node only.
-    frequencies: of each block, see `BlockRun.frequencies`; of the last node only.
+    frequencies, begun: of each block, see `BlockRun`; of the last node only.
     """
 
     mission: int
@@ -44,6 +44,7 @@ class MissionNode:
     likes: tuple[Like, ...] = ()
     carried: StartState | None = None
     frequencies: tuple[tuple[float, ...], ...] = ()
+    begun: tuple[StartState | None, ...] = ()
 
     @property
     def depth(self) -> FloatArray:
@@ -146,5 +147,5 @@ def growth_within(before: MissionNode, after: MissionNode, mission: float) -> Fl
 
 
 def _without_state(node: MissionNode) -> MissionNode:
-    """The node without the state for the next mission."""
+    """The node without the states for the next mission."""
     return MissionNode(node.mission, node.growth, node.rate, node.local, node.values, node.likes)

@@ -23,7 +23,7 @@ def is_one_history(mission: Mission) -> bool:
     block = mission.blocks[0]
     if len(mission.blocks) > 1 or isinstance(block.frequency, Passage):
         return False
-    return block.begin == "continue" or mission.missions[-1] == 1
+    return block.way == "continue" or mission.missions[-1] == 1
 
 
 def integrate_one_block(
@@ -32,7 +32,7 @@ def integrate_one_block(
     """The wear history of the only block, read at its missions; arguments as of `integrate_missions`."""
     (block,) = mission.blocks
     frequency, cycles = block.steady
-    sweep: Sweep = mission.first if block.begin == "continue" else block.begin
+    sweep: Sweep = mission.first if block.way == "continue" else block.way
     _, start = next(
         follow_branch(
             block.model,

@@ -84,6 +84,9 @@ class MissionSolutions:
 
     def _begun(self, fine: MissionCourse | None) -> MissionProgress:
         course = MissionCourse.begun(len(self.mission.blocks), self.mission.area.size)
+        if fine is not None:
+            (unworn,) = course.nodes
+            course = replace(course, nodes=(replace(unworn, begun=fine.nodes[-1].begun),))
         return MissionProgress(course, 1, fine, (), self.spent)
 
     def _integrate(self, rtol: float, last: int, fine: MissionCourse | None) -> MissionCourse:
@@ -144,7 +147,7 @@ class MissionSolutions:
         fine: the history, for a block of the reference solution; mission: number of the mission that is flown.
         """
         known = iter(self.progress.runs)
-        frequencies = self.progress.course.nodes[-1].frequencies
+        node = self.progress.course.nodes[-1]
         # as in a wear history: stability is tested at the begin and the end
         every = fine is None and mission in (1, self.mission.missions[-1])
         likes = () if fine is None else fine.nodes[int(np.searchsorted(fine.ends, mission))].likes
@@ -155,8 +158,9 @@ class MissionSolutions:
                 return found
             settings = self.mission.settings
             left = replace(settings, time_limit=settings.time_limit - self.spent)
-            near = frequencies[place] if frequencies else ()
-            case = BlockCase(self.mission, place, depth, carried, with_slope, left, near, every)
+            frequencies = node.frequencies[place] if node.frequencies else ()
+            begun = node.begun[place] if node.begun else None
+            case = BlockCase(self.mission, place, depth, carried, with_slope, left, frequencies, begun, every)
             through = run_passage if isinstance(case.block.frequency, Passage) else run_block
             flown = guarded(lambda: through(case, likes[place] if likes else None))
             found = not_flown(case, flown, 0) if isinstance(flown, Failure) else flown

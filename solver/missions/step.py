@@ -208,13 +208,16 @@ def _node(
         for row, end in enumerate(("begin", "end"))
     }
     values |= {name: np.array([getattr(run, name) for run in runs]) for name in ("response_error", "growth_error")}
+    # the error of a block that wears nothing may be unknown
+    of_blocks = np.where(rates > 0.0, values["growth_error"][:, None] * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
     return MissionNode(
         now.mission + length,
         before + rates,
         rates,
-        now.local + error,
+        now.local + error + length * of_blocks,
         values,
         tuple(run.like for run in runs if run.like is not None),
         runs[-1].last,
         tuple(run.frequencies for run in runs),
+        tuple(run.begun for run in runs),
     )

@@ -73,12 +73,15 @@ class AdaptiveSteps:
 
     rtol: relative error of the worn volume.
     bounded: whether a step that moves many times the normal forces is refused.
-    end: cycle count beyond which no step goes; inf for steps that go beyond the last count.
+    end: cycle count beyond which no step goes; inf for steps that go beyond the last count. At least two steps lead
+        there, where the first one has its usual length.
+    first: length of the first step over its usual length.
     """
 
     rtol: float
     bounded: bool = True
     end: float = np.inf
+    first: float = 1.0
 
     def begin(self, work: WearingJoint, state: WearState) -> WearState:
         """As in `Control`."""
@@ -87,7 +90,8 @@ class AdaptiveSteps:
         if fastest > 0.0:
             moved = float(np.abs(at.displacement_h[:, :, 1:]).max())
             # the limit is no bound where almost nothing slips
-            length = min(WEAR.first_step * state.step_limit, WEAR.first_depth * moved / fastest)
+            usual = min(WEAR.first_step * state.step_limit, WEAR.first_depth * moved / fastest, 0.5 * self.end)
+            length = self.first * usual
         return replace(state, length=length, first_length=length)
 
     def step(self, work: WearingJoint, state: WearState) -> Step | Failure:

@@ -193,8 +193,11 @@ class Solutions:
         assert self.start.state is not None
         work, end = self._joint(), float(compared[-1])
         resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in like.resolutions)
+        # a short history may consist of its first steps, which do not depend on rtol
+        first = 2.0 if self.asked.ends_at_last else 1.0
+        steps = AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, False, self._last_step_end(end), first)
         integration = Integration(
-            AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, bounded=False, end=self._last_step_end(end)),
+            steps,
             PlainCheck(resolutions, with_resonance=self._shifts),
             AtCount(end),
             DenseOutput(work.area, compared, smooth=True),

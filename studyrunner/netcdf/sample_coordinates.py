@@ -12,11 +12,12 @@ from studyrunner.coordinates import COORDINATES
 from studyrunner.scene.drawn_contacts import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import SceneSet
-from studyrunner.study.realisation import draw_inputs
+from studyrunner.study.realisation import block_of_input, draw_inputs
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study
 from studyrunner.variables import Variable
 
+_BY_SCATTER = "By [scatter] of the study."
 _OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "area of the contact pair")}
 
 
@@ -52,7 +53,7 @@ def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneS
             every = np.array([each[name] for each in drawn]).reshape(*shape, -1)
             along = tuple(slice(None) if each == place else 0 for each in range(len(shape)))
             dimensions, values = (name, "sample"), every[along]
-        yield _coordinate(name, dimensions, values, units, meaning)
+        yield _coordinate(name, dimensions, values, units, meaning, _comment(study, name))
     if scatters_pairs(study):
         yield from _of_pairs(study, facts, scenes)
 
@@ -91,10 +92,22 @@ def worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Input
     yield InputCoordinate("worn_depth", entry, values[0] if axis is None else values)
 
 
+def _comment(study: Study, name: str) -> str:
+    block = block_of_input(study, name)
+    if block is None:
+        return _BY_SCATTER
+    return f"{_BY_SCATTER} In the block {block.name}; in another block around the value of that block."
+
+
 def _coordinate(
-    name: str, dimensions: tuple[str, ...], values: NDArray[np.float64], units: str, meaning: str
+    name: str,
+    dimensions: tuple[str, ...],
+    values: NDArray[np.float64],
+    units: str,
+    meaning: str,
+    comment: str = _BY_SCATTER,
 ) -> InputCoordinate:
-    entry = Variable(dimensions, units, f"{meaning}, as the sample draws it", comment="By [scatter] of the study.")
+    entry = Variable(dimensions, units, f"{meaning}, as the sample draws it", comment=comment)
     return InputCoordinate(f"sample_{name}", entry, np.asarray(values, dtype=np.float64))
 
 

@@ -7,6 +7,7 @@ which nothing slips takes no step.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 ITERATIONS_AT_FIRST = 560
@@ -44,12 +45,23 @@ ITERATIONS_AN_ADAPTIVE_STEP = 7
 """Newton iterations of one adaptive step near the resonance (36 and 48 pairs: 4 to 13), with refused steps and the
 reference solution."""
 
-MISSIONS_FLOWN = 20
-"""Missions that are flown for thousands, by the history and again by its reference solution (18 to 26)."""
+MISSIONS_A_DOUBLING = 2.0
+"""Missions that are flown for each doubling of their number, by the history and again by its reference solution: 6 of
+20 on a slider, 18 to 26 of thousands on a dovetail, 42 of a million on a slider."""
+
+WAYS_OF_ONE_PAIR = 0.25
+"""Ramps and sweeps of a joint of one pair that are computed, over those of a joint whose pairs stick, where each
+mission has its own: 2 of 14 with 20 missions, 12 of 84 with a million (`solver.missions.block_start`)."""
+
+ITERATIONS_OF_BLOCK = 20
+"""Newton iterations of a block behind its start state (slider: 10 to 35, those of a way that is not gone included)."""
 
 ITERATIONS_OF_PASSAGE = 900
 """Newton iterations of a passage (dovetail with 16 pairs, rtol 0.1, 17 to 25 frequencies: 970 where most of its time
 goes, 330 where nothing slips; 2500 with about 40 frequencies)."""
+
+ITERATIONS_AN_OCTAVE = 350
+"""Those of a wide passage for each octave (slider from 1 to 10 000 Hz: 5600, and 2700 of its reference solution)."""
 
 AUTOMATIC_HARMONICS = 5
 """Harmonics of a state on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
@@ -94,11 +106,29 @@ def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
     return ITERATIONS_A_STEP * (max(1, math.ceil(cycles / step)) if cycles < math.inf else STEPS_TO_THE_END)
 
 
-def iterations_of_missions(n_blocks: int, n_passages: int, missions: int) -> int:
-    """Newton iterations of a mission history. n_passages: blocks of these whose frequency runs."""
-    steady = ITERATIONS_OF_RAMP + ITERATIONS_AN_ADAPTIVE_STEP * ADAPTIVE_STEPS
-    flown = 2 * min(missions, MISSIONS_FLOWN)
-    return flown * ((n_blocks - n_passages) * steady + n_passages * ITERATIONS_OF_PASSAGE)
+def missions_flown(missions: float) -> int:
+    """Missions that are flown for a number of missions, by the history or by its reference solution."""
+    return math.ceil(min(missions, 2.0 + MISSIONS_A_DOUBLING * math.log2(max(missions, 1.0))))
+
+
+def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float, *, one_pair: bool) -> float:
+    """Newton iterations of a mission history.
+
+    blocks: how each block begins, and the octaves of a passage, 0 for steady vibration. one_pair: whether the joint has
+    one contact pair only.
+    """
+    if len(blocks) == 1 and blocks[0][1] == 0.0 and (blocks[0][0] == "continue" or missions <= 1.0):
+        # one wear history
+        return iterations_of_branch(blocks[0][0], 1) + iterations_of_march("adaptive", math.inf, 1.0)
+    each = 0.0
+    for begin, octaves in blocks:
+        if octaves > 0.0:
+            each += ITERATIONS_OF_PASSAGE + ITERATIONS_AN_OCTAVE * octaves
+        elif begin == "continue":
+            each += 2 * ITERATIONS_OF_BLOCK
+        else:
+            each += ITERATIONS_OF_BLOCK + iterations_of_branch(begin, 1) * (WAYS_OF_ONE_PAIR if one_pair else 1.0)
+    return 2 * missions_flown(missions) * each
 
 
 def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float) -> float:

@@ -17,6 +17,9 @@ from studyrunner.study.realisation import Realisation
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
 
+_OF_ONE_PAIR = 3
+"""Relative displacements of one contact pair, at most."""
+
 _POINT = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
 
 
@@ -89,8 +92,11 @@ def _task(
     settings = settings_of_line(study, solver)
     n_unknowns = max(n_unknowns_of(n_displacements[block.joint.scene], settings.harmonics) for block in blocks)
     coefficient = part.study.axes.wear_coefficient[at["wear_coefficient"]]
-    n_passages = sum(block.passage is not None for block in blocks)
-    iterations = iterations_of_missions(len(blocks), n_passages, int(study.cycles_kept[-1]))
+    one_pair = n_displacements[blocks[0].joint.scene] <= _OF_ONE_PAIR
+    ways = [
+        (block.begin, abs(math.log2(block.passage[0] / block.frequency)) if block.passage else 0.0) for block in blocks
+    ]
+    iterations = iterations_of_missions(ways, study.cycles_kept[-1], one_pair=one_pair)
     return MarchTask(
         number=0,
         joint=blocks[0].joint,

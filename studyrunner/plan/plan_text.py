@@ -14,8 +14,8 @@ from studyrunner.plan.estimate import (
     ITERATIONS_AN_ADAPTIVE_STEP,
     ITERATIONS_OF_MODE,
     ITERATIONS_TO_A_FINAL_STATE,
-    MISSIONS_FLOWN,
     memory_a_rank,
+    missions_flown,
     seconds_an_iteration,
 )
 from studyrunner.plan.tasks import TaskPlan
@@ -146,7 +146,8 @@ def _assumed(study: Study, plan: TaskPlan) -> str:
         iterations = f"{ITERATIONS_A_MODE_POINT} Newton iterations of {milliseconds:.0f} ms or less a point"
         return f"{iterations}, {ITERATIONS_OF_MODE} to the first; a first run compiles for {COMPILE_SECONDS} s more"
     if study.has_missions:
-        at_once = f"{MISSIONS_FLOWN} missions are flown for thousands, and again for their reference solution"
+        flown = missions_flown(study.cycles_kept[-1])
+        at_once = f"{count(flown, 'mission is', 'missions are')} flown, and again for their reference solution"
         return f"{at_once}; Newton iterations of {milliseconds:.0f} ms or less; none where nothing slips"
     said = f"{ITERATIONS_A_STEP} Newton iterations of {milliseconds:.0f} ms or less a step"
     if "final" in study.axes.scheme:

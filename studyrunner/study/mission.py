@@ -28,8 +28,11 @@ def _read_frequency(value: object) -> object:
         return read(_POSITIVE, value)
     if value.keys() != set(_PASSAGE):
         raise WrongValueError(value, _FORM)
-    for each in value.values():
-        read(_POSITIVE, each)
+    for name, each in value.items():
+        try:
+            read(_POSITIVE, each)
+        except WrongValueError as error:
+            raise WrongValueError(error.value, error.remedy, f"frequency.{name}") from None
     if value["start"] == value["stop"]:
         raise WrongValueError(value, "give a stop that differs from start: the frequency runs from one to the other")
     return {name: float(value[name]) for name in _PASSAGE}
@@ -159,7 +162,12 @@ def _read_block(table: Mapping[str, Any], scene: type[BaseModel], axes: type[Bas
     given: dict[str, object] = {key: value for key, value in table.items() if key in own}
     if isinstance(table.get("frequency"), dict):
         given.setdefault("begin", "sweep")
-    return check_table(MissionBlock, {**given, "parameters": parameters}, source, place)
+    try:
+        return check_table(MissionBlock, {**given, "parameters": parameters}, source, place)
+    except UserError as error:
+        if error.key.startswith(place):
+            raise
+        raise UserError(source, f"{place}.{error.key}", error.value, error.remedy) from None
 
 
 def _check_block(before: MissionBlock, block: MissionBlock, sections: Mapping[str, Any], source: str) -> None:

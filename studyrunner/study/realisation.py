@@ -15,6 +15,7 @@ from pydantic import BaseModel
 
 from studyrunner.scatter.drawn_values import Drawn, ScatteredPairs, drawn
 from studyrunner.scatter.section import OF_PAIRS, Scattered, ScatterSection
+from studyrunner.study.mission import MissionBlock
 from studyrunner.study.mission_tables import with_room_of_all
 from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.similar_names import nearest_name
@@ -148,8 +149,17 @@ def _numbers_of(study: Study) -> list[str]:
     return [*floats, *study.wear.numbers]
 
 
+def block_of_input(study: Study, name: str) -> MissionBlock | None:
+    """The block of a mission for which the values of an input are told: the first one where each has a value of its
+    own; None where the values are around that of the study.
+    """
+    return study.mission[0] if study.mission and all(block.gives(name) for block in study.mission) else None
+
+
 def _own_value(study: Study, name: str) -> ArrayLike:
     """The study's own value of an input; 1, for any, where the contact pairs have their own."""
+    if block_of_input(study, name) is not None:
+        return _own_value(study.block_studies[0], name)
     if name in _OF_AXES:
         return np.array(getattr(study.axes, name))[:, None]
     value = {**dict(study.scene.parameters), **study.wear.numbers}.get(name)

@@ -135,6 +135,9 @@ def check_study(
             raise UserError(source, name, section, f"unknown table, give {nearest_name(name, _SECTIONS)}")
         if not isinstance(section, dict) and name != "mission":
             raise UserError(source, name, section, f"give a table [{name}] with keys")
+    if asks_for_missions(sections):
+        # each block may give its own values
+        sections.setdefault("axes", {})
     for name in ("study", "scene", "axes"):
         if name not in sections:
             raise UserError(source, name, None, f"missing: give a table [{name}]")

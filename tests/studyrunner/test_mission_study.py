@@ -8,6 +8,7 @@ from solver import Block, Outcome, Passage, integrate_mission
 from studies import build_scene
 from studyrunner.api import run_study
 from studyrunner.mpi import schedule
+from studyrunner.plan.estimate import iterations_of_missions
 from studyrunner.plan.planning import build_tasks
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import format_study, read_study
@@ -249,6 +250,15 @@ seconds = 10
     assert find_scenes(study).of_blocks == ((0, 1), (0, 2))
 
 
+def test_missions_whose_blocks_give_all_need_no_axes(tmp_path):
+    path = tmp_path / "no_axes.toml"
+    path.write_text(STEADY.replace("[axes]\nfrequency = 160\n", "") + "frequency = 160\n", encoding="utf-8")
+    study = read_study(path)
+    assert tuple(study.dimensions) == ("wear_coefficient", "sweep")
+    path.write_text(format_study(study), encoding="utf-8")
+    assert read_study(path).dimensions == study.dimensions
+
+
 @pytest.mark.parametrize(
     ("changes", "key", "said"),
     [
@@ -262,6 +272,7 @@ seconds = 10
         ({"mission.cruise.frequenzy": 1.0}, "mission.cruise.frequenzy", "unknown key, give frequency"),
         ({"mission.cruise.cycles": 10}, "mission.cruise.cycles", "or seconds: give one"),
         ({"mission.cruise.frequency": {"start": 1.0, "stop": 2.0}}, "mission.cruise.frequency", "rate = Hz/s"),
+        ({"mission.run-up.frequency.rate": -1}, "mission.run-up.frequency.rate", "= -1: give a finite number above 0"),
         ({"mission": [{"name": "one", "engine_order": 4, "cycles": 9}, {"name": "other", "seconds": 9}]},
          "mission.one.engine_order", "the scene has no rotation_speed"),
         ({"mission.heavy.engine_order": 4}, "mission.heavy.engine_order", "give one of both"),
@@ -301,3 +312,37 @@ def test_samples_draw_what_all_blocks_have(study_file, blocks):
         assert loads["cruise"] == load
         assert loads["heavy"] == pytest.approx(12.0 + load - 10.0)
     assert len(set(result.worn_volume.isel(mission=-1).values.ravel())) == 3
+
+
+@pytest.mark.slow
+def test_drawn_values_are_those_of_a_block_where_each_gives_its_own(study_file, blocks):
+    own = {"mission.cruise.excitation_amplitude": 12.0, "axes.wear_coefficient": 1e-11, "axes.sweep": "up"}
+    scatter = {"samples": 3, "excitation_amplitude": {"normal": {"relative_std": 0.05}}}
+    result = run(study_file, overrides={**own, "axes.frequency": 160, "scatter": scatter})
+    drawn = result.sample_excitation_amplitude
+    for sample in range(3):
+        load = drawn.values[sample]
+        assert load in [case.block.excitation_amplitude for case in blocks.flown if case.block.name == "run-up"]
+        others = [case.block.excitation_amplitude for case in blocks.flown if case.block.name == "heavy"]
+        assert 1.4 * load == pytest.approx(min(others, key=lambda each: abs(each - 1.4 * load)))
+    assert "In the block run-up" in drawn.attrs["comment"]
+
+
+@pytest.mark.slow
+def test_a_result_at_mission_0_alone_has_no_error(study_file, blocks):
+    few = {"axes.frequency": 160, "axes.sweep": "up", "axes.wear_coefficient": 1e-11, "slow_time.outputs": [0]}
+    result = run(study_file, overrides=few).squeeze()
+    assert result.worn_volume.item() == result.error_estimate.item() == 0.0
+    assert result.last_mission.item() == 0.0
+
+
+def test_the_estimated_time_follows_the_missions_that_are_flown():
+    times = [iterations_of_missions([("ramp", 0.0)], number, one_pair=False) for number in (1, 3, 20, 1e6)]
+    assert times[1] == pytest.approx(6 * 200)
+    assert times[2] < 4 * times[1]
+    assert times[3] < 5 * times[2]
+    # a ramp of one pair is seldom computed again; one block that continues is one wear history
+    assert iterations_of_missions([("ramp", 0.0)], 20, one_pair=True) < 0.4 * times[2]
+    assert iterations_of_missions([("continue", 0.0)], 1e6, one_pair=False) < 1000
+    narrow, wide = (iterations_of_missions([("up", octaves)], 20, one_pair=True) for octaves in (0.1, 13.3))
+    assert wide == pytest.approx(6 * narrow, rel=0.2)
