@@ -158,15 +158,11 @@ def _check_memory() -> None:
 
 def _follow(ranks: Ranks) -> int:
     """Any other rank. Only rank 0 has an exit status."""
-    from studyrunner.mpi.broadcast import LostError, take_over
+    from studyrunner.mpi.broadcast import take_over
     from studyrunner.mpi.version_check import report_version
 
     report_version(ranks)
-    try:
-        model = take_over(ranks)
-    except LostError:
-        # it is gone with what this rank was to compute with; where the others go on, they do so without both
-        os._exit(UNEXPECTED)
+    model = take_over(ranks)
     if model is not None:
         from studyrunner.run import work_on_job
         from studyrunner.scene_building import SeveralScenes, help_to_build

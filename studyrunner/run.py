@@ -204,7 +204,7 @@ def serve_study(
             for rank in range(1, ranks.size):
                 ranks.send(crashes, rank)
             with evaluator(scenes.model, crashes, rank=0) as evaluate:
-                run_tasks(ranks, completion, crashes, evaluate, progress, scenes)
+                run_tasks(ranks, completion, evaluate, progress, scenes)
             progress.say("writing the result")
             summary = writer.write(completion, n_found, progress)
         except BaseException as error:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from solver.clock import n_compiled
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.evaluate import build_evaluator, failed_results
-from studyrunner.mpi.crashes import count_crashes, note_tasks, read_tally
+from studyrunner.mpi.crashes import note_tasks
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Handlers, serve_tasks
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
@@ -59,14 +59,12 @@ def evaluator(model: ReducedModel | None, crashes: Path, rank: int) -> contextli
 def run_tasks(
     ranks: Ranks,
     completion: CompletionIndex,
-    folder: Path,
     evaluate: Evaluate,
     progress: ProgressDisplay,
     scenes: Scenes,
 ) -> None:
-    """Rank 0: has the remaining tasks done and their results saved. folder: of the notes on crashes."""
-    tally = read_tally(folder)
-    tasks = TaskProgress(completion, {key: len(crashes) for key, crashes in tally.items()})
+    """Rank 0: has the remaining tasks done and their results saved."""
+    tasks = TaskProgress(completion)
 
     def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         new = tasks.take(task, result)
@@ -85,12 +83,6 @@ def run_tasks(
                 " there is one"
             )
         return bool(fault)
-
-    def take_back(rank: int, lost: Sequence[tuple[BranchTask | MarchTask, int]]) -> list[BranchTask | MarchTask]:
-        had = f", which had {count(len(lost), 'task')}" if lost else ""
-        progress.note(f"rank {rank} is lost{had}: the others go on without it")
-        crashes = {crash.key: crash for crash in count_crashes(folder, rank)}
-        return tasks.take_back(lost, crashes)
 
     known: int | None = n_compiled()
 
@@ -112,6 +104,6 @@ def run_tasks(
     if completion.plan.n_missions:
         progress.say(f"computing {count(completion.plan.n_missions, 'mission history', 'mission histories')}")
     progress.begin_tasks()
-    handlers = Handlers(take, tick, tasks.keep, take_back, is_sick, scenes.with_model)
+    handlers = Handlers(take, tick, tasks.keep, is_sick, scenes.with_model)
     serve_tasks(ranks, tasks.begin(), evaluate, handlers, tasks.costs)
     completion.store.flush()

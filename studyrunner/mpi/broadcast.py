@@ -22,10 +22,6 @@ from studyrunner.mpi.version_check import Machine
 Thing = TypeVar("Thing")
 
 
-class LostError(Exception):
-    """The rank that this rank waits for is lost."""
-
-
 @dataclass(frozen=True)
 class _Whole:
     """The object, and the ranks of this machine that wait for it."""
@@ -67,9 +63,8 @@ class Broadcast(Generic[Thing]):
 
     def send(self) -> None:
         """Sends the object to every other rank. Raises KeyboardInterrupt where a rank was interrupted."""
-        left = [[rank for rank in group if rank not in self._ranks.lost] for group in self._groups]
-        (_, *neighbours), *elsewhere = left
-        for leader, *others in filter(None, elsewhere):
+        (_, *neighbours), *elsewhere = self._groups
+        for leader, *others in elsewhere:
             self._ranks.send(_Whole(self.value, tuple(others)), leader)
             for rank in others:
                 self._ranks.send(_From(leader), rank)
@@ -78,13 +73,7 @@ class Broadcast(Generic[Thing]):
 
 
 def take_over(ranks: Ranks) -> Any:  # a type that rank 0 knows
-    """Any other rank: the object that rank 0 sends; None where rank 0 sends None.
-
-    Raises
-    ------
-    LostError
-        Where the rank of this machine that had the object is lost.
-    """
+    """Any other rank: the object that rank 0 sends; None where rank 0 sends None."""
     message = _next_from(ranks, 0)
     leader = message.leader if isinstance(message, _From) else 0
     if leader:
@@ -127,21 +116,18 @@ def _tell(ranks: Ranks, shared: SharedObject[Thing] | None, thing: Thing, others
     if shared is None:
         return mapped
     for rank in others:
-        with contextlib.suppress(LostError):
-            answer = _next_from(ranks, rank)
-            if not isinstance(answer, _Mapped):
-                raise KeyboardInterrupt
-            if answer.done:
-                mapped.append(rank)
-            else:
-                ranks.send(_Whole(thing), rank)
+        answer = _next_from(ranks, rank)
+        if not isinstance(answer, _Mapped):
+            raise KeyboardInterrupt
+        if answer.done:
+            mapped.append(rank)
+        else:
+            ranks.send(_Whole(thing), rank)
     shared.close()
     return mapped
 
 
 def _next_from(ranks: Ranks, rank: int) -> object:
     while (received := ranks.receive(rank)) is None:
-        if rank in ranks.lost:
-            raise LostError
         time.sleep(POLL_SECONDS)
     return received[1]

@@ -4,7 +4,7 @@ A task has one result or several; each result is handed on at once. A long task 
 so that another run can continue from there. Rank 0 computes as well: the main thread sends tasks and receives results,
 a second thread computes. `dispatch` decides which rank gets which task.
 
-By hand: in the pools of mpi4py and schwimmbad a task has one result, no progress, and ends with the rank that has it.
+By hand: in the pools of mpi4py and schwimmbad a task has one result and no progress.
 """
 
 from __future__ import annotations
@@ -157,15 +157,6 @@ class _LocalWorker(Generic[Task, Result]):
         self._sent.put(message)
 
 
-TakeBack = Callable[[int, Sequence[tuple[Task, int]]], Iterable[Task]]
-"""Tasks that are done in place of the tasks of a lost rank; the number is that of results still to come."""
-
-
-def give_again(_rank: int, lost: Sequence[tuple[Task, int]]) -> list[Task]:
-    """The tasks of a lost rank, which begin anew."""
-    return [task for task, _ in lost]
-
-
 @dataclass(frozen=True)
 class Handlers(Generic[Task, Result]):
     """What rank 0 does with results and messages. All of them are called in the main thread.
@@ -174,7 +165,6 @@ class Handlers(Generic[Task, Result]):
         result makes possible.
     tick: called many times a second with a function that returns the running tasks, as `Dispatcher.running`.
     keep: called with a task and its progress, or words on its progress; never after the last result of the task.
-    take_back: called with a lost rank and the tasks that it had; returns the tasks to be done instead.
     is_sick: whether a result of a rank shows that the rank should get no more tasks.
     prepare: the task as a rank gets it; called once for each task that is sent, in the order of sending.
     """
@@ -182,7 +172,6 @@ class Handlers(Generic[Task, Result]):
     take: Callable[[Task, Result], Iterable[Task]]
     tick: Callable[[Callable[[], Sequence[tuple[Task, int, float]]]], None] = lambda _: None
     keep: Callable[[Task, object], None] = lambda *_: None
-    take_back: TakeBack[Task] = give_again
     is_sick: Callable[[int, Result], bool] = lambda *_: False
     prepare: Callable[[int, Task], Task] = lambda _, task: task
 
@@ -245,7 +234,6 @@ class _Server(Generic[Task, Result]):
         self._handlers = handlers
         self._dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
         self._local = _LocalWorker(run, _seconds_to_progress(ranks))
-        self._lost: frozenset[int] = frozenset()
 
     @property
     def done(self) -> bool:
@@ -254,13 +242,10 @@ class _Server(Generic[Task, Result]):
 
     def begin(self) -> None:
         """Sends the first tasks."""
-        self._do_without_the_lost()
         self._hand_out()
 
     def look(self) -> None:
         """Receives what there is; waits a moment where there is nothing."""
-        if self._ranks.lost != self._lost:
-            self.begin()
         quiet = False
         for _ in range(_LOOKS_A_TICK):
             received, message = self._ranks.receive(), self._local.receive(0.0)
@@ -297,15 +282,7 @@ class _Server(Generic[Task, Result]):
             else:
                 self._ranks.send(assignment, rank)
 
-    def _do_without_the_lost(self) -> None:
-        new, self._lost = self._ranks.lost - self._lost, self._ranks.lost
-        for rank in sorted(new):
-            self._dispatcher.add_lost(self._handlers.take_back(rank, self._dispatcher.lose(rank)))
-
     def _accept(self, rank: int, message: object) -> None:
-        if rank in self._lost:
-            # sent before the rank was lost; its task is done again
-            return
         if isinstance(message, _Progress):
             self._handlers.keep(self._dispatcher.task(message.number), message.progress)
             return

@@ -93,13 +93,11 @@ def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> dict[int
     silent = set(range(1, ranks.size))
     differences = {}
     latest = time.monotonic() + seconds
-    while silent - ranks.lost:
+    while silent:
         received = ranks.receive()
         if received is None:
             if time.monotonic() > latest:
-                raise LauncherError(
-                    f"rank {min(silent - ranks.lost)} has not said within {seconds:.0f} s what it runs: {_REMEDY}"
-                )
+                raise LauncherError(f"rank {min(silent)} has not said within {seconds:.0f} s what it runs: {_REMEDY}")
             time.sleep(POLL_SECONDS)
             continue
         rank, said = received

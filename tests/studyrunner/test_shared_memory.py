@@ -13,7 +13,7 @@ import pytest
 
 from studies import build_scene
 from studyrunner.mpi import broadcast
-from studyrunner.mpi.broadcast import Broadcast, LostError, take_over
+from studyrunner.mpi.broadcast import Broadcast, take_over
 from studyrunner.mpi.shared_memory import SharedObject, open_shared
 from studyrunner.mpi.version_check import Machine
 from studyrunner.scene.scene import describe_scene
@@ -92,15 +92,11 @@ def test_the_memory_stays_with_those_who_have_it_when_its_owner_is_killed():
 
 
 class Threads:
-    """Ranks that are threads of one process. lost: known to all at once."""
+    """Ranks that are threads of one process."""
 
-    def __init__(self, rank, boxes, lost):
-        self.rank, self._boxes, self._lost = rank, boxes, lost
+    def __init__(self, rank, boxes):
+        self.rank, self._boxes = rank, boxes
         self.size = 1 + max(rank for rank, _ in boxes)
-
-    @property
-    def lost(self):
-        return frozenset(self._lost)
 
     def send(self, message, rank):
         self._boxes[self.rank, rank].put(pickle.dumps(message))
@@ -122,10 +118,9 @@ class Threads:
         raise AssertionError(status)
 
 
-def hand_to_all(monkeypatch, hosts, refused="", lost=frozenset()):
+def hand_to_all(monkeypatch, hosts, refused=""):
     """What each rank gets, one letter a rank for the machine it is on; how often the memory of others was mapped."""
     size = len(hosts)
-    gone = set(lost)
     boxes: dict[tuple[int, int], queue.SimpleQueue[bytes]] = {
         (a, b): queue.SimpleQueue() for a in range(size) for b in range(size)
     }
@@ -142,30 +137,25 @@ def hand_to_all(monkeypatch, hosts, refused="", lost=frozenset()):
     monkeypatch.setattr(broadcast, "open_shared", open_here)
 
     def follow(rank):
-        ranks = Threads(rank, boxes, gone)
-        try:
-            got[rank] = take_over(ranks)
-            # what rank 0 sends next is still there
-            while (message := ranks.receive(0)) is None:
-                pass
-            assert message == (0, "next")
-        except LostError as error:
-            got[rank] = error
+        ranks = Threads(rank, boxes)
+        got[rank] = take_over(ranks)
+        # what rank 0 sends next is still there
+        while (message := ranks.receive(0)) is None:
+            pass
+        assert message == (0, "next")
 
     others = [threading.Thread(target=follow, args=(rank,), name=str(rank)) for rank in range(1, size)]
-    for rank, thread in enumerate(others, 1):
-        if rank not in lost:
-            thread.start()
-    ranks = Threads(0, boxes, gone)
+    for thread in others:
+        thread.start()
+    ranks = Threads(0, boxes)
     handed = Broadcast(ranks, machines, {"a": np.arange(5.0)})
     handed.send()
     got[0] = handed.value
     for rank in range(1, size):
         ranks.send("next", rank)
-    for rank, thread in enumerate(others, 1):
-        if rank not in lost:
-            thread.join(timeout=200)
-            assert not thread.is_alive()
+    for thread in others:
+        thread.join(timeout=200)
+        assert not thread.is_alive()
     return got, len(mapped)
 
 
@@ -180,19 +170,3 @@ def test_every_rank_gets_it_and_those_of_a_machine_share(monkeypatch, hosts, ref
     for value in got.values():
         assert isinstance(value, dict)
         np.testing.assert_array_equal(value["a"], np.arange(5.0))
-
-
-def test_a_lost_rank_is_not_waited_for(monkeypatch):
-    got, mapped = hand_to_all(monkeypatch, "aaabbb", lost=frozenset({1, 3}))
-    assert mapped == 2
-    assert sorted(got) == [0, 2, 4, 5]
-
-
-def test_a_rank_whose_leader_is_lost_on_the_way_says_so():
-    boxes: dict[tuple[int, int], queue.SimpleQueue[bytes]] = {
-        (a, b): queue.SimpleQueue() for a in range(3) for b in range(3)
-    }
-    machines = {0: Machine("a", "", ""), 1: Machine("b", "", ""), 2: Machine("b", "", "")}
-    Broadcast(Threads(0, boxes, set()), machines, {"a": np.arange(5.0)}).send()
-    with pytest.raises(LostError):
-        take_over(Threads(2, boxes, {1}))
