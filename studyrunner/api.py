@@ -12,7 +12,6 @@ from threadpoolctl import threadpool_limits
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
 from studyrunner.mpi.launcher import launcher_size
 from studyrunner.mpi.ranks import Alone
-from studyrunner.mpi.version_check import describe_machine
 from studyrunner.netcdf.creation_date import check_date
 from studyrunner.netcdf.existing_result import Target, check_result
 from studyrunner.netcdf.output import check_output
@@ -103,7 +102,7 @@ def run_study(
             ProgressDisplay() if progress else SilentProgress() as shown,
         ):
             alone = Alone()
-            scenes = build_scenes(alone, {0: describe_machine()}, study, store, shown.say)
+            scenes = build_scenes(alone, study, store, shown.say)
             given = RunOptions(fresh=fresh, retry_failed=retry_failed, prune=prune, date=checked)
             serve_study(alone, study, scenes, target, shown, given)
     except Interrupted as ended:

@@ -157,7 +157,13 @@ def open_progress(target: Target) -> Iterator[Store]:
         remedy = "another run is writing there: wait for its end, or give another result file with -o"
         raise UserError(str(path), "in use", Verbatim(f"by {error}"), remedy) from None
     with contextlib.closing(store):
-        yield store
+        remove_leftovers(path, alone=store.locked)
+        try:
+            yield store
+        finally:
+            with contextlib.suppress(OSError):
+                # what the ranks have mapped
+                remove_leftovers(path, alone=store.locked)
 
 
 def serve_study(
@@ -199,8 +205,6 @@ def serve_study(
     with crash_notes(crashes):
         n_found = _begin(completion, crashes, writer.plan.n_points, options, progress)
         try:
-            if scenes.model is not None:
-                scenes.broadcast.send()
             for rank in range(1, ranks.size):
                 ranks.send(crashes, rank)
             with evaluator(scenes.model, crashes, rank=0) as evaluate:
@@ -230,8 +234,7 @@ def _prepare(
     said = doubts_of_study(study)
     for note in (*store.notes, *_older(target.path), *scenes.notes, *said):
         progress.note(note)
-    for path in (target.path, progress_file(target.path)):
-        remove_leftovers(path, alone=store.locked)
+    remove_leftovers(target.path, alone=store.locked)
     identities = Identities([each.digest for each in scenes.facts], hash_of_kind(kind.descr))
     completion = CompletionIndex(plan, identities, store, kind)
     label = Label.of(study)
