@@ -9,7 +9,6 @@ By hand: in the pools of mpi4py and schwimmbad a task has one result and no prog
 
 from __future__ import annotations
 
-import ctypes
 import itertools
 import queue
 import threading
@@ -75,8 +74,9 @@ def _work(
     run: Run[Task, Result],
     send: Callable[[object], None],
     seconds_to_progress: float,
+    check: Callable[[], None] = raise_ending,
 ) -> None:
-    """Sends the results of a task, each as soon as it is there."""
+    """Sends the results of a task, each as soon as it is there. check: raises KeyboardInterrupt where the run ends."""
     task = assignment.task
     wrong = ValueError(f"not {task.n_results} results from {task}")
     n_given = 0
@@ -84,7 +84,7 @@ def _work(
     sent = dict.fromkeys((True, False), began)
 
     def keep(progress: object) -> None:
-        raise_ending()
+        check()
         in_words, now = isinstance(progress, str), time.perf_counter()
         # a task that has given all its results has no progress
         if n_given < task.n_results and now > sent[in_words] + (SECONDS_TO_WORDS if in_words else seconds_to_progress):
@@ -135,25 +135,22 @@ class _LocalWorker(Generic[Task, Result]):
         self.receive(0.0)
 
     def give_up(self) -> None:
-        """Ends the thread without its results, as soon as the running call of a library returns.
-
-        Until then each call of the main thread may wait for the interpreter as long as such a call takes.
-        """
+        """Ends the thread without its results, at the next step of its task."""
         self._ended = True
-        if self._thread.ident is not None:
-            number, error = ctypes.c_ulong(self._thread.ident), ctypes.py_object(KeyboardInterrupt)
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(number, error)
 
     def _compute(self) -> None:
         try:
             while (assignment := self._waiting.get()) is not None:
-                _work(assignment, self._run, self._send, self._seconds_to_progress)
+                _work(assignment, self._run, self._send, self._seconds_to_progress, self._check)
         except BaseException as error:  # handed to the main thread, which raises it
             self._sent.put(error)
 
-    def _send(self, message: object) -> None:
+    def _check(self) -> None:
         if self._ended:
             raise KeyboardInterrupt
+
+    def _send(self, message: object) -> None:
+        self._check()
         self._sent.put(message)
 
 
