@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from solver.outcome import COMPLETE, Outcome
 from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
-from studyrunner.checkpoint.database import StoreInUseError
+from studyrunner.checkpoint.database import NoLocksError, StoreInUseError
 from studyrunner.checkpoint.records import layout_of, record_type
 from studyrunner.checkpoint.store import Store
 from studyrunner.crashed_tasks import crash_notes, take_crashes, tried_again
@@ -146,7 +146,7 @@ def open_progress(target: Target) -> Iterator[Store]:
     Raises
     ------
     UserError
-        Where another run uses the file.
+        Where another run uses the file, or its file system has no locks.
     StorageError
         Where the file cannot be written.
     """
@@ -156,14 +156,17 @@ def open_progress(target: Target) -> Iterator[Store]:
     except StoreInUseError as error:
         remedy = "another run is writing there: wait for its end, or give another result file with -o"
         raise UserError(str(path), "in use", Verbatim(f"by {error}"), remedy) from None
+    except NoLocksError:
+        remedy = "give a result file on another disk with -o: this file system has no locks"
+        raise UserError(str(path), "locks", Verbatim("none"), remedy) from None
     with contextlib.closing(store):
-        remove_leftovers(path, alone=store.locked)
+        remove_leftovers(path)
         try:
             yield store
         finally:
             with contextlib.suppress(OSError):
                 # what the ranks have mapped
-                remove_leftovers(path, alone=store.locked)
+                remove_leftovers(path)
 
 
 def serve_study(
@@ -234,7 +237,7 @@ def _prepare(
     said = doubts_of_study(study)
     for note in (*store.notes, *_older(target.path), *scenes.notes, *said):
         progress.note(note)
-    remove_leftovers(target.path, alone=store.locked)
+    remove_leftovers(target.path)
     identities = Identities([each.digest for each in scenes.facts], hash_of_kind(kind.descr))
     completion = CompletionIndex(plan, identities, store, kind)
     label = Label.of(study)

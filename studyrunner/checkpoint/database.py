@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import re
 import sqlite3
 import time
 import zlib
@@ -78,6 +77,10 @@ class StoreInUseError(Exception):
     """Another run works with the file; the text says which."""
 
 
+class NoLocksError(Exception):
+    """The file system has no locks."""
+
+
 class DamagedError(Exception):
     """A file is none that a run has written, or does not contain any more what was written."""
 
@@ -97,15 +100,13 @@ def _set_up(database: sqlite3.Connection) -> None:
         database.execute(f"PRAGMA {pragma}").fetchall()
 
 
-def open_locked(path: Path, *, lock: bool = True) -> tuple[sqlite3.Connection, str]:
+def open_locked(path: Path) -> tuple[sqlite3.Connection, str]:
     """The file of a run, new or with what an earlier run has left, and a sentence on a file that was damaged.
 
     Parameters
     ----------
     path
         The file, in a folder that exists.
-    lock
-        Whether the file system has locks. Without locks no other run may use this file.
 
     Raises
     ------
@@ -118,17 +119,17 @@ def open_locked(path: Path, *, lock: bool = True) -> tuple[sqlite3.Connection, s
     if name in _open:
         raise StoreInUseError(_user_of(path))
     try:
-        return _open_file(path, lock), ""
+        return _open_file(path), ""
     except DamagedError as error:
         aside = _set_aside(path)
         said = f"{path.name} {error}: it is kept as {aside.name}, and the study begins anew"
-        return _open_file(path, lock), said
+        return _open_file(path), said
 
 
-def _open_file(path: Path, lock: bool) -> sqlite3.Connection:
+def _open_file(path: Path) -> sqlite3.Connection:
     is_new = not os.path.lexists(path)
     check_plain(path)
-    database = connect(path, "mode=rwc" if lock else "mode=rwc&vfs=unix-none")
+    database = connect(path, "mode=rwc")
     try:
         with damage_told():
             _lock(database, path)
@@ -225,12 +226,6 @@ def read_study(path: Path) -> tuple[str, str] | None:
     """
     found = _read_row(path, "SELECT name, scene FROM study")
     return None if found is None or None in found else (str(found[0]), str(found[1]))
-
-
-def others(path: Path) -> list[Path]:
-    """Files of runs with the same result on a file system without locks."""
-    name = re.compile(re.escape(path.name) + "-[0-9a-f]{12}")
-    return sorted(found for found in path.parent.iterdir() if name.fullmatch(found.name))
 
 
 @contextlib.contextmanager

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 import socket
 import sqlite3
 import time
@@ -21,11 +20,11 @@ from pathlib import Path
 from solver.packing import Packed
 from studyrunner.checkpoint import database
 from studyrunner.checkpoint.contents import LARGEST, decompress
-from studyrunner.checkpoint.database import COMPUTED, TABLES, UNDER_WAY, DamagedError, faults_told
+from studyrunner.checkpoint.database import COMPUTED, TABLES, UNDER_WAY, NoLocksError, faults_told
 from studyrunner.checkpoint.entries import Batch, Entry, Name, row_of
 from studyrunner.checkpoint.writer import Writer
 from studyrunner.system.endings import uninterrupted
-from studyrunner.system.files import NotPlainError, has_locks
+from studyrunner.system.files import has_locks
 from studyrunner.user_error import StorageError
 
 SECONDS_A_TRANSACTION = 0.25
@@ -38,10 +37,9 @@ _BYTES_A_TRANSACTION = 8e6
 
 
 class Store:
-    """The open file of a run. Raises database.StoreInUseError and StorageError.
+    """The open file of a run. Raises database.StoreInUseError, database.NoLocksError and StorageError.
 
-    path: of the file; a run on a file system without locks has a file of its own beside this one.
-    locked: whether no other run uses the file.
+    path: of the file.
     notes: lines for the user on what was found.
     """
 
@@ -55,15 +53,10 @@ class Store:
         self._used: set[str] = set()
         self._written = 0.0
         with faults_told(path):
-            self.locked = has_locks(path)
-            if not self.locked:
-                self.path = path.with_name(f"{path.name}-{secrets.token_hex(6)}")
-                self.notes.append(
-                    f"{path.name}: there are no locks on this file system: this run writes {self.path.name} and uses"
-                    " what other files of this name contain; give each run a result file of its own with -o"
-                )
+            if not has_locks(path):
+                raise NoLocksError
             self._is_new = not self.path.exists()
-            self._database, damage = database.open_locked(self.path, lock=self.locked)
+            self._database, damage = database.open_locked(path)
             try:
                 self.notes += [damage] if damage else []
                 self._file = self.path.stat().st_ino
@@ -73,9 +66,6 @@ class Store:
                     if self._database.execute("UPDATE study SET run=?", [run]).rowcount != 1:
                         self._database.execute("DELETE FROM study")
                         self._database.execute("INSERT INTO study (run) VALUES (?)", [run])
-                for other in (*database.others(path), *(() if self.locked or not path.exists() else (path,))):
-                    if other != self.path:
-                        self._take_over(other)
             except BaseException:
                 database.close(self._database, self.path)
                 raise
@@ -326,19 +316,3 @@ class Store:
             number = len(self._forgotten)
             self.notes.append(f"{self.path.name}: {number} damaged entries, which are computed again")
         return keys
-
-    def _take_over(self, other: Path) -> None:
-        """Copies what another run has finished, on a file system without locks. Its file is left as it is."""
-        try:
-            with database.reading(other) as source, self._transaction():
-                database.check(source, create=False)
-                for table in TABLES:
-                    columns = database.columns(table)
-                    for values in source.execute(f"SELECT {', '.join(columns)} FROM {table}"):
-                        row = dict(zip(columns, values, strict=True))
-                        key = row["key"]
-                        if database.is_whole(key, row["checksum"], row["content"]) and key not in self._keys[table]:
-                            self._insert(table, row)
-                            self._keys[table].add(key)
-        except (DamagedError, NotPlainError, FileNotFoundError):
-            self.notes.append(f"{other.name} is not used: it is damaged, or another run writes it now")
