@@ -107,12 +107,9 @@ def test_a_disk_without_locks_is_refused(shim, tmp_path):
     """Two runs could write one file there."""
     ended = run_with(shim, tmp_path, lock=errno.ENOLCK)
     assert ended.returncode == 2
-    assert ended.stderr.splitlines() == [
-        (
-            f"run-study: {tmp_path}/out.nc.progress: locks = none: give a result file on another disk with -o: this file"
-            " system has no locks"
-        )
-    ]
+    where = f"{tmp_path}/out.nc.progress: locks = none: "
+    remedy = "give a result file on another disk with -o: this file system has no locks"
+    assert ended.stderr.splitlines() == [f"run-study: {where}{remedy}"]
     assert list(tmp_path.iterdir()) == []
 
 
