@@ -43,6 +43,8 @@ class TaskProgress:
         self._n_faults: Counter[str] = Counter()
         self._n_given: Counter[int] = Counter()
         self._words: dict[str, str] = {}
+        self._suspects: list[BranchTask | MarchTask] = []
+        self._tried = ""  # key of the suspect that is under way
         self._left = dict.fromkeys((BRANCHES, MARCHES, RESTING), 0.0)
         self._left[BRANCHES] = sum(branch.cost for branch in self.branches)
         lines = completion.plan.marches
@@ -50,21 +52,47 @@ class TaskProgress:
 
     def begin(self) -> Iterator[BranchTask | MarchTask]:
         """Tasks that are possible at the beginning."""
-        yield from self.branches
+        yield from self._without_suspects(self.branches)
         for branch in self._completion.plan.branches:
             for result in self._completion.known_starts(branch):
-                yield from self._start(branch, result)
-        yield from self._completion.marches_without_start()
+                yield from self._without_suspects(self._start(branch, result))
+        yield from self._without_suspects(self._completion.marches_without_start())
 
     def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         """Takes a result; returns tasks that the result makes possible, or that have to be done again."""
+        new = self._take(task, result)
+        place = result.position if isinstance(result, StartResult) else result.place
+        if task.key == self._tried and place == _last_place(task) and task.key not in {each.key for each in new}:
+            self._tried = ""
+            return [*self._without_suspects(new), *self._without_suspects(self._suspects_left())]
+        return self._without_suspects(new)
+
+    def _without_suspects(self, tasks: Sequence[BranchTask | MarchTask]) -> list[BranchTask | MarchTask]:
+        """The tasks, but of those with which runs have crashed one at a time: the others wait for its end."""
+        now = []
+        for task in tasks:
+            if not self._completion.is_suspect(task.key) or task.key == self._tried:
+                now.append(task)
+            elif self._tried:
+                self._suspects.append(task)
+            else:
+                self._tried = task.key
+                now.append(task)
+        return now
+
+    def _suspects_left(self) -> list[BranchTask | MarchTask]:
+        left, self._suspects = self._suspects, []
+        return left
+
+    def _take(
+        self, task: BranchTask | MarchTask, result: StartResult | MarchResult
+    ) -> Sequence[BranchTask | MarchTask]:
         self._left[task.kind] -= task.cost_of(first=_is_first(task, result))
         self._words.pop(task.key, None)
         self.n_starts_left -= isinstance(task, BranchTask)
         if fault_of(result):
-            last = task.order_left[-1] if isinstance(task, BranchTask) else task.n_results - 1
             place = result.position if isinstance(result, StartResult) else result.place
-            return self._try_again(task) if place == last else ()
+            return self._try_again(task) if place == _last_place(task) else ()
         if isinstance(task, BranchTask) and isinstance(result, StartResult):
             self._completion.add_start(task, result)
             return self._start(task, result)
@@ -142,6 +170,11 @@ class TaskProgress:
             what = f"mission history {task.number + 1}"
             return f"{what} ({self._words[task.key]})" if task.key in self._words else what
         return f"{self._completion.plan.frequency_of(task):.6g} Hz {task.scheme}"
+
+
+def _last_place(task: BranchTask | MarchTask) -> int:
+    """Position or place of the last result of a task."""
+    return task.order_left[-1] if isinstance(task, BranchTask) else task.n_results - 1
 
 
 def _is_first(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> bool:

@@ -105,11 +105,6 @@ def progress_file(path: Path) -> Path:
     return path.with_name(f"{path.name}.progress")
 
 
-def crash_folder(path: Path) -> Path:
-    """Folder of the notes on crashes beside the result file `path`; empty folders are removed at the end of a run."""
-    return path.with_name(f"{path.name}.crashes")
-
-
 def older_folder(path: Path) -> Path:
     """Folder of what version 0.4.0 or before has computed of the result file `path`."""
     return path.with_name(f"{path.name}.parts")

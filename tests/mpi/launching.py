@@ -248,10 +248,10 @@ def memory_of_mapping(name: str) -> dict[str, int]:
     return found
 
 
-def count_rows(table: str, result: Path = Path("out.nc")) -> int:
-    """Number of rows of a table in the progress of a result, also of a run that is at work."""
+def count_entries(kind: str, result: Path = Path("out.nc")) -> int:
+    """Number of entries of a kind in the progress of a result, also of a run that is at work."""
     address = f"file:{result}.progress?mode=ro&immutable=1"
     with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(address, uri=True)) as database:
-        (number,) = database.execute(f"SELECT count(*) FROM {table}").fetchone()
+        (number,) = database.execute("SELECT count(*) FROM entries WHERE kind=?", [kind]).fetchone()
         return int(number)
     return 0

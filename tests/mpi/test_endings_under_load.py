@@ -66,7 +66,7 @@ def test_the_launcher_is_gone_with_a_rank(tmp_path):
 STUCK = """
 import sys, time
 from studyrunner import run
-from studyrunner.checkpoint.writer import Writer
+from studyrunner.checkpoint.store import Store
 from studyrunner.system import endings
 endings.SECONDS_OF_GRACE = 1.0
 
@@ -75,7 +75,7 @@ def hang(*_, **__):
     while True:
         time.sleep(600)
 
-Writer.take = hang
+Store.tick = hang
 from studyrunner.cli import main
 sys.exit(main())
 """

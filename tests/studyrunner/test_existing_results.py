@@ -166,7 +166,7 @@ def test_progress_that_is_damaged_belongs_to_no_study(solver, capsys):
     solver.begin_again()
     Path("out.nc.progress").write_bytes(b"x" * 5000)
     assert main(OTHER) == 0
-    assert "out.nc.progress is no file of a run: it is kept as out.nc.progress.damaged" in capsys.readouterr().err
+    assert "out.nc.progress is damaged: it is kept as out.nc.progress.old" in capsys.readouterr().err
 
 
 @pytest.mark.slow
