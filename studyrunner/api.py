@@ -35,7 +35,6 @@ def run_study(
     fresh: bool = False,
     overwrite: bool = False,
     retry_failed: bool = False,
-    prune: bool = False,
     date: str | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
@@ -61,8 +60,6 @@ def run_study(
         Replace a result that is of another study: one of another name or of another scene.
     retry_failed
         Compute points that failed in an earlier run once more.
-    prune
-        Remove what other studies have left in this file, once this is finished.
     date
         `date_created` of the result, in a form of ISO 8601, or `"now"`; none if not given: equal runs have equal files.
     progress
@@ -103,7 +100,7 @@ def run_study(
         ):
             alone = Alone()
             scenes = build_scenes(alone, study, store, shown.say)
-            given = RunOptions(fresh=fresh, retry_failed=retry_failed, prune=prune, date=checked)
+            given = RunOptions(fresh=fresh, retry_failed=retry_failed, date=checked)
             serve_study(alone, study, scenes, target, shown, given)
     except Interrupted as ended:
         summary = ended.summary

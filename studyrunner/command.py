@@ -230,7 +230,7 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
     progress = ProgressDisplay()
-    given = RunOptions(fresh=options.fresh, retry_failed=options.retry_failed, prune=options.prune, date=options.date)
+    given = RunOptions(fresh=options.fresh, retry_failed=options.retry_failed, date=options.date)
     try:
         with open_progress(target) as store:
             # Before anything is said: a wrong scene is bad input, which ends with one line.

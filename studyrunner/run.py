@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from solver.outcome import COMPLETE, Outcome
-from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
+from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.database import NoLocksError, StoreInUseError
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
@@ -79,13 +79,11 @@ class RunOptions:
 
     fresh: whether the run begins anew. Else the run continues what an earlier one has left.
     retry_failed: whether failed points are computed again.
-    prune: whether results of other studies beside the result are removed at the end.
     date: date of creation, as `check_date` gives it; None for no date in the file.
     """
 
     fresh: bool = False
     retry_failed: bool = False
-    prune: bool = False
     date: str | None = None
 
 
@@ -216,7 +214,7 @@ def serve_study(
         begin_ending()
         raise Interrupted(writer.write(completion, n_found, progress)) from None
     if summary.n_left == 0:
-        _tidy(completion, prune=options.prune)
+        _tidy(completion)
     return summary
 
 
@@ -265,9 +263,9 @@ def _begin(completion: CompletionIndex, n_points: int, options: RunOptions, prog
     return n_found
 
 
-def _tidy(completion: CompletionIndex, *, prune: bool) -> None:
+def _tidy(completion: CompletionIndex) -> None:
     """Removes what a finished study no longer needs."""
-    completion.prune(0.0 if prune else MOST_OF_OTHERS)
+    completion.prune()
     # The result is written. The next run does what a signal interrupts.
     try:
         completion.store.shrink()

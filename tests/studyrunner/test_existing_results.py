@@ -209,14 +209,9 @@ def test_a_variant_leaves_the_work_of_the_first_study(solver):
         solver.begin_again()
         assert main(command) == 0
         assert solver.tasks == []
-    assert main([*VARIANT, "--prune"]) == 0
-    assert solver.tasks == []
-    assert main(VARIANT) == 0
-    assert solver.tasks == []
-    for command in (APART, [*APART, "--fresh"]):
-        solver.begin_again()
-        assert main(command) == 0
-        assert len(solver.tasks) > 4
+    solver.begin_again()
+    assert main([*APART, "--fresh"]) == 0
+    assert len(solver.tasks) > 4
 
 
 def test_what_a_killed_run_has_left_of_a_result_goes(solver, folder):
