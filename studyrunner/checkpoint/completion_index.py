@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.records import empty_record, record_in, record_of
+from studyrunner.checkpoint.records import empty_record, pack_record, record_in, record_of
 from studyrunner.checkpoint.store import PROGRESS, RESULTS, STARTS, Store
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.results import MarchResult, StartResult, failed_result, unpack_start
@@ -140,7 +140,7 @@ class CompletionIndex:
     def add_history(self, march: MarchTask, result: MarchResult) -> None:
         """Adds a history."""
         key, record = self._histories[march.number][result.place], record_of(self.kind, result)
-        self.store.put(RESULTS, key, Packed("", (record,)))
+        self.store.put(RESULTS, key, pack_record(record))
         self.store.note_life(self.key(march))
         if result.progress is not None:
             self.keep(march, result.progress)

@@ -47,9 +47,14 @@ def record_of(kind: np.dtype[np.void], result: MarchResult) -> NDArray[np.void]:
     return records
 
 
+def pack_record(record: NDArray[np.void]) -> Packed:
+    """The bytes of a record (1,), whose data type is part of its key."""
+    return Packed("", (np.frombuffer(record.tobytes(), np.uint8),))
+
+
 def record_in(packed: Packed | None, kind: np.dtype[np.void]) -> bytes | None:
-    """The bytes of the record (1,) in an entry; None where there is none, or another than of `kind`."""
-    if packed is None or len(packed.arrays) != 1 or packed.arrays[0].dtype != kind or packed.arrays[0].shape != (1,):
+    """The bytes of the record (1,) in an entry; None where there is none of `kind`."""
+    if packed is None or len(packed.arrays) != 1 or packed.arrays[0].nbytes != kind.itemsize:
         return None
     return packed.arrays[0].tobytes()
 

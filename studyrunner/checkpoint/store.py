@@ -7,7 +7,6 @@ goes into one transaction.
 from __future__ import annotations
 
 import contextlib
-import io
 import json
 import os
 import socket
@@ -18,6 +17,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.packing import Packed
 from studyrunner.checkpoint.database import RUN, faults_told, open_file, run_in, transaction
@@ -35,21 +35,24 @@ SECONDS_A_TRANSACTION = 0.25
 
 _SHARE_OF_WRITING = 0.1  # of the time of rank 0, on a disk that is slow
 _BYTES_A_TRANSACTION = 8e6
+_HEAD_BYTES = 8
+_KINDS = frozenset("biufcSU")  # of numpy: numbers and texts, no objects
 _LEVEL = 1  # of zlib: the rank that compresses hands out the tasks as well
 
 Name = tuple[str, str]
 
 
 def to_blob(packed: Packed) -> bytes:
-    """The text and the arrays of a value in the format .npy, compressed by zlib.
+    """The text, type and shape of the arrays of a value as JSON, then their bytes, compressed by zlib.
 
-    Raises ValueError for arrays of anything but numbers and texts: a bug.
+    Raises TypeError for arrays of anything but numbers and texts: a bug.
     """
-    stream = io.BytesIO()
-    text = np.frombuffer(packed.text.encode("utf-8", "surrogatepass"), np.uint8)
-    for array in (text, *packed.arrays):
-        np.lib.format.write_array(stream, array, allow_pickle=False)
-    return zlib.compress(stream.getbuffer(), _LEVEL)
+    for array in packed.arrays:
+        if array.dtype.kind not in _KINDS:
+            raise TypeError(f"arrays of {array.dtype} are not kept")
+    head = json.dumps([packed.text, [[array.dtype.str, array.shape] for array in packed.arrays]]).encode()
+    raw = (len(head).to_bytes(_HEAD_BYTES, "little"), head, *(array.tobytes() for array in packed.arrays))
+    return zlib.compress(b"".join(raw), _LEVEL)
 
 
 def from_blob(blob: bytes) -> Packed:
@@ -59,13 +62,15 @@ def from_blob(blob: bytes) -> Packed:
         raw = compressed.decompress(blob, LARGEST)
         if not compressed.eof:
             raise ValueError("not all of it, or too much")
-        stream = io.BytesIO(raw)
+        place = _HEAD_BYTES + int.from_bytes(raw[:_HEAD_BYTES], "little")
+        text, layout = json.loads(raw[_HEAD_BYTES:place])
         arrays = []
-        while stream.tell() < len(raw):
-            arrays.append(np.lib.format.read_array(stream, allow_pickle=False))
-        text, *others = arrays
-        return Packed(text.tobytes().decode("utf-8", "surrogatepass"), tuple(others))
-    except (zlib.error, EOFError, MemoryError, OverflowError, TypeError) as error:
+        for kind, shape in layout:
+            array: NDArray[np.generic] = np.ndarray(tuple(shape), np.dtype(kind), raw, place)
+            arrays.append(array.copy())
+            place += array.nbytes
+        return Packed(text, tuple(arrays))
+    except (zlib.error, TypeError, OverflowError) as error:
         raise ValueError("not written by a run") from error
 
 

@@ -14,7 +14,7 @@ import solver
 from solver.outcome import COMPLETE
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import MOST_CRASHES, MOST_OF_OTHERS
-from studyrunner.checkpoint.records import empty_record, record_in, record_type
+from studyrunner.checkpoint.records import empty_record, pack_record, record_in, record_type
 from studyrunner.checkpoint.store import RESULTS, STARTS
 from studyrunner.plan import identity
 from studyrunner.plan.identity import Identities
@@ -239,9 +239,9 @@ def test_what_another_study_has_left_stays_up_to_a_size(most, expected, finished
 def test_a_record_of_another_study_is_none_of_this():
     study, other = (read_study("sdof_slider", (*BASE[:-1], f"slow_time.outputs={n}")) for n in (3, 4))
     kind = record_type(study, FACTS)
-    packed = Packed("", (empty_record(kind),))
-    wrong = [replace(packed, arrays=arrays) for arrays in ((), (np.zeros(3),), (np.zeros(2, kind),))]
-    for odd in (Packed("", (empty_record(record_type(other, FACTS)),)), *wrong, None):
+    packed = pack_record(empty_record(kind))
+    wrong = [replace(packed, arrays=arrays) for arrays in ((), (np.zeros(3),), (*packed.arrays, *packed.arrays))]
+    for odd in (pack_record(empty_record(record_type(other, FACTS))), *wrong, None):
         assert record_in(odd, kind) is None
     assert record_in(packed, kind) == empty_record(kind).tobytes()
 

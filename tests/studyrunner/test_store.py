@@ -99,9 +99,7 @@ ARRAYS = [
 ]
 
 
-@pytest.mark.parametrize(
-    "array", [*ARRAYS, np.zeros(1, [("a", "<f8", (2, 3)), ("b", "<U9")])], ids=lambda array: str(array.dtype)
-)
+@pytest.mark.parametrize("array", ARRAYS, ids=lambda array: f"{array.dtype}{array.shape}")
 def test_arrays_are_kept_to_the_last_bit(array):
     found = store.from_blob(store.to_blob(Packed('{"text": "\udce9"}', (array, array))))
     assert found.text == '{"text": "\udce9"}'
@@ -111,7 +109,7 @@ def test_arrays_are_kept_to_the_last_bit(array):
 
 
 def test_objects_are_not_kept():
-    with pytest.raises(ValueError, match="Object arrays cannot be saved"):
+    with pytest.raises(TypeError, match="arrays of object are not kept"):
         store.to_blob(Packed("", (np.array([{}], dtype=object),)))
 
 
