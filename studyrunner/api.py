@@ -12,7 +12,6 @@ from threadpoolctl import threadpool_limits
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
 from studyrunner.mpi.launcher import launcher_size
 from studyrunner.mpi.ranks import Alone
-from studyrunner.mpi.version_check import describe_machine
 from studyrunner.netcdf.creation_date import check_date
 from studyrunner.netcdf.existing_result import Target, check_result
 from studyrunner.netcdf.output import check_output
@@ -36,7 +35,6 @@ def run_study(
     fresh: bool = False,
     overwrite: bool = False,
     retry_failed: bool = False,
-    prune: bool = False,
     date: str | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
@@ -62,8 +60,6 @@ def run_study(
         Replace a result that is of another study: one of another name or of another scene.
     retry_failed
         Compute points that failed in an earlier run once more.
-    prune
-        Remove what other studies have left in this file, once this is finished.
     date
         `date_created` of the result, in a form of ISO 8601, or `"now"`; none if not given: equal runs have equal files.
     progress
@@ -103,8 +99,8 @@ def run_study(
             ProgressDisplay() if progress else SilentProgress() as shown,
         ):
             alone = Alone()
-            scenes = build_scenes(alone, {0: describe_machine()}, study, store, shown.say)
-            given = RunOptions(fresh=fresh, retry_failed=retry_failed, prune=prune, date=checked)
+            scenes = build_scenes(alone, study, store, shown.say)
+            given = RunOptions(fresh=fresh, retry_failed=retry_failed, date=checked)
             serve_study(alone, study, scenes, target, shown, given)
     except Interrupted as ended:
         summary = ended.summary

@@ -6,7 +6,7 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,6 @@ from studyrunner.system.streams import keep_talking, last_error
 from studyrunner.user_error import StorageError, UserError, Verbatim, show_text
 
 if TYPE_CHECKING:
-    from studyrunner.mpi.version_check import Machine
     from studyrunner.study.study import Study
 
 CONVERGED, UNEXPECTED, BAD_INPUT, SOME_FAILED = 0, 1, 2, 3
@@ -118,7 +117,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     try:
         from studyrunner.mpi.version_check import check_versions
 
-        machines = check_versions(ranks)
+        check_versions(ranks)
         options = parse_options(arguments)
         _check_memory()
         raise_ending()
@@ -133,7 +132,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
         elif options.write_scene is not None:
             status = _write_scene(study, options.write_scene)
         else:
-            return _compute(ranks, machines, study, options)
+            return _compute(ranks, study, options)
     except UserError as error:
         # Ctrl-C ends the processes that read files as well, which tells nothing of the files
         raise_ending()
@@ -158,15 +157,11 @@ def _check_memory() -> None:
 
 def _follow(ranks: Ranks) -> int:
     """Any other rank. Only rank 0 has an exit status."""
-    from studyrunner.mpi.broadcast import LostError, take_over
+    from studyrunner.mpi.mapped_file import take_over
     from studyrunner.mpi.version_check import report_version
 
     report_version(ranks)
-    try:
-        model = take_over(ranks)
-    except LostError:
-        # it is gone with what this rank was to compute with; where the others go on, they do so without both
-        os._exit(UNEXPECTED)
+    model = take_over(ranks)
     if model is not None:
         from studyrunner.run import work_on_job
         from studyrunner.scene_building import SeveralScenes, help_to_build
@@ -223,7 +218,7 @@ def _write_scene(study: Study, path: Path) -> int:
     return CONVERGED
 
 
-def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, options: Options) -> int:
+def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     from studyrunner.netcdf.existing_result import check_result
     from studyrunner.netcdf.output import check_output
     from studyrunner.netcdf.provenance import compare_with_archived
@@ -235,11 +230,11 @@ def _compute(ranks: Ranks, machines: Mapping[int, Machine], study: Study, option
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
     progress = ProgressDisplay()
-    given = RunOptions(fresh=options.fresh, retry_failed=options.retry_failed, prune=options.prune, date=options.date)
+    given = RunOptions(fresh=options.fresh, retry_failed=options.retry_failed, date=options.date)
     try:
         with open_progress(target) as store:
             # Before anything is said: a wrong scene is bad input, which ends with one line.
-            scenes = build_scenes(ranks, machines, study, store, _SlowSteps().say)
+            scenes = build_scenes(ranks, study, store, _SlowSteps().say)
             for line in compare_with_archived(study, merge_facts(scenes.facts).digest):
                 print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
             with progress:

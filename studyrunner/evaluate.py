@@ -20,7 +20,7 @@ from solver.results.mode_values import ModeValues, without_state
 from solver.settings import Resolution, ToTheEnd
 from studyrunner.history_result import build_result
 from studyrunner.mission_result import build_mission_result, missions_read
-from studyrunner.mpi.shared_memory import Address, open_shared
+from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult, failed_result
 from studyrunner.plan.tasks import BranchTask, Joint, MarchTask
 from studyrunner.system.machine_faults import (
@@ -103,9 +103,9 @@ def _with_contact(model: ReducedModel, joint: Joint) -> ReducedModel:
     return replace(model, contact=replace(model.contact, **drawn))
 
 
-def _open_model(given: ReducedModel | Address) -> ReducedModel:
-    """The model that a task brings. Raises OSError where it is in shared memory that cannot be mapped."""
-    model = open_shared(given) if isinstance(given, Address) else given
+def _open_model(given: ReducedModel | MappedFile) -> ReducedModel:
+    """The model that a task brings. Raises OSError where it is in a file that has gone."""
+    model = open_mapped(given) if isinstance(given, MappedFile) else given
     if not isinstance(model, ReducedModel):
         raise TypeError(f"{model!r} instead of a model")
     return model

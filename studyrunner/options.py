@@ -54,7 +54,6 @@ class Options:
     fresh: bool
     overwrite: bool
     retry_failed: bool
-    prune: bool
     date: str | None
 
 
@@ -124,11 +123,6 @@ def parse_options(arguments: Sequence[str]) -> Options:
     parser.add_argument("--overwrite", action="store_true", help="replace the result of another study")
     parser.add_argument(
         "--retry-failed", action="store_true", help="compute points that failed in an earlier run once more"
-    )
-    parser.add_argument(
-        "--prune",
-        action="store_true",
-        help="remove what other studies have left in OUT.nc.progress, once this is finished",
     )
     parser.add_argument(
         "--date",

@@ -9,19 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from solver.outcome import COMPLETE, Outcome
-from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS, CompletionIndex
-from studyrunner.checkpoint.database import StoreInUseError
-from studyrunner.checkpoint.records import layout_of, record_type
+from studyrunner.checkpoint.completion_index import CompletionIndex
+from studyrunner.checkpoint.database import NoLocksError, StoreInUseError
+from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
-from studyrunner.crashed_tasks import crash_notes, take_crashes, tried_again
-from studyrunner.mpi.crashes import (
-    forget_crashes,
-)
 from studyrunner.mpi.ranks import Ranks, wait_for_message
 from studyrunner.mpi.schedule import work_on_tasks
 from studyrunner.netcdf.creation_date import describe_date
 from studyrunner.netcdf.existing_result import Label, Target
-from studyrunner.netcdf.output import crash_folder, older_folder, progress_file, remove_leftovers
+from studyrunner.netcdf.output import older_folder, progress_file, remove_leftovers
 from studyrunner.netcdf.provenance import PACKAGES
 from studyrunner.netcdf.sample_coordinates import sample_coordinates, worn_coordinate
 from studyrunner.netcdf.software import describe_software
@@ -42,6 +38,9 @@ from studyrunner.user_error import UserError, Verbatim
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from studyrunner.netcdf.gather import Gathered
+
+
+_GO = "go"  # rank 0 has something to compute
 
 
 class Interrupted(KeyboardInterrupt):
@@ -80,13 +79,11 @@ class RunOptions:
 
     fresh: whether the run begins anew. Else the run continues what an earlier one has left.
     retry_failed: whether failed points are computed again.
-    prune: whether results of other studies beside the result are removed at the end.
     date: date of creation, as `check_date` gives it; None for no date in the file.
     """
 
     fresh: bool = False
     retry_failed: bool = False
-    prune: bool = False
     date: str | None = None
 
 
@@ -146,7 +143,7 @@ def open_progress(target: Target) -> Iterator[Store]:
     Raises
     ------
     UserError
-        Where another run uses the file.
+        Where another run uses the file, or its file system has no locks.
     StorageError
         Where the file cannot be written.
     """
@@ -156,8 +153,17 @@ def open_progress(target: Target) -> Iterator[Store]:
     except StoreInUseError as error:
         remedy = "another run is writing there: wait for its end, or give another result file with -o"
         raise UserError(str(path), "in use", Verbatim(f"by {error}"), remedy) from None
+    except NoLocksError:
+        remedy = "give a result file on another disk with -o: this file system has no locks"
+        raise UserError(str(path), "locks", Verbatim("none"), remedy) from None
     with contextlib.closing(store):
-        yield store
+        remove_leftovers(path)
+        try:
+            yield store
+        finally:
+            with contextlib.suppress(OSError):
+                # what the ranks have mapped
+                remove_leftovers(path)
 
 
 def serve_study(
@@ -195,25 +201,20 @@ def serve_study(
         Where the run is ended from outside; finished points have been written.
     """
     completion, writer = _prepare(study, scenes, target, progress, options)
-    crashes = crash_folder(target.path)
-    with crash_notes(crashes):
-        n_found = _begin(completion, crashes, writer.plan.n_points, options, progress)
-        try:
-            if scenes.model is not None:
-                scenes.broadcast.send()
-            for rank in range(1, ranks.size):
-                ranks.send(crashes, rank)
-            with evaluator(scenes.model, crashes, rank=0) as evaluate:
-                run_tasks(ranks, completion, crashes, evaluate, progress, scenes)
-            progress.say("writing the result")
-            summary = writer.write(completion, n_found, progress)
-        except BaseException as error:
-            if not is_ending(error):
-                raise
-            begin_ending()
-            raise Interrupted(writer.write(completion, n_found, progress)) from None
-        if summary.n_left == 0:
-            _tidy(completion, crashes, prune=options.prune)
+    n_found = _begin(completion, writer.plan.n_points, options, progress)
+    try:
+        for rank in range(1, ranks.size):
+            ranks.send(_GO, rank)
+        run_tasks(ranks, completion, evaluator(scenes.model), progress, scenes)
+        progress.say("writing the result")
+        summary = writer.write(completion, n_found, progress)
+    except BaseException as error:
+        if not is_ending(error):
+            raise
+        begin_ending()
+        raise Interrupted(writer.write(completion, n_found, progress)) from None
+    if summary.n_left == 0:
+        _tidy(completion)
     return summary
 
 
@@ -230,12 +231,11 @@ def _prepare(
     said = doubts_of_study(study)
     for note in (*store.notes, *_older(target.path), *scenes.notes, *said):
         progress.note(note)
-    for path in (target.path, progress_file(target.path)):
-        remove_leftovers(path, alone=store.locked)
+    remove_leftovers(target.path)
     identities = Identities([each.digest for each in scenes.facts], hash_of_kind(kind.descr))
     completion = CompletionIndex(plan, identities, store, kind)
     label = Label.of(study)
-    store.note_study(label.name, label.model, layout_of(kind), completion.describe_tasks())
+    store.note_study(label.name, label.model)
     pairs = pair_arrays(study, scenes.facts, scenes.scenes)
     writer = _ResultWriter(study, plan, facts, scenes, pairs, target, software, options.date, said)
     return completion, writer
@@ -249,28 +249,23 @@ def _older(target: Path) -> list[str]:
     return [f"{folder.name} is of version 0.4.0 or before: it is neither used nor changed, and may be removed"]
 
 
-def _begin(
-    completion: CompletionIndex, folder: Path, n_points: int, options: RunOptions, progress: ProgressDisplay
-) -> int:
+def _begin(completion: CompletionIndex, n_points: int, options: RunOptions, progress: ProgressDisplay) -> int:
     """Applies the options to the results of earlier runs; returns the number of finished points."""
     if options.fresh:
         completion.forget_all()
     if options.retry_failed:
-        # Before crashes are counted: a task that has ended two more processes has failed again.
         completion.forget_failed(COMPLETE)
-    for crash in take_crashes(completion, folder, fresh=options.fresh):
-        if completion.is_left(crash.key):
-            progress.note(f"a task has ended its process ({crash.message}): it is tried once more")
+    completion.give_up_crashed()
+    completion.store.flush()
     n_found = completion.n_points_finished
     if n_found:
         progress.say(f"{n_found} of {count(n_points, 'point')} are there from an earlier run")
     return n_found
 
 
-def _tidy(completion: CompletionIndex, folder: Path, *, prune: bool) -> None:
-    """Removes what a finished study no longer needs. folder: of the notes on crashes."""
-    forget_crashes(folder, None if prune else completion.keys - tried_again(completion, folder))
-    completion.prune(0.0 if prune else MOST_OF_OTHERS)
+def _tidy(completion: CompletionIndex) -> None:
+    """Removes what a finished study no longer needs."""
+    completion.prune()
     # The result is written. The next run does what a signal interrupts.
     try:
         completion.store.shrink()
@@ -293,11 +288,5 @@ def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: 
 
 def work_on_job(ranks: Ranks, model: ReducedModel | None) -> None:
     """Any other rank after it has received the model, if there is only one: does tasks until there are none."""
-    crashes = wait_for_message(ranks)
-    if crashes is None:
-        # nothing has to be computed
-        return
-    if not isinstance(crashes, Path):
-        raise TypeError(f"rank 0 sent {crashes!r} instead of the folder of the notes on crashes")
-    with evaluator(model, crashes, ranks.rank) as evaluate:
-        work_on_tasks(ranks, evaluate)
+    if wait_for_message(ranks) == _GO:
+        work_on_tasks(ranks, evaluator(model))

@@ -1,6 +1,6 @@
 """The scenes of a run: built once, and handed to the ranks that compute with them.
 
-A single scene is built by rank 0, and each machine gets the model once. Several scenes are built by all ranks side by
+A single scene is built by rank 0, which hands the model to all ranks. Several scenes are built by all ranks side by
 side, each scene once. Their models are kept in the file of the run and go to the ranks with the tasks (`SceneModels`),
 so that a rank holds few models, whatever their number.
 """
@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 
 from solver.packing import Packed
 from studyrunner.checkpoint.store import Store
-from studyrunner.mpi.broadcast import Broadcast
+from studyrunner.mpi.mapped_file import hand_out
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Handlers, serve_tasks, work_on_tasks
-from studyrunner.mpi.version_check import Machine
 from studyrunner.plan.cost_model import CostKeys, CostModel
 from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.computed import InMemory, keep_model, model_key, read_model
@@ -36,6 +35,7 @@ from studyrunner.scene.variables import SceneVariable, build_scene_variables
 from studyrunner.scene_models import SceneModels
 from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study
+from studyrunner.system.files import new_partial
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
@@ -88,8 +88,9 @@ class Scenes:
 
     scenes: which there are. facts: of each. variables: what the study asks of them.
     kept: the model that the result file keeps. notes: what the user should know.
-    broadcast: the model of the only scene, or `SeveralScenes`.
-    store: file of the run, with the models of several scenes.
+    model: of the only scene; None where there are several, whose models are in the file of the run.
+    seeing: ranks that see files beside the file of the run.
+    store: file of the run.
     """
 
     scenes: SceneSet
@@ -97,18 +98,13 @@ class Scenes:
     variables: tuple[SceneVariable, ...]
     kept: KeptScene | None
     notes: tuple[str, ...]
-    broadcast: Broadcast[ReducedModel | SeveralScenes]
+    model: ReducedModel | None
+    seeing: frozenset[int]
     store: Store
-
-    @property
-    def model(self) -> ReducedModel | None:
-        """The model of the only scene; None where there are several."""
-        handed = self.broadcast.value
-        return None if isinstance(handed, SeveralScenes) else handed
 
     @cached_property
     def _models(self) -> SceneModels:
-        return SceneModels(self._read_model, self.broadcast.sharing)
+        return SceneModels(self._read_model, self.seeing, self.store.path)
 
     def with_model(self, rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
         """The task as a rank gets it: with the model where the rank does not have the model."""
@@ -119,15 +115,15 @@ class Scenes:
         return read_model(study, harmonics_to_build(study), self.store)
 
 
-def build_scenes(
-    ranks: Ranks, machines: Mapping[int, Machine], study: Study, store: Store, say: Callable[[str], None]
-) -> Scenes:
+def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], None]) -> Scenes:
     """Rank 0: builds the scenes of a study, several of them together with the other ranks.
+
+    The other ranks have the model of the only scene, or know that there are several, when this returns.
 
     Parameters
     ----------
-    ranks, machines
-        All ranks, and the machine of each.
+    ranks
+        All ranks.
     study
         The study.
     store
@@ -149,10 +145,10 @@ def build_scenes(
             say("finding the natural frequencies of the scene")
         variables = (*build_scene_variables(one, model, store), *exact_answers(study))
         facts = replace(describe_scene(model), static_response=static_response(model))
-        broadcast: Broadcast[ReducedModel | SeveralScenes] = Broadcast(ranks, machines, model)
-        return Scenes(scenes, (facts,), variables, scene_to_keep(one, model), (), broadcast, store)
-    several: Broadcast[ReducedModel | SeveralScenes] = Broadcast(ranks, machines, SeveralScenes())
-    several.send()
+        kept = scene_to_keep(one, model)
+        handed, seeing = hand_out(ranks, model, new_partial(store.path))
+        return Scenes(scenes, (facts,), variables, kept, (), handed, seeing, store)
+    _, seeing = hand_out(ranks, SeveralScenes(), new_partial(store.path))
     built = _build_all(ranks, scenes, store, say)
     with keys_as_given(study.scene_axes):
         for each in built:
@@ -160,7 +156,7 @@ def build_scenes(
                 raise each.error
     facts_of_all = tuple(each.facts for each in built if each.facts is not None)
     variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
-    return Scenes(scenes, facts_of_all, (*variables, *exact_answers(study)), None, notes, several, store)
+    return Scenes(scenes, facts_of_all, (*variables, *exact_answers(study)), None, notes, None, seeing, store)
 
 
 def _build_all(ranks: Ranks, scenes: SceneSet, store: Store, say: Callable[[str], None]) -> list[SceneBuilt]:

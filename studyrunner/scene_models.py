@@ -1,37 +1,40 @@
-"""The models of several scenes on their way to the ranks: once to the machine of rank 0, and only while in use there.
+"""The models of several scenes on their way to the ranks: while they are in use, once in memory on each machine.
 
-Rank 0 keeps the models in the file of the run, and a task brings the model to a rank that does not have it. The ranks
-that share the memory of rank 0 (`Broadcast.sharing`) get the address of one copy; any other rank gets the model itself.
+Rank 0 keeps the models in the file of the run, and a task brings the model to a rank that does not have it: as a file
+that the ranks map (`mapped_file`), or the model itself where the rank does not see that file.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Collection
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studyrunner.evaluate import ModelCache
-from studyrunner.mpi.broadcast import share
-from studyrunner.mpi.shared_memory import Address, SharedObject
+from studyrunner.mpi.mapped_file import MappedFile, write_mapped
 from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.system.files import new_partial
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
 
 
 class SceneModels:
-    """Rank 0: which rank has which models, and the models in shared memory.
+    """Rank 0: which rank has which models, and the files of models in use.
 
     A rank holds the models of two tasks at most (`ModelCache`) and two tasks at most (`Dispatcher`). So a rank that
     loses models here, by two later tasks with other models, has done the task that brought these.
     """
 
-    def __init__(self, read: Callable[[int], ReducedModel], sharing: Collection[int]) -> None:
-        """read: the model of a scene. sharing: ranks that share the memory of rank 0."""
+    def __init__(self, read: Callable[[int], ReducedModel], seeing: Collection[int], beside: Path) -> None:
+        """read: the model of a scene. seeing: ranks that see the files. beside: the file that they stand beside."""
         self._read = read
-        self._sharing = sharing
+        self._seeing = seeing
+        self._beside = beside
         self._held: dict[int, ModelCache[None]] = {}
-        self._shared: dict[int, SharedObject[ReducedModel]] = {}
+        self._files: dict[int, MappedFile] = {}
 
     def with_model(self, rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
         """The task as a rank gets it: with the models that the rank does not have."""
@@ -39,23 +42,18 @@ class SceneModels:
         if held.use(task.scenes):
             return task
         held.add(task.scenes, None)
-        self._close_unused()
+        self._remove_unused()
         return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
 
-    def _hand(self, rank: int, number: int) -> ReducedModel | Address:
+    def _hand(self, rank: int, number: int) -> ReducedModel | MappedFile:
         """The model of a scene as a rank gets it."""
-        if rank not in self._sharing:
-            return self._read(number)
-        if number not in self._shared:
-            model = self._read(number)
-            shared = share(model)
-            if shared is None:
-                return model
-            self._shared[number] = shared
-        return self._shared[number].address
+        if rank in self._seeing and number not in self._files:
+            # a full disk costs memory: each rank gets the model itself
+            with contextlib.suppress(OSError):
+                self._files[number] = write_mapped(self._read(number), new_partial(self._beside))
+        return self._files[number] if rank in self._seeing and number in self._files else self._read(number)
 
-    def _close_unused(self) -> None:
-        held_here = (held for rank, held in self._held.items() if rank in self._sharing)
-        used = {number for held in held_here for scenes in held for number in scenes}
-        for number in self._shared.keys() - used:
-            self._shared.pop(number).close()
+    def _remove_unused(self) -> None:
+        used = {number for held in self._held.values() for scenes in held for number in scenes}
+        for number in self._files.keys() - used:
+            self._files.pop(number).remove()

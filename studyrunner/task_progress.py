@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from solver.outcome import Outcome
 from solver.packing import unpack
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.mode_result import build_mode_result
-from studyrunner.mpi.crashes import MOST_DEATHS, Crash
 from studyrunner.plan.cost_model import CostModel
 from studyrunner.plan.results import MarchResult, StartResult
 from studyrunner.plan.tasks import BRANCHES, MARCHES, RESTING, BranchTask, MarchTask
@@ -32,19 +31,20 @@ class TaskProgress:
     """State of the tasks of a study, and the tasks that results make possible.
 
     A wear history becomes possible with its start state, while the branch goes on. Results of a task do not depend on
-    the order. n_crashes: number of processes that each task has ended in earlier runs, by hash.
+    the order.
     """
 
-    def __init__(self, completion: CompletionIndex, n_crashes: Mapping[str, int] | None = None) -> None:
+    def __init__(self, completion: CompletionIndex) -> None:
         self.costs = CostModel()
         self.branches = completion.branches_left()
         self.n_points = completion.n_points_finished
         self.n_starts_left = sum(branch.n_results for branch in self.branches)
         self._completion = completion
-        self._n_lost: Counter[str] = Counter(n_crashes)
         self._n_faults: Counter[str] = Counter()
         self._n_given: Counter[int] = Counter()
         self._words: dict[str, str] = {}
+        self._suspects: list[BranchTask | MarchTask] = []
+        self._tried = ""  # key of the suspect that is under way
         self._left = dict.fromkeys((BRANCHES, MARCHES, RESTING), 0.0)
         self._left[BRANCHES] = sum(branch.cost for branch in self.branches)
         lines = completion.plan.marches
@@ -52,21 +52,47 @@ class TaskProgress:
 
     def begin(self) -> Iterator[BranchTask | MarchTask]:
         """Tasks that are possible at the beginning."""
-        yield from self.branches
+        yield from self._without_suspects(self.branches)
         for branch in self._completion.plan.branches:
             for result in self._completion.known_starts(branch):
-                yield from self._start(branch, result)
-        yield from self._completion.marches_without_start()
+                yield from self._without_suspects(self._start(branch, result))
+        yield from self._without_suspects(self._completion.marches_without_start())
 
     def take(self, task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         """Takes a result; returns tasks that the result makes possible, or that have to be done again."""
+        new = self._take(task, result)
+        place = result.position if isinstance(result, StartResult) else result.place
+        if task.key == self._tried and place == _last_place(task) and task.key not in {each.key for each in new}:
+            self._tried = ""
+            return [*self._without_suspects(new), *self._without_suspects(self._suspects_left())]
+        return self._without_suspects(new)
+
+    def _without_suspects(self, tasks: Sequence[BranchTask | MarchTask]) -> list[BranchTask | MarchTask]:
+        """The tasks, but of those with which runs have crashed one at a time: the others wait for its end."""
+        now = []
+        for task in tasks:
+            if not self._completion.is_suspect(task.key) or task.key == self._tried:
+                now.append(task)
+            elif self._tried:
+                self._suspects.append(task)
+            else:
+                self._tried = task.key
+                now.append(task)
+        return now
+
+    def _suspects_left(self) -> list[BranchTask | MarchTask]:
+        left, self._suspects = self._suspects, []
+        return left
+
+    def _take(
+        self, task: BranchTask | MarchTask, result: StartResult | MarchResult
+    ) -> Sequence[BranchTask | MarchTask]:
         self._left[task.kind] -= task.cost_of(first=_is_first(task, result))
         self._words.pop(task.key, None)
         self.n_starts_left -= isinstance(task, BranchTask)
         if fault_of(result):
-            last = task.order_left[-1] if isinstance(task, BranchTask) else task.n_results - 1
             place = result.position if isinstance(result, StartResult) else result.place
-            return self._try_again(task) if place == last else ()
+            return self._try_again(task) if place == _last_place(task) else ()
         if isinstance(task, BranchTask) and isinstance(result, StartResult):
             self._completion.add_start(task, result)
             return self._start(task, result)
@@ -97,48 +123,6 @@ class TaskProgress:
             self.n_points -= self._n_given.pop(task.number, 0)
         self._left[again.kind] += again.cost
         return [again]
-
-    def take_back(
-        self, lost: Sequence[tuple[BranchTask | MarchTask, int]], crashes: Mapping[str, Crash]
-    ) -> list[BranchTask | MarchTask]:
-        """Tasks in place of the tasks of a lost rank, each with the number of results still to come.
-
-        The rank was doing the first task, or the task that it has noted. crashes: these notes, by hash of the task. A
-        task is tried once more. A task with which two ranks were lost is not tried again, as it crashes or needs too
-        much memory.
-        """
-        left: list[BranchTask | MarchTask] = []
-        keys = [task.key for task, _ in lost]
-        # The note of the rank is newer than its last message, which may be lost.
-        at = next((key for key in keys if key in crashes), next(iter(keys), ""))
-        self._n_lost[at] += 1
-        for task, n_left in lost:
-            again = self._completion.renew(task)
-            crash = None
-            if task.key == at and self._n_lost[at] >= MOST_DEATHS:
-                position = next(iter(again.order_left)) if isinstance(again, BranchTask) else None
-                unknown = Crash(task.key, position, f"{MOST_DEATHS} ranks were lost while they were at it")
-                crash = crashes.get(at, unknown)
-            if crash is not None:
-                ended = crash.key, crash.position, Outcome.CRASHED, crash.message
-                self.n_points += self._completion.take_as_failed(*ended)
-            if isinstance(again, BranchTask):
-                if crash is not None and crash.position is not None:
-                    behind = again.order[again.order.index(crash.position) :]
-                    again = replace(again, known=again.known.union(behind))
-                again = replace(again, cost=_cost_left(task, again.n_results))
-                self._left[task.kind] -= _cost_left(task, n_left) - again.cost
-                self.n_starts_left -= n_left - again.n_results
-                left += [again] if again.n_results else []
-            elif crash is not None:
-                self._left[task.kind] -= _cost_left(task, n_left)
-            else:
-                # The task gives all of its histories again.
-                n_given = task.n_results - n_left
-                self.n_points -= sum(len(scaled.points) for scaled in again.histories[:n_given])
-                self._left[task.kind] += task.cost - _cost_left(task, n_left)
-                left.append(again)
-        return left
 
     def _start(self, branch: BranchTask, result: StartResult) -> Sequence[MarchTask]:
         planned = self._completion.marches_from(branch.number, result.position)
@@ -186,6 +170,11 @@ class TaskProgress:
             what = f"mission history {task.number + 1}"
             return f"{what} ({self._words[task.key]})" if task.key in self._words else what
         return f"{self._completion.plan.frequency_of(task):.6g} Hz {task.scheme}"
+
+
+def _last_place(task: BranchTask | MarchTask) -> int:
+    """Position or place of the last result of a task."""
+    return task.order_left[-1] if isinstance(task, BranchTask) else task.n_results - 1
 
 
 def _is_first(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> bool:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from solver.clock import n_compiled
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.evaluate import build_evaluator, failed_results
-from studyrunner.mpi.crashes import count_crashes, note_tasks, read_tally
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Handlers, serve_tasks
 from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
@@ -25,11 +22,8 @@ if TYPE_CHECKING:
     from solver.model import ReducedModel
 
 
-def evaluator(model: ReducedModel | None, crashes: Path, rank: int) -> contextlib.AbstractContextManager[Evaluate]:
-    """The function that does tasks on a rank. A task that breaks off gives failed results; the other tasks go on.
-
-    crashes: folder of the notes on crashes; not every rank needs to see it.
-    """
+def evaluator(model: ReducedModel | None) -> Evaluate:
+    """The function that does tasks on a rank. A task that breaks off gives failed results; the other tasks go on."""
     compute = build_evaluator(model)
 
     def compute_all(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
@@ -53,20 +47,18 @@ def evaluator(model: ReducedModel | None, crashes: Path, rank: int) -> contextli
             raise_ending()
             yield from failed_results(task, n_given, error)
 
-    return note_tasks(evaluate, crashes, rank)
+    return evaluate
 
 
 def run_tasks(
     ranks: Ranks,
     completion: CompletionIndex,
-    folder: Path,
     evaluate: Evaluate,
     progress: ProgressDisplay,
     scenes: Scenes,
 ) -> None:
-    """Rank 0: has the remaining tasks done and their results saved. folder: of the notes on crashes."""
-    tally = read_tally(folder)
-    tasks = TaskProgress(completion, {key: len(crashes) for key, crashes in tally.items()})
+    """Rank 0: has the remaining tasks done and their results saved."""
+    tasks = TaskProgress(completion)
 
     def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
         new = tasks.take(task, result)
@@ -85,12 +77,6 @@ def run_tasks(
                 " there is one"
             )
         return bool(fault)
-
-    def take_back(rank: int, lost: Sequence[tuple[BranchTask | MarchTask, int]]) -> list[BranchTask | MarchTask]:
-        had = f", which had {count(len(lost), 'task')}" if lost else ""
-        progress.note(f"rank {rank} is lost{had}: the others go on without it")
-        crashes = {crash.key: crash for crash in count_crashes(folder, rank)}
-        return tasks.take_back(lost, crashes)
 
     known: int | None = n_compiled()
 
@@ -112,6 +98,11 @@ def run_tasks(
     if completion.plan.n_missions:
         progress.say(f"computing {count(completion.plan.n_missions, 'mission history', 'mission histories')}")
     progress.begin_tasks()
-    handlers = Handlers(take, tick, tasks.keep, take_back, is_sick, scenes.with_model)
+
+    def prepare(rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
+        completion.store.note_begin(task.key)
+        return scenes.with_model(rank, task)
+
+    handlers = Handlers(take, tick, tasks.keep, is_sick, prepare)
     serve_tasks(ranks, tasks.begin(), evaluate, handlers, tasks.costs)
     completion.store.flush()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.database import RESULTS, STARTS, UNDER_WAY
-from studyrunner.checkpoint.records import empty_record, pack_record, record_of, unpack_records, values_in
-from studyrunner.checkpoint.store import Store
+from studyrunner.checkpoint.records import empty_record, pack_record, record_in, record_of
+from studyrunner.checkpoint.store import PROGRESS, RESULTS, STARTS, Store
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.results import MarchResult, StartResult, failed_result, unpack_start
 from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 
 MOST_OF_OTHERS = 2.0**30
 """Largest size, bytes, of results of other studies that are kept under the same name."""
+
+MOST_CRASHES = 3
+"""A task is given up after so many runs in a row that were killed or crashed before the task had given anything. Such
+tasks are tried one after the other, so that another task is seldom to blame."""
 
 
 class CompletionIndex:
@@ -61,8 +64,8 @@ class CompletionIndex:
         )
 
     def is_finished(self, march: MarchTask) -> bool:
-        """Whether all histories of a task are on the disk."""
-        known = self.store.on_disk(RESULTS)
+        """Whether all histories of a task are there."""
+        known = self.store.keys(RESULTS)
         return all(key in known for key in self._histories[march.number])
 
     def read_histories(self, keys: Sequence[str]) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
@@ -70,16 +73,14 @@ class CompletionIndex:
 
         Raises StorageError where the disk fails.
         """
-        values = [values_in(self.store.read(RESULTS, key), self.kind) for key in keys]
-        there = np.array([value is not None for value in values], np.bool_)
-        records = np.repeat(empty_record(self.kind), len(keys))
-        if there.any():
-            records[there] = unpack_records(np.stack([value for value in values if value is not None]), self.kind)
-        return records, there
+        found = [record_in(self.store.read(RESULTS, key), self.kind) for key in keys]
+        empty = empty_record(self.kind).tobytes()
+        records = np.frombuffer(bytearray(b"".join(empty if each is None else each for each in found)), self.kind)
+        return records, np.array([each is not None for each in found], np.bool_)
 
     @property
     def n_points_finished(self) -> int:
-        """Number of points whose history is on the disk."""
+        """Number of points whose history is there."""
         return sum(len(march.points) for line in self.plan.marches for march in line if self.is_finished(march))
 
     def key(self, task: BranchTask | MarchTask) -> str:
@@ -96,7 +97,7 @@ class CompletionIndex:
             )
             if len(known) < len(keys):
                 key = self.key(branch)
-                left.append(replace(branch, known=known, resume=self.store.read_progress(key), key=key))
+                left.append(replace(branch, known=known, resume=self.store.read(PROGRESS, key), key=key))
         return left
 
     def known_starts(self, branch: BranchTask) -> list[StartResult]:
@@ -109,7 +110,7 @@ class CompletionIndex:
         """Unfinished tasks of wear histories from one start state, each with its progress."""
         keys = {march.number: self.key(march) for march in self.plan.marches_from(branch, position)}
         return tuple(
-            replace(march, resume=self.store.read_progress(keys[march.number]), key=keys[march.number])
+            replace(march, resume=self.store.read(PROGRESS, keys[march.number]), key=keys[march.number])
             for march in self.plan.marches_from(branch, position)
             if not self.is_finished(march)
         )
@@ -125,8 +126,7 @@ class CompletionIndex:
 
     def renew(self, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
         """A task that has to be done again, with the results that it has given so far."""
-        self.store.flush()
-        resume = self.store.read_progress(self.key(task))
+        resume = self.store.read(PROGRESS, self.key(task))
         if isinstance(task, MarchTask):
             return replace(task, resume=resume)
         given = {place for place, key in enumerate(self._starts[task.number]) if self.store.has(STARTS, key)}
@@ -134,68 +134,62 @@ class CompletionIndex:
 
     def add_start(self, branch: BranchTask, result: StartResult) -> None:
         """Adds a start state."""
-        shown = {**_case(branch, result.position), "unknowns": result.n_unknowns, "moves": result.moves}
-        self.store.put(STARTS, self._starts[branch.number][result.position], result.pack(), shown)
+        self.store.put(STARTS, self._starts[branch.number][result.position], result.pack())
+        self.store.note_life(self.key(branch))
 
     def add_history(self, march: MarchTask, result: MarchResult) -> None:
         """Adds a history."""
         key, record = self._histories[march.number][result.place], record_of(self.kind, result)
-        ended = result.place == march.n_results - 1 and result.progress is None
-        finished = self.key(march) if ended else ""
-        shown = {**self._shown(march, result.place), **_totals(record)}
-        self.store.put(RESULTS, key, pack_record(record), shown, finished)
+        self.store.put(RESULTS, key, pack_record(record))
+        self.store.note_life(self.key(march))
         if result.progress is not None:
             self.keep(march, result.progress)
+        elif result.place == march.n_results - 1:
+            self.store.forget(PROGRESS, self.key(march))
 
     def keep(self, task: BranchTask | MarchTask, progress: object) -> None:
         """Adds the progress of a task."""
         if not isinstance(progress, Packed):
             raise TypeError(f"{progress!r} is no progress of {task}")
-        self.store.keep_progress(self.key(task), progress, {"kind": _kind(task), **self._shown(task)})
-
-    def describe_tasks(self) -> Iterator[dict[str, object]]:
-        """All tasks, for people who read the file."""
-        tasks: list[BranchTask | MarchTask] = [*self.plan.branches, *itertools.chain.from_iterable(self.plan.marches)]
-        for task in tasks:
-            points = len(task.points) if isinstance(task, MarchTask) else None
-            yield {"key": self.key(task), "kind": _kind(task), "points": points, **self._shown(task)}
+        self.store.put_if_small(PROGRESS, self.key(task), progress)
+        self.store.note_life(self.key(task))
 
     def forget_failed(self, complete: Collection[int]) -> None:
-        """Marks failed points as not computed. complete: outcomes of points that did not fail."""
-        failed = self.store.with_outcome({Outcome(number).meaning for number in complete}, other=True)
+        """Forgets failed points. complete: outcomes of points that did not fail."""
         for branch, line, keys in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
             starts = ((place, self.store.read(STARTS, key)) for place, key in enumerate(keys))
             without_state = {place for place, start in starts if start and unpack_start(place, start).failed}
             for place in without_state:
                 self.store.forget(STARTS, keys[place])
             if without_state:
-                self.store.forget(UNDER_WAY, self.key(branch))
+                self.store.forget(PROGRESS, self.key(branch))
             for march in line:
-                for key in self._histories[march.number]:
-                    if key in failed or march.position in without_state:
+                keys_of_march = self._histories[march.number]
+                records, there = self.read_histories(keys_of_march)
+                for key, record, is_there in zip(keys_of_march, records, there, strict=True):
+                    if is_there and (record["outcome"] not in complete or march.position in without_state):
                         self.store.forget(RESULTS, key)
 
-    def tasks_with(self, outcome: int) -> set[str]:
-        """Hashes of the wear histories with a point of this outcome, and of their branches."""
-        found = self.store.with_outcome({Outcome(outcome).meaning})
-        return {
-            key
-            for branch, line in zip(self.plan.branches, self.plan.marches, strict=True)
-            for march in line
-            if not found.isdisjoint(self._histories[march.number])
-            for key in (self.key(branch), self.key(march))
-        }
+    def is_suspect(self, key: str) -> bool:
+        """Whether a run has crashed or was killed while this task was under way and had given nothing."""
+        return key in self.store.crashes
 
-    def take_as_failed(self, key: str, position: int | None, outcome: int, message: str) -> int:
-        """Marks a task as failed that has ended its process too often: no other run tries this task.
+    def give_up_crashed(self) -> None:
+        """Marks tasks as failed with which too many runs have ended."""
+        for key in [key for key, number in self.store.crashes.items() if number >= MOST_CRASHES]:
+            message = f"{MOST_CRASHES} runs in a row have crashed or were killed while they were at it"
+            if self.take_as_failed(key, Outcome.CRASHED, message):
+                self.store.note_life(key)
+
+    def take_as_failed(self, key: str, outcome: int, message: str) -> int:
+        """Marks a task as failed that has ended too many runs: no other run tries this task.
+
+        A branch ends before the first of its start states that is not there.
 
         Parameters
         ----------
         key
             Hash of the task.
-        position
-            Index of the frequency at which a branch ended its process; the branch ends before it. None for a wear
-            history.
         outcome, message
             Outcome and message of the lost points.
 
@@ -207,28 +201,28 @@ class CompletionIndex:
         n_points = 0
         for branch, line, starts in zip(self.plan.branches, self.plan.marches, self._starts, strict=True):
             lost: set[int] = set()
-            if self.key(branch) == key and position in branch.order:
-                behind = branch.order[branch.order.index(position) :]
-                lost = {place for place in behind if not self.store.has(STARTS, starts[place])}
+            if self.key(branch) == key:
+                lost = {place for place in branch.order if not self.store.has(STARTS, starts[place])}
             for march in line:
                 if self.key(march) != key and march.position not in lost:
                     continue
                 for place, history in enumerate(self._histories[march.number]):
-                    if history not in self.store.on_disk(RESULTS):
+                    if not self.store.has(RESULTS, history):
                         n_points += len(march.histories[place].points)
                         self.add_history(march, failed_result(march, place, outcome, message))
         self.store.flush()
         return n_points
 
     def forget_all(self) -> None:
-        """Marks all points of this study as not computed. Results of other studies stay."""
+        """Forgets all points of this study. Results of other studies stay."""
         for key in self._all_histories():
             self.store.forget(RESULTS, key)
         for key in itertools.chain.from_iterable(self._starts):
             self.store.forget(STARTS, key)
         for key in self.keys:
-            self.store.forget(UNDER_WAY, key)
-        self.store.remove_forgotten()
+            self.store.forget(PROGRESS, key)
+            self.store.note_life(key)
+        self.store.flush()
 
     def prune(self, most: float = MOST_OF_OTHERS) -> None:
         """Removes what a finished study does not need, and results of others until they take at most so many bytes.
@@ -238,9 +232,9 @@ class CompletionIndex:
         for branch, keys in zip(self.plan.branches, self._starts, strict=True):
             # nothing is left to be followed; that of a march which was given up for its time is what it goes on from
             if all(self.store.has(STARTS, key) for key in keys):
-                self.store.forget(UNDER_WAY, self.key(branch))
+                self.store.forget(PROGRESS, self.key(branch))
         starts = set(itertools.chain.from_iterable(self._starts))
-        self.store.prune({RESULTS: self._all_histories(), STARTS: starts, UNDER_WAY: self.keys}, most)
+        self.store.prune({RESULTS: self._all_histories(), STARTS: starts, PROGRESS: self.keys}, most)
 
     def _all_histories(self) -> set[str]:
         return set(itertools.chain.from_iterable(self._histories.values()))
@@ -249,40 +243,3 @@ class CompletionIndex:
         """Indices of the frequencies of a branch from which a history is still to be computed."""
         line = self.plan.marches[branch.number]
         return frozenset(march.position for march in line if not self.is_finished(march))
-
-    def _shown(self, task: BranchTask | MarchTask, place: int = 0) -> dict[str, object]:
-        """Columns of the file that describe a task, or a history of the task."""
-        if isinstance(task, BranchTask):
-            if not task.frequencies:
-                return {}
-            position = next(iter(task.order_left), task.order[-1])
-            return _case(task, position)
-        branch, history = self.plan.branches[task.branch], task.histories[place]
-        own = {"scheme": task.scheme, "wear_coefficient": history.wear_coefficient, "step": history.step}
-        if task.blocks:
-            return {"frequency": self.plan.frequency_of(task), **own}
-        return {**_case(branch, task.position), **own}
-
-
-def _kind(task: BranchTask | MarchTask) -> str:
-    return "sweep" if isinstance(task, BranchTask) else "integration"
-
-
-def _case(branch: BranchTask, position: int) -> dict[str, object]:
-    """Columns of the file that describe a start state."""
-    if branch.mode is not None:
-        return {"sweep": branch.sweep}
-    frequency = branch.frequencies[position]
-    return {"sweep": branch.sweep, "excitation_amplitude": branch.excitation_amplitude, "frequency": frequency}
-
-
-def _totals(record: NDArray[np.void]) -> dict[str, object]:
-    """Columns of the file that describe a result."""
-    there = record.dtype.names or ()
-    totals = ("last_cycle", "error_estimate", "run_time")
-    shown: dict[str, object] = {name: record[name][0].item() for name in totals if name in there}
-    if "worn_volume" in there:
-        known = record["worn_volume"][0][np.isfinite(record["worn_volume"][0])]
-        shown["worn_volume"] = known[-1].item() if len(known) else None
-    outcome = Outcome(record["outcome"][0].item()).meaning
-    return {**shown, "outcome": outcome, "message": str(record["message"][0]) or None}

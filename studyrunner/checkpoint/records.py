@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.packing import Packed
-from studyrunner.checkpoint.contents import join_bytes, sort_bytes
 from studyrunner.plan.planning import march_variables
 from studyrunner.plan.results import MarchResult
 from studyrunner.scene.scene import SceneFacts
@@ -37,8 +35,7 @@ def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
         lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
         entry = {**study.variables, **LOOPS, **COUNTS}[name]
         fields.append((name, entry.dtype, tuple(lengths[dimension] for dimension in entry.dimensions)))
-    # single values come first, see `_arrays_of`
-    return np.dtype(sorted(fields, key=lambda each: bool(each[2])))
+    return np.dtype(fields)
 
 
 def record_of(kind: np.dtype[np.void], result: MarchResult) -> NDArray[np.void]:
@@ -51,45 +48,15 @@ def record_of(kind: np.dtype[np.void], result: MarchResult) -> NDArray[np.void]:
 
 
 def pack_record(record: NDArray[np.void]) -> Packed:
-    """A record (1,) for a file: the hash of its data type, and its values, those of each array with sorted bytes."""
-    first, arrays = _arrays_of(record.dtype)
-    pieces = [record.tobytes()[:first], *(sort_bytes(record[name][0]) for name in arrays)]
-    return Packed(layout_of(record.dtype)[0], (np.frombuffer(b"".join(pieces), np.uint8),))
+    """The bytes of a record (1,), whose data type is part of its key."""
+    return Packed("", (np.frombuffer(record.tobytes(), np.uint8),))
 
 
-def values_in(packed: Packed | None, kind: np.dtype[np.void]) -> NDArray[np.uint8] | None:
-    """Values of a record, for `unpack_records`; None where there are none, or others than those of `kind`."""
-    if packed is None or packed.text != layout_of(kind)[0] or len(packed.arrays) != 1:
+def record_in(packed: Packed | None, kind: np.dtype[np.void]) -> bytes | None:
+    """The bytes of the record (1,) in an entry; None where there is none of `kind`."""
+    if packed is None or len(packed.arrays) != 1 or packed.arrays[0].nbytes != kind.itemsize:
         return None
-    (values,) = packed.arrays
-    is_right = values.dtype == np.uint8 and values.shape == (kind.itemsize,)
-    return values.astype(np.uint8) if is_right else None
-
-
-def unpack_records(values: NDArray[np.uint8], kind: np.dtype[np.void]) -> NDArray[np.void]:
-    """Records (n,) from their values (n, n_bytes)."""
-    first, arrays = _arrays_of(kind)
-    records = np.zeros(len(values), kind)
-    records.view(np.uint8).reshape(values.shape)[:, :first] = values[:, :first]
-    for name in arrays:
-        last = first + kind[name].itemsize
-        records[name] = join_bytes(values[:, first:last], kind[name].base, kind[name].shape)
-        first = last
-    return records
-
-
-@functools.lru_cache(maxsize=4)
-def layout_of(kind: np.dtype[np.void]) -> tuple[str, str]:
-    """Hash of the data type of a record, and the type in words: names, types and shapes of its values."""
-    text = repr(kind.descr)
-    return hashlib.sha256(text.encode()).hexdigest()[:16], text
-
-
-@functools.lru_cache(maxsize=4)
-def _arrays_of(kind: np.dtype[np.void]) -> tuple[int, tuple[str, ...]]:
-    """Size of the single values of a record, which come first, bytes, and names of the arrays behind these."""
-    arrays = tuple(name for name in kind.names or () if kind[name].shape)
-    return kind.itemsize - sum(kind[name].itemsize for name in arrays), arrays
+    return packed.arrays[0].tobytes()
 
 
 def empty_record(kind: np.dtype[np.void]) -> NDArray[np.void]:

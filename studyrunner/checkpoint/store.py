@@ -1,344 +1,259 @@
-"""What a study has computed so far, in one file beside the result: written within a second or so, read by a later run.
+"""What a study has computed so far, in one SQLite file beside the result, from which a later run goes on.
 
-Rank 0 alone uses the file. A thread writes, as a transaction waits for the disk; what arrives meanwhile goes into the
-next transaction. The connection is used by one thread at a time: who reads waits until the writer has ended.
-
-By hand is what goes into one transaction: all else is SQLite's.
+The file has one table with the columns kind, key and blob. Rank 0 alone uses the file. What arrives within a moment
+goes into one transaction.
 """
 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
-import secrets
 import socket
 import sqlite3
 import time
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from datetime import UTC, datetime
+import zlib
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from solver.packing import Packed
-from studyrunner.checkpoint import database
-from studyrunner.checkpoint.contents import LARGEST, decompress
-from studyrunner.checkpoint.database import COMPUTED, TABLES, UNDER_WAY, DamagedError, faults_told
-from studyrunner.checkpoint.entries import Batch, Entry, Name, row_of
-from studyrunner.checkpoint.writer import Writer
+from studyrunner.checkpoint.database import RUN, faults_told, open_file, run_in, transaction
 from studyrunner.system.endings import uninterrupted
-from studyrunner.system.files import NotPlainError, has_locks
 from studyrunner.user_error import StorageError
 
+STARTS, PROGRESS, RESULTS, COMPUTED = "start", "progress", "result", "computed"
+"""Kinds of entries: start states; progress of tasks; finished wear histories; what is computed once for a study."""
+
+LARGEST = 9 * 10**8
+"""Largest size of an entry, bytes. SQLite has no larger ones."""
+
 SECONDS_A_TRANSACTION = 0.25
-"""Longest time, s, that a result or progress waits for others that go into the same transaction."""
+"""Longest time, s, that an entry waits for others that go into the same transaction, on a disk that is fast."""
 
-MOST_BYTES_WAITING = 32e6
-"""Bytes that may wait for the disk. Beyond this size a new result waits until there is room again."""
-
+_SHARE_OF_WRITING = 0.1  # of the time of rank 0, on a disk that is slow
 _BYTES_A_TRANSACTION = 8e6
+_HEAD_BYTES = 8
+_KINDS = frozenset("biufcSU")  # of numpy: numbers and texts, no objects
+_LEVEL = 1  # of zlib: the rank that compresses hands out the tasks as well
+
+Name = tuple[str, str]
+
+
+def to_blob(packed: Packed) -> bytes:
+    """The text, type and shape of the arrays of a value as JSON, then their bytes, compressed by zlib.
+
+    Raises TypeError for arrays of anything but numbers and texts: a bug.
+    """
+    for array in packed.arrays:
+        if array.dtype.kind not in _KINDS:
+            raise TypeError(f"arrays of {array.dtype} are not kept")
+    head = json.dumps([packed.text, [[array.dtype.str, array.shape] for array in packed.arrays]]).encode()
+    raw = (len(head).to_bytes(_HEAD_BYTES, "little"), head, *(array.tobytes() for array in packed.arrays))
+    return zlib.compress(b"".join(raw), _LEVEL)
+
+
+def from_blob(blob: bytes) -> Packed:
+    """The value of `to_blob`. Raises ValueError where the bytes are no such value."""
+    try:
+        compressed = zlib.decompressobj()
+        raw = compressed.decompress(blob, LARGEST)
+        if not compressed.eof:
+            raise ValueError("not all of it, or too much")
+        place = _HEAD_BYTES + int.from_bytes(raw[:_HEAD_BYTES], "little")
+        text, layout = json.loads(raw[_HEAD_BYTES:place])
+        arrays = []
+        for kind, shape in layout:
+            array: NDArray[np.generic] = np.ndarray(tuple(shape), np.dtype(kind), raw, place)
+            arrays.append(array.copy())
+            place += array.nbytes
+        return Packed(text, tuple(arrays))
+    except (zlib.error, TypeError, OverflowError) as error:
+        raise ValueError("not written by a run") from error
 
 
 class Store:
-    """The open file of a run. Raises database.StoreInUseError and StorageError.
+    """The open file of a run. Raises StoreInUseError, NoLocksError and StorageError.
 
-    path: of the file; a run on a file system without locks has a file of its own beside this one.
-    locked: whether no other run uses the file.
+    path: of the file.
     notes: lines for the user on what was found.
+    ended_hard: whether the run before was killed or has crashed.
+    crashes: how many runs in a row have ended so while a task was under way and had given nothing yet, by its key.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.notes: list[str] = []
-        self._waiting: Batch = {}
-        self._handed_over: Batch = {}
-        self._n_bytes = 0.0  # that wait
-        self._forgotten: set[Name] = set()
+        self._waiting: dict[Name, bytes | None] = {}
+        self._n_bytes = 0  # that wait
         self._used: set[str] = set()
-        self._written = 0.0
+        self._next_write = 0.0
         with faults_told(path):
-            self.locked = has_locks(path)
-            if not self.locked:
-                self.path = path.with_name(f"{path.name}-{secrets.token_hex(6)}")
-                self.notes.append(
-                    f"{path.name}: there are no locks on this file system: this run writes {self.path.name} and uses"
-                    " what other files of this name contain; give each run a result file of its own with -o"
-                )
-            self._is_new = not self.path.exists()
-            self._database, damage = database.open_locked(self.path, lock=self.locked)
-            try:
-                self.notes += [damage] if damage else []
-                self._file = self.path.stat().st_ino
-                self._keys = self._read_keys()
-                run = f"process {os.getpid()} on {socket.gethostname()}"
-                with self._transaction():
-                    if self._database.execute("UPDATE study SET run=?", [run]).rowcount != 1:
-                        self._database.execute("DELETE FROM study")
-                        self._database.execute("INSERT INTO study (run) VALUES (?)", [run])
-                for other in (*database.others(path), *(() if self.locked or not path.exists() else (path,))):
-                    if other != self.path:
-                        self._take_over(other)
-            except BaseException:
-                database.close(self._database, self.path)
-                raise
-        self._writer = Writer(self._write)
+            self._is_new = not path.exists()
+            self._database, said = open_file(path)
+            self.notes += [said] if said else []
+            self._file = path.stat().st_ino
+            self._keys: dict[str, set[str]] = {kind: set() for kind in (STARTS, PROGRESS, RESULTS, COMPUTED, RUN)}
+            for kind, key in self._database.execute("SELECT kind, key FROM entries"):
+                self._keys.setdefault(kind, set()).add(key)
+        before = run_in(self._database)
+        self.ended_hard = bool(before.get("open"))
+        under_way = frozenset(before.get("under_way", ())) if self.ended_hard else frozenset()
+        self.crashes: dict[str, int] = dict(before.get("crashes", {}))
+        for key in under_way:
+            self.crashes[key] = self.crashes.get(key, 0) + 1
+        self._study: dict[str, str] = {name: before[name] for name in ("name", "scene") if name in before}
+        self._under_way: set[str] = set()
+        self._is_open, self._is_noted = True, False
+        self.flush()
 
-    def note_study(self, name: str, scene: str, layout: tuple[str, str], tasks: Iterable[Mapping[str, object]]) -> None:
-        """Writes the study that the file belongs to, and for people its tasks and the layout of its results."""
-        columns = database.columns("tasks")
-        self._take(wait=True)
-        with faults_told(self.path), self._transaction():
-            self._database.execute("UPDATE study SET name=?, scene=?", [name, scene])
-            self._database.execute("INSERT OR REPLACE INTO layouts VALUES (?, ?)", layout)
-            self._database.execute("DELETE FROM tasks")
-            self._database.executemany(
-                f"INSERT OR REPLACE INTO tasks VALUES ({', '.join('?' * len(columns))})",
-                ([task.get(column) for column in columns] for task in tasks),
-            )
+    def note_study(self, name: str, scene: str) -> None:
+        """Writes which study the file belongs to."""
+        self._study = {"name": name, "scene": scene}
         self._is_new = False
+        self._is_noted = False
+        self.flush()
 
-    def put(self, table: str, key: str, packed: Packed, shown: Mapping[str, object], finished: str = "") -> None:
-        """Adds an entry, in place of an earlier one.
+    def note_begin(self, key: str) -> None:
+        """Notes that a rank is about to do a task. After a run that has ended hard this is on the disk at once."""
+        self._under_way.add(key)
+        self._is_noted = False
+        if self.ended_hard:
+            self.flush()
 
-        Parameters
-        ----------
-        table, key
-            Name of the entry.
-        packed, shown
-            Its contents, and columns that a person can read.
-        finished
-            Key of a task whose progress is no longer needed with this entry.
-        """
+    def note_life(self, key: str) -> None:
+        """Notes that a task has given something: it has not ended the run, nor the runs before."""
+        if key in self._under_way or key in self.crashes:
+            self._under_way.discard(key)
+            self.crashes.pop(key, None)
+            self._is_noted = False
+
+    def put(self, kind: str, key: str, packed: Packed) -> None:
+        """Adds an entry, in place of an earlier one. Raises StorageError."""
         if packed.n_bytes > LARGEST:
             raise StorageError(self.path, ValueError(f"{packed.n_bytes:.3g} bytes in one entry"), "use a smaller model")
-        self._waiting[table, key] = Entry(packed, shown)
-        if finished:
-            self._waiting[UNDER_WAY, finished] = None
-        self._n_bytes += packed.n_bytes
+        self._put(kind, key, to_blob(packed))
         if self._n_bytes > _BYTES_A_TRANSACTION:
-            self._take(wait=self._n_bytes > MOST_BYTES_WAITING)
-            if not self._writer.busy:
-                self._begin()
+            self.flush()
 
-    def has(self, table: str, key: str) -> bool:
+    def put_if_small(self, kind: str, key: str, packed: Packed) -> None:
+        """Adds an entry that only saves time; nothing where it is too large."""
+        if kind == COMPUTED:
+            self._used.add(key)
+        if packed.n_bytes <= LARGEST:
+            self.put(kind, key, packed)
+
+    def has(self, kind: str, key: str) -> bool:
         """Whether there is an entry, on the disk or on its way."""
-        for batch in (self._waiting, self._handed_over):
-            if (table, key) in batch:
-                return batch[table, key] is not None
-        return key in self._keys[table]
+        return key in self._keys[kind]
 
-    def on_disk(self, table: str) -> Collection[str]:
-        """Keys of all entries on the disk."""
-        return self._keys[table]
+    def keys(self, kind: str) -> Collection[str]:
+        """Keys of all entries of a kind."""
+        return self._keys[kind]
 
-    def read(self, table: str, key: str) -> Packed | None:
-        """Contents of an entry; None where there is none, or a damaged one. Raises StorageError."""
-        for batch in (self._waiting, self._handed_over):
-            if (table, key) in batch:
-                entry = batch[table, key]
-                return None if entry is None else entry.packed
-        if key not in self._keys[table]:
+    def read(self, kind: str, key: str) -> Packed | None:
+        """An entry; None where there is none, or a damaged one, which is forgotten. Raises StorageError."""
+        if key not in self._keys[kind]:
             return None
-        self._take(wait=True)
-        query = f"SELECT size, checksum, content FROM {table} WHERE key=?"
-        try:
+        blob = self._waiting.get((kind, key))
+        if blob is None:
             with faults_told(self.path):
-                size, sum_, content = self._database.execute(query, [key]).fetchone() or (0, 0, None)
-            if isinstance(size, int) and isinstance(content, bytes) and database.is_whole(key, sum_, content):
-                return decompress(size, content)
-        except ValueError:
-            pass
-        self.forget(table, key)
+                query = "SELECT blob FROM entries WHERE kind=? AND key=?"
+                (blob,) = self._database.execute(query, [kind, key]).fetchone() or (b"",)
+        with contextlib.suppress(ValueError, TypeError):
+            return from_blob(blob)
+        self.forget(kind, key)
         return None
 
-    def keep_progress(self, key: str, progress: Packed, shown: Mapping[str, object] | None = None) -> None:
-        """Adds the progress of a task, in place of an earlier one; more than `LARGEST` bytes are left out."""
-        if progress.n_bytes <= LARGEST:
-            self.put(UNDER_WAY, key, progress, shown or {})
-
-    def read_progress(self, key: str) -> Packed | None:
-        """Progress of a task; None where there is none."""
-        return self.read(UNDER_WAY, key)
-
     def keep_computed(self, key: str, value: Packed) -> None:
-        """Keeps what is computed once for a study; more than `LARGEST` bytes are left out. key: hash of its inputs."""
-        self._used.add(key)
-        if value.n_bytes <= LARGEST:
-            self.put(COMPUTED, key, value, {})
-            self.tick()
+        """Keeps what is computed once for a study. key: hash of its inputs."""
+        self.put_if_small(COMPUTED, key, value)
 
     def read_computed(self, key: str) -> Packed | None:
         """What `keep_computed` has kept, in this run or an earlier one; None where there is nothing."""
         self._used.add(key)
         return self.read(COMPUTED, key)
 
-    def forget(self, table: str, key: str) -> None:
-        """Makes an entry invalid in this run. A new entry replaces it, `remove_forgotten` removes it.
-
-        Raises StorageError.
-        """
-        self._take(wait=True)
-        self._waiting.pop((table, key), None)
-        if key in self._keys[table]:
-            self._keys[table].discard(key)
-            self._forgotten.add((table, key))
-
-    def remove_forgotten(self) -> None:
-        """Removes what was forgotten from the disk, so that no later run finds it. Raises StorageError."""
-        self._waiting.update(dict.fromkeys(self._forgotten.difference(self._waiting)))
-        self.flush()
-
-    def with_outcome(self, outcomes: Collection[str], *, other: bool = False) -> set[str]:
-        """Keys of the results with one of these outcomes, or with any other one."""
-        self.flush()
-        with faults_told(self.path):
-            rows = self._database.execute("SELECT key, outcome FROM results").fetchall()
-        keys = self._keys[database.RESULTS]
-        return {key for key, outcome in rows if key in keys and (outcome in outcomes) != other}
+    def forget(self, kind: str, key: str) -> None:
+        """Removes an entry with the next transaction."""
+        if key in self._keys[kind]:
+            self._keys[kind].discard(key)
+            self._waiting[kind, key] = None
 
     def prune(self, used: Mapping[str, Collection[str]], most: float) -> None:
         """Removes the oldest entries without a name in `used` until these have at most `most` bytes together.
 
-        used: keys by table. What was kept or read by `read_computed` in this run is used as well.
+        used: keys by kind. What was kept or read by `read_computed` in this run is used as well.
         """
         self.flush()
-        named = {table: frozenset(used.get(table, ())) for table in TABLES}
-        named[COMPUTED] |= self._used
-        idle: list[tuple[str, int, int, Name]] = []
+        named = {RUN: frozenset({""}), COMPUTED: self._used, **used}
         with faults_told(self.path):
-            for table in TABLES:
-                rows = self._database.execute(f"SELECT key, written, rowid, length(content) FROM {table}")
-                idle += [
-                    (str(when), row, size, (table, key)) for key, when, row, size in rows if key not in named[table]
-                ]
-        too_much = sum(size for _, _, size, _ in idle) - most
-        for _, _, n_bytes, (table, key) in sorted(idle):
+            rows = self._database.execute("SELECT kind, key, length(blob) FROM entries ORDER BY rowid").fetchall()
+        idle = [(kind, key, size) for kind, key, size in rows if key not in named.get(kind, ())]
+        too_much = sum(size for *_, size in idle) - most
+        for kind, key, size in idle:
             if too_much <= 0.0:
                 break
-            too_much -= n_bytes
-            self.forget(table, key)
-        self.remove_forgotten()
+            too_much -= size
+            self.forget(kind, key)
+        self.flush()
 
     def shrink(self) -> None:
         """Gives the room of what was removed back to the disk. A full disk only keeps the file larger."""
-        self._take(wait=True)
         with contextlib.suppress(StorageError), faults_told(self.path), uninterrupted():
             self._database.executescript("PRAGMA incremental_vacuum")
 
     def tick(self) -> None:
-        """Called many times a second: hands over to the writer what waits, without delay after a pause.
-
-        Raises
-        ------
-        StorageError
-            Where an earlier transaction has failed.
-        """
-        self._take()
-        late = time.monotonic() > self._written + SECONDS_A_TRANSACTION
-        if self._waiting and late and not self._writer.busy:
-            self._begin()
+        """Called many times a second: writes what waits, when it has waited long enough. Raises StorageError."""
+        if (self._waiting or not self._is_noted) and time.monotonic() > self._next_write:
+            self.flush()
 
     def flush(self) -> None:
-        """Waits until everything is on the disk. Raises StorageError."""
-        self._take(wait=True)
-        while self._waiting:
-            self._begin()
-            self._take(wait=True)
+        """Writes what waits, in one transaction. Raises StorageError; what waits then still waits."""
+        if not self._waiting and self._is_noted:
+            return
+        if not self._is_noted:
+            self._waiting[RUN, ""] = self._describe_run()
+        began = time.monotonic()
+        with uninterrupted(), faults_told(self.path):
+            if self.path.stat().st_ino != self._file:
+                raise FileNotFoundError(None, "another file has taken its place")
+            with transaction(self._database):
+                for (kind, key), blob in self._waiting.items():
+                    if blob is None:
+                        self._database.execute("DELETE FROM entries WHERE kind=? AND key=?", [kind, key])
+                    else:
+                        self._database.execute("INSERT OR REPLACE INTO entries VALUES (?, ?, ?)", [kind, key, blob])
+            self._waiting, self._n_bytes, self._is_noted = {}, 0, True
+        now = time.monotonic()
+        self._next_write = now + max(SECONDS_A_TRANSACTION, (now - began) / _SHARE_OF_WRITING)
 
     def close(self) -> None:
         """Writes what waits, as far as there is room, and closes the file. A new file without a study is removed."""
-        try:
-            # an error was said before, or there is nothing that waits for an answer
-            with contextlib.suppress(StorageError):
-                self.flush()
-        finally:
-            self._writer.close()
-            with contextlib.suppress(sqlite3.Error):
-                database.close(self._database, self.path)
-            if self._is_new and not any((*self._keys.values(), self._waiting, self._handed_over)):
-                # the run has ended before it began: the scene or the disk is at fault
-                with contextlib.suppress(OSError):
-                    self.path.unlink()
+        self._is_open, self._is_noted = False, False
+        # an error was said before, or there is nothing that waits for an answer
+        with contextlib.suppress(StorageError):
+            self.flush()
+        with contextlib.suppress(sqlite3.Error):
+            self._database.close()
+        if self._is_new and not any(keys for kind, keys in self._keys.items() if kind != RUN):
+            # the run has ended before it began: the scene or the disk is at fault
+            with contextlib.suppress(OSError):
+                self.path.unlink()
 
-    def _begin(self) -> None:
-        """Makes everything that waits a job of the idle writer."""
-        with uninterrupted():
-            self._handed_over, self._waiting, self._n_bytes = self._waiting, {}, 0.0
-            self._writer.begin(self._handed_over)
-            self._written = time.monotonic()
+    def _put(self, kind: str, key: str, blob: bytes) -> None:
+        self._waiting[kind, key] = blob
+        self._keys[kind].add(key)
+        self._n_bytes += len(blob)
 
-    def _take(self, *, wait: bool = False) -> None:
-        self._writer.take(self._accept, self._refuse, wait=wait)
-
-    def _accept(self, batch: Batch, _: None) -> None:
-        """Notes what is on the disk now."""
-        self._forgotten.difference_update(batch)
-        for (table, key), entry in batch.items():
-            if entry is None:
-                self._keys[table].discard(key)
-            else:
-                self._keys[table].add(key)
-        self._handed_over = {}
-
-    def _refuse(self, batch: Batch) -> None:
-        """Puts a failed batch back to those that wait."""
-        self._waiting, self._handed_over = batch | self._waiting, {}
-
-    def _write(self, batch: Batch) -> None:
-        """The job of the writer: one transaction with all of a batch, or nothing of it. Raises StorageError."""
-        now = datetime.now(UTC).isoformat(" ", "seconds")[:19]
-        with faults_told(self.path):
-            rows = [(*name, None if entry is None else row_of(name, entry, now)) for name, entry in batch.items()]
-            if self.path.stat().st_ino != self._file:
-                raise FileNotFoundError(None, "another file has taken its place")
-            with self._transaction():
-                for table, key, row in rows:
-                    if row is None:
-                        self._database.execute(f"DELETE FROM {table} WHERE key=?", [key])
-                    else:
-                        self._insert(table, row)
-
-    def _insert(self, table: str, row: Mapping[str, object]) -> None:
-        places = ", ".join("?" * len(row))
-        self._database.execute(
-            f"INSERT OR REPLACE INTO {table} ({', '.join(row)}) VALUES ({places})", list(row.values())
-        )
-
-    @contextlib.contextmanager
-    def _transaction(self) -> Iterator[None]:
-        self._database.execute("BEGIN IMMEDIATE")
-        try:
-            yield
-            self._database.execute("COMMIT")
-        except BaseException:
-            if self._database.in_transaction:
-                self._database.execute("ROLLBACK")
-            raise
-
-    def _read_keys(self) -> dict[str, set[str]]:
-        """Keys of all entries. Damaged ones, which only a fault of the disk leaves, are to be removed."""
-        keys: dict[str, set[str]] = {table: set() for table in TABLES}
-        for table in TABLES:
-            for key, sum_, content in self._database.execute(f"SELECT key, checksum, content FROM {table}"):
-                if database.is_whole(key, sum_, content):
-                    keys[table].add(key)
-                else:
-                    self._forgotten.add((table, key))
-        if self._forgotten:
-            number = len(self._forgotten)
-            self.notes.append(f"{self.path.name}: {number} damaged entries, which are computed again")
-        return keys
-
-    def _take_over(self, other: Path) -> None:
-        """Copies what another run has finished, on a file system without locks. Its file is left as it is."""
-        try:
-            with database.reading(other) as source, self._transaction():
-                database.check(source, create=False)
-                for table in TABLES:
-                    columns = database.columns(table)
-                    for values in source.execute(f"SELECT {', '.join(columns)} FROM {table}"):
-                        row = dict(zip(columns, values, strict=True))
-                        key = row["key"]
-                        if database.is_whole(key, row["checksum"], row["content"]) and key not in self._keys[table]:
-                            self._insert(table, row)
-                            self._keys[table].add(key)
-        except (DamagedError, NotPlainError, FileNotFoundError):
-            self.notes.append(f"{other.name} is not used: it is damaged, or another run writes it now")
+    def _describe_run(self) -> bytes:
+        noted = {
+            **self._study,
+            "run": f"process {os.getpid()} on {socket.gethostname()}",
+            "open": self._is_open,
+            "under_way": sorted(self._under_way),
+            "crashes": self.crashes,
+        }
+        return json.dumps(noted).encode()

@@ -116,8 +116,6 @@ class Dispatcher(Generic[Task]):
     - Tasks that make other tasks possible go first, unless enough tasks wait for all ranks: so the memory for waiting
       tasks is bounded.
     - Of the other tasks the longest go first, so that the ranks end together.
-    - Tasks that may have ended a rank come first of all, but not on rank 0, which all ranks need, while there is
-      another rank.
     """
 
     def __init__(self, n_ranks: int, costs: CostModel, clock: Callable[[], float]) -> None:
@@ -130,7 +128,6 @@ class Dispatcher(Generic[Task]):
         self._next_watch = self._began + WATCH_SECONDS
         self._openers: WaitingTasks[Task] = WaitingTasks(costs)
         self._others: WaitingTasks[Task] = WaitingTasks(costs)
-        self._suspects: WaitingTasks[Task] = WaitingTasks(costs)
         self._held: dict[int, _Held[Task]] = {}
         self._held_by: list[list[int]] = [[] for _ in range(n_ranks)]
         # Ranks that hold nothing, and those that may hold one more: the last is the next to get one.
@@ -141,7 +138,7 @@ class Dispatcher(Generic[Task]):
     @property
     def done(self) -> bool:
         """Whether no task waits and no task runs."""
-        return not self._held and self._n_waiting == 0 and not self._suspects
+        return not self._held and self._n_waiting == 0
 
     @property
     def wants_more(self) -> bool:
@@ -154,21 +151,11 @@ class Dispatcher(Generic[Task]):
             (self._openers if task.opens_others else self._others).add(self._n_known, task)
             self._n_known += 1
 
-    def add_lost(self, tasks: Iterable[Task]) -> None:
-        """Adds tasks of a lost rank; one of them may have ended the rank."""
-        for task in tasks:
-            self._suspects.add(self._n_known, task)
-            self._n_known += 1
-
     def assign(self) -> Iterator[tuple[int, Assignment[Task]]]:
         """Ranks that get a task now, and the tasks."""
         if self._n_measured >= max(_FEW_MEASURED, len(self._others) // _MEASURED_SHARE):
             self._n_measured = 0
             self._others.reorder()
-        only_0 = self._n_ranks - len(self._shunned - {0}) == 1
-        while self._suspects and (rank := next((rank for rank in self._free if rank or only_0), None)) is not None:
-            del self._free[rank]
-            yield rank, self._hold(rank, *self._suspects.pop())
         while self._free and self._n_waiting:
             rank, _ = self._free.popitem()
             assignment = self._hand_out(rank)
@@ -203,25 +190,6 @@ class Dispatcher(Generic[Task]):
             elif rank not in self._shunned:
                 self._free[rank] = None
         return task
-
-    def lose(self, rank: int) -> list[tuple[Task, int]]:
-        """Removes a lost rank. Returns its tasks, and the number of results that each still had to give."""
-        lost = []
-        for number in self._held_by[rank]:
-            held = self._held.pop(number)
-            if held.measurement is not None:
-                self._costs.forget(held.measurement)
-            lost.append((held.task, held.n_left))
-        self._held_by[rank] = []
-        self._shunned.discard(rank)
-        self._free.pop(rank, None)
-        self._ahead.pop(rank, None)
-        self._n_ranks -= 1
-        if len(self._shunned) == self._n_ranks:
-            # sick ones alone are left
-            self._free |= dict.fromkeys(rank for rank in self._shunned if not self._held_by[rank])
-            self._shunned.clear()
-        return lost
 
     def shun(self, rank: int) -> None:
         """Gives a faulty rank no more tasks, as long as there is another rank."""

@@ -3,24 +3,20 @@
 Only this module imports mpi4py, and only where a launcher is at work: `run-study` alone needs no MPI library. All MPI
 calls come from the main thread, so that any MPI library works (MPI_THREAD_FUNNELED).
 
-By hand: mpi4py needs an MPI library, and leaves lost ranks and signals to its user.
+By hand: mpi4py needs an MPI library, and leaves signals to its user. The loss of a rank ends all, as MPI has it.
 """
 
 from __future__ import annotations
 
 import contextlib
-import faulthandler
 import os
-import signal
 import sys
 import time
 import warnings
-from importlib import metadata
 from pathlib import Path
-from types import FrameType
-from typing import TYPE_CHECKING, NoReturn, Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from studyrunner.mpi.launcher import LauncherError, has_launcher, launcher_rank, launcher_size, load_packaged_library
+from studyrunner.mpi.launcher import LauncherError, has_launcher, launcher_size, load_packaged_library
 from studyrunner.system.endings import uninterrupted
 
 if TYPE_CHECKING:
@@ -32,14 +28,6 @@ POLL_SECONDS = 1e-3
 _SECONDS_TO_PRINT = 1.0
 _SHARED = "/dev/shm/mpich_shm_"
 _MANY_SENT = 64
-
-_TOLERANT = "OMPI_MCA_mpi_ft_enable"
-"""Variable that the launcher of Open MPI sets with --with-ft ulfm."""
-
-_SECONDS_TO_START = 120.0
-"""Longest time from the first rank that calls the library to the last, s. Ranks of a job start within seconds."""
-
-_SECONDS_TO_MISS_RANK_0 = 0.5
 
 _REMEDY = (
     "start run-study with the mpiexec of the environment it is installed in or, on a cluster, install mpi4py against"
@@ -56,11 +44,7 @@ class Ranks(Protocol):
 
     @property
     def size(self) -> int:
-        """Number of processes, lost ones included."""
-
-    @property
-    def lost(self) -> frozenset[int]:
-        """Processes that have ended before their time, as far as known here; empty where the loss of one ends all."""
+        """Number of processes."""
 
     def send(self, message: object, rank: int) -> None:
         """Sends without waiting for the receiver."""
@@ -89,7 +73,6 @@ class Alone:
 
     rank = 0
     size = 1
-    lost: frozenset[int] = frozenset()
 
     def send(self, message: object, rank: int) -> None:
         """There is no receiver: a call is a bug."""
@@ -111,8 +94,6 @@ class Alone:
 
 class MpiRanks:
     """All ranks of MPI's world. Raises ImportError or RuntimeError where mpi4py or an MPI library is missing."""
-
-    lost: frozenset[int] = frozenset()
 
     def __init__(self) -> None:
         import mpi4py
@@ -179,10 +160,7 @@ class MpiRanks:
         self._world.Abort(status)
 
     def _forget_sent(self) -> None:
-        self._sent = [request for request in self._sent if not self._is_through(request)]
-
-    def _is_through(self, request: MPI.Request) -> bool:
-        return request.Test()
+        self._sent = [request for request in self._sent if not request.Test()]
 
 
 def _unlink_shared_memory() -> None:
@@ -193,97 +171,6 @@ def _unlink_shared_memory() -> None:
             if _SHARED in line:
                 with contextlib.suppress(OSError):
                     Path(line[line.index(_SHARED) :]).unlink()
-
-
-class TolerantRanks(MpiRanks):
-    """MPI ranks where the end of one process does not end all: Open MPI 5 under `mpiexec --with-ft ulfm`.
-
-    MPI reports a lost process when it is asked for messages (ULFM, MPI 5). Messages to lost processes are dropped.
-    Without rank 0 the other ranks end.
-    """
-
-    def __init__(self) -> None:
-        # The library waits for ever for a process that is lost while it starts, and lets no other thread run.
-        speaks = launcher_rank() == 0
-        patience = _SECONDS_TO_START if speaks else _SECONDS_TO_START + 2.0 * _SECONDS_TO_PRINT
-        with Path(os.devnull).open("w", encoding="utf-8") as nobody:
-            faulthandler.dump_traceback_later(patience, exit=True, file=2 if speaks else nobody)
-            try:
-                super().__init__()
-            finally:
-                faulthandler.cancel_dump_traceback_later()
-        if self.rank > 0:
-            # In the midst of a long task as well, and in the main thread, as all calls of MPI.
-            signal.signal(signal.SIGALRM, self._look_after_rank_0)
-            signal.siginterrupt(signal.SIGALRM, False)
-            signal.setitimer(signal.ITIMER_REAL, _SECONDS_TO_MISS_RANK_0, _SECONDS_TO_MISS_RANK_0)
-
-    def send(self, message: object, rank: int) -> None:
-        """As in Ranks; a message to a lost process is dropped."""
-        if rank not in self.lost:
-            try:
-                super().send(message, rank)
-            except self._mpi.Exception as error:
-                self._note_lost(error)
-
-    def receive(self, rank: int | None = None) -> tuple[int, object] | None:
-        """As in Ranks."""
-        try:
-            return super().receive(rank)
-        except self._mpi.Exception as error:
-            self._note_lost(error)
-            return None
-
-    def close(self) -> None:
-        """As in Ranks."""
-        # Rank 0 may still write the result. The launcher has no status for its loss, if the others are gone by then.
-        if self.rank == 0:
-            for rank in range(1, self.size):
-                self.send(None, rank)
-        else:
-            wait_for_message(self)
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-        # MPI_Finalize sometimes waits for ever where a process is lost, of which not all need know. The launcher takes
-        # the exit status from processes that end without it as well.
-        self.flush()
-
-    def _is_through(self, request: MPI.Request) -> bool:
-        try:
-            return request.Test()
-        except self._mpi.Exception as error:
-            self._note_lost(error)
-            return True
-
-    def _look_after_rank_0(self, _number: int, _frame: FrameType | None) -> None:
-        try:
-            self._world.iprobe()
-        except self._mpi.Exception as error:
-            self._note_lost(error)
-
-    def _note_lost(self, error: MPI.Exception) -> None:
-        """Notes the lost processes that an error names. Raises any other error."""
-        if error.Get_error_class() not in (self._mpi.ERR_PROC_FAILED, self._mpi.ERR_PROC_FAILED_PENDING):
-            raise error
-        failed = self._world.Get_failed()
-        # Until then every look for a message tells of them again.
-        self._world.Ack_failed(failed.Get_size())
-        numbers = range(failed.Get_size())
-        self.lost |= set(self._mpi.Group.Translate_ranks(failed, numbers, self._world.Get_group()))
-        if 0 in self.lost:
-            self._end_without_rank_0()
-
-    def _end_without_rank_0(self) -> NoReturn:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        if any(rank not in self.lost for rank in range(self.rank)):
-            # One speaks for all; the launcher passes nothing on once another one has ended.
-            time.sleep(2.0 * _SECONDS_TO_MISS_RANK_0)
-        else:
-            line = (
-                "run-study: rank 0 is lost, which the others cannot do without: the same command goes on where it was"
-            )
-            print(line, file=sys.stderr, flush=True)
-        # Each by itself: MPI_Abort leaves processes behind here, and its status is not always that of the launcher.
-        os._exit(1)
 
 
 def start_ranks() -> Ranks:
@@ -298,7 +185,7 @@ def start_ranks() -> Ranks:
         return Alone()
     announced = launcher_size()
     try:
-        ranks = TolerantRanks() if _survives_losses() else MpiRanks()
+        ranks = MpiRanks()
     except (ImportError, RuntimeError, LauncherError) as error:
         if announced <= 1:
             return Alone()
@@ -307,14 +194,6 @@ def start_ranks() -> Ranks:
         ranks.close()
         raise LauncherError(f"{announced} processes were started, but MPI knows of {ranks.size} only: {_REMEDY}")
     return ranks
-
-
-def _survives_losses() -> bool:
-    """Whether the launcher keeps the other ranks when a process is lost, and mpi4py can report the loss."""
-    if os.environ.get(_TOLERANT, "0").lower() not in ("1", "true"):
-        return False
-    version = tuple(int(part) for part in metadata.version("mpi4py").split(".")[:2])
-    return version >= (4, 1)
 
 
 def wait_for_message(ranks: Ranks) -> object:

@@ -4,12 +4,11 @@ A task has one result or several; each result is handed on at once. A long task 
 so that another run can continue from there. Rank 0 computes as well: the main thread sends tasks and receives results,
 a second thread computes. `dispatch` decides which rank gets which task.
 
-By hand: in the pools of mpi4py and schwimmbad a task has one result, no progress, and ends with the rank that has it.
+By hand: in the pools of mpi4py and schwimmbad a task has one result and no progress.
 """
 
 from __future__ import annotations
 
-import ctypes
 import itertools
 import queue
 import threading
@@ -75,8 +74,9 @@ def _work(
     run: Run[Task, Result],
     send: Callable[[object], None],
     seconds_to_progress: float,
+    check: Callable[[], None] = raise_ending,
 ) -> None:
-    """Sends the results of a task, each as soon as it is there."""
+    """Sends the results of a task, each as soon as it is there. check: raises KeyboardInterrupt where the run ends."""
     task = assignment.task
     wrong = ValueError(f"not {task.n_results} results from {task}")
     n_given = 0
@@ -84,7 +84,7 @@ def _work(
     sent = dict.fromkeys((True, False), began)
 
     def keep(progress: object) -> None:
-        raise_ending()
+        check()
         in_words, now = isinstance(progress, str), time.perf_counter()
         # a task that has given all its results has no progress
         if n_given < task.n_results and now > sent[in_words] + (SECONDS_TO_WORDS if in_words else seconds_to_progress):
@@ -135,35 +135,23 @@ class _LocalWorker(Generic[Task, Result]):
         self.receive(0.0)
 
     def give_up(self) -> None:
-        """Ends the thread without its results, as soon as the running call of a library returns.
-
-        Until then each call of the main thread may wait for the interpreter as long as such a call takes.
-        """
+        """Ends the thread without its results, at the next step of its task."""
         self._ended = True
-        if self._thread.ident is not None:
-            number, error = ctypes.c_ulong(self._thread.ident), ctypes.py_object(KeyboardInterrupt)
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(number, error)
 
     def _compute(self) -> None:
         try:
             while (assignment := self._waiting.get()) is not None:
-                _work(assignment, self._run, self._send, self._seconds_to_progress)
+                _work(assignment, self._run, self._send, self._seconds_to_progress, self._check)
         except BaseException as error:  # handed to the main thread, which raises it
             self._sent.put(error)
 
-    def _send(self, message: object) -> None:
+    def _check(self) -> None:
         if self._ended:
             raise KeyboardInterrupt
+
+    def _send(self, message: object) -> None:
+        self._check()
         self._sent.put(message)
-
-
-TakeBack = Callable[[int, Sequence[tuple[Task, int]]], Iterable[Task]]
-"""Tasks that are done in place of the tasks of a lost rank; the number is that of results still to come."""
-
-
-def give_again(_rank: int, lost: Sequence[tuple[Task, int]]) -> list[Task]:
-    """The tasks of a lost rank, which begin anew."""
-    return [task for task, _ in lost]
 
 
 @dataclass(frozen=True)
@@ -174,7 +162,6 @@ class Handlers(Generic[Task, Result]):
         result makes possible.
     tick: called many times a second with a function that returns the running tasks, as `Dispatcher.running`.
     keep: called with a task and its progress, or words on its progress; never after the last result of the task.
-    take_back: called with a lost rank and the tasks that it had; returns the tasks to be done instead.
     is_sick: whether a result of a rank shows that the rank should get no more tasks.
     prepare: the task as a rank gets it; called once for each task that is sent, in the order of sending.
     """
@@ -182,7 +169,6 @@ class Handlers(Generic[Task, Result]):
     take: Callable[[Task, Result], Iterable[Task]]
     tick: Callable[[Callable[[], Sequence[tuple[Task, int, float]]]], None] = lambda _: None
     keep: Callable[[Task, object], None] = lambda *_: None
-    take_back: TakeBack[Task] = give_again
     is_sick: Callable[[int, Result], bool] = lambda *_: False
     prepare: Callable[[int, Task], Task] = lambda _, task: task
 
@@ -245,7 +231,6 @@ class _Server(Generic[Task, Result]):
         self._handlers = handlers
         self._dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
         self._local = _LocalWorker(run, _seconds_to_progress(ranks))
-        self._lost: frozenset[int] = frozenset()
 
     @property
     def done(self) -> bool:
@@ -254,13 +239,10 @@ class _Server(Generic[Task, Result]):
 
     def begin(self) -> None:
         """Sends the first tasks."""
-        self._do_without_the_lost()
         self._hand_out()
 
     def look(self) -> None:
         """Receives what there is; waits a moment where there is nothing."""
-        if self._ranks.lost != self._lost:
-            self.begin()
         quiet = False
         for _ in range(_LOOKS_A_TICK):
             received, message = self._ranks.receive(), self._local.receive(0.0)
@@ -297,15 +279,7 @@ class _Server(Generic[Task, Result]):
             else:
                 self._ranks.send(assignment, rank)
 
-    def _do_without_the_lost(self) -> None:
-        new, self._lost = self._ranks.lost - self._lost, self._ranks.lost
-        for rank in sorted(new):
-            self._dispatcher.add_lost(self._handlers.take_back(rank, self._dispatcher.lose(rank)))
-
     def _accept(self, rank: int, message: object) -> None:
-        if rank in self._lost:
-            # sent before the rank was lost; its task is done again
-            return
         if isinstance(message, _Progress):
             self._handlers.keep(self._dispatcher.task(message.number), message.progress)
             return

@@ -6,10 +6,8 @@ By hand: mpi4py exchanges messages between ranks of any versions.
 from __future__ import annotations
 
 import hashlib
-import os
 import platform
 import time
-from dataclasses import dataclass
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,19 +22,6 @@ _REMEDY = "install the same software for all ranks"
 _PACKAGES = ("fretwear", "numba", "numpy", "scipy")
 _SOURCE = "source of run-study"
 _SOURCES = ("solver", "studies", "studyrunner")
-
-
-@dataclass(frozen=True)
-class Machine:
-    """Machine of a rank.
-
-    host: name of the machine.
-    boot, processes: tell machines with the same name, and containers, apart.
-    """
-
-    host: str
-    boot: str
-    processes: str
 
 
 def describe_software() -> dict[str, str]:
@@ -56,28 +41,12 @@ def describe_software() -> dict[str, str]:
 
 
 def report_version(ranks: Ranks) -> None:
-    """Any other rank: tells rank 0 its machine and versions."""
-    ranks.send((describe_machine(), describe_software()), 0)
+    """Any other rank: tells rank 0 the name of its machine and its versions."""
+    ranks.send((platform.node(), describe_software()), 0)
 
 
-def describe_machine() -> Machine:
-    """Machine of this process. Ranks of the same machine see each other's processes."""
-    try:
-        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
-        processes = Path("/proc/self/ns/pid").readlink().as_posix()
-    except OSError:
-        # no such system: each is alone
-        boot, processes = "", str(os.getpid())
-    return Machine(platform.node(), boot, processes)
-
-
-def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> dict[int, Machine]:
+def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> None:
     """Rank 0: compares the versions of all ranks.
-
-    Returns
-    -------
-    dict of int, Machine
-        Machine of each rank.
 
     Raises
     ------
@@ -86,36 +55,31 @@ def check_versions(ranks: Ranks, seconds: float = SECONDS_TO_ANSWER) -> dict[int
     KeyboardInterrupt
         Where another rank was interrupted.
     """
-    machines = {0: describe_machine()}
     if ranks.size == 1:
-        return machines
+        return
     own = describe_software()
     silent = set(range(1, ranks.size))
     differences = {}
     latest = time.monotonic() + seconds
-    while silent - ranks.lost:
+    while silent:
         received = ranks.receive()
         if received is None:
             if time.monotonic() > latest:
-                raise LauncherError(
-                    f"rank {min(silent - ranks.lost)} has not said within {seconds:.0f} s what it runs: {_REMEDY}"
-                )
+                raise LauncherError(f"rank {min(silent)} has not said within {seconds:.0f} s what it runs: {_REMEDY}")
             time.sleep(POLL_SECONDS)
             continue
         rank, said = received
         match said:
-            case (Machine() as machine, dict(software)):
+            case (str(host), dict(software)):
                 silent.discard(rank)
-                machines[rank] = machine
                 if software != own:
-                    differences[rank] = _difference(own, machine.host, software)
+                    differences[rank] = _difference(own, host, software)
             case _:
                 raise KeyboardInterrupt
     if differences:
         first = min(differences)
         more = f" (and {len(differences) - 1} more)" if len(differences) > 1 else ""
         raise LauncherError(f"rank {first}{more} {differences[first]}: {_REMEDY}")
-    return machines
 
 
 def _difference(own: dict[str, str], host: str, other: dict[str, str]) -> str:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from studyrunner.system.files import create, leftovers, new_partial, sync
 from studyrunner.user_error import UserError
 
-_SECONDS_TO_WRITE = 86400.0  # no run is at one file for so long
 _TRIAL = bytes(4096)  # a full disk has room for a name
 _STREAMS = (0, 1, 2)
 
@@ -94,29 +92,17 @@ def try_to_create(path: Path) -> None:
             trial.unlink()
 
 
-def remove_leftovers(path: Path, *, alone: bool) -> None:
-    """Removes temporary files of `path` that killed runs have left.
-
-    Parameters
-    ----------
-    alone
-        Whether no other run writes this file; else only old files are removed.
-    """
+def remove_leftovers(path: Path) -> None:
+    """Removes temporary files of `path` that killed runs have left. No other run may be at work there."""
     for found in leftovers(path):
-        # the file may have gone meanwhile, and one that stays is no harm
+        # one that stays is no harm
         with contextlib.suppress(OSError):
-            if alone or time.time() - found.stat().st_mtime > _SECONDS_TO_WRITE:
-                found.unlink()
+            found.unlink()
 
 
 def progress_file(path: Path) -> Path:
     """File of what is computed so far of the result file `path`."""
     return path.with_name(f"{path.name}.progress")
-
-
-def crash_folder(path: Path) -> Path:
-    """Folder of the notes on crashes beside the result file `path`; empty folders are removed at the end of a run."""
-    return path.with_name(f"{path.name}.crashes")
 
 
 def older_folder(path: Path) -> Path:

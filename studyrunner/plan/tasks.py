@@ -22,7 +22,7 @@ from studyrunner.scene.drawn_contacts import ContactChange
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-    from studyrunner.mpi.shared_memory import Address
+    from studyrunner.mpi.mapped_file import MappedFile
 
 BRANCHES, MARCHES, RESTING = "branch", "march", "march without motion"
 """Most general keys of tasks in the cost model."""
@@ -61,7 +61,7 @@ class BranchTask:
         that start from them.
     resume: progress of an earlier run; None to begin with the first frequency.
     key: hash of the branch in the file of the run.
-    models: reduced models of `scenes`, or where they are in shared memory, for a rank that does not have them.
+    models: reduced models of `scenes`, or files with them, for a rank that does not have them.
     """
 
     number: int
@@ -76,7 +76,7 @@ class BranchTask:
     known: frozenset[int] = frozenset()
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
-    models: tuple[ReducedModel | Address, ...] = field(default=(), compare=False, repr=False)
+    models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def scenes(self) -> tuple[int, ...]:
@@ -164,7 +164,7 @@ class MarchTask:
     start: start state; None until the branch has reached it.
     resume: progress of an earlier run; None to begin with the start state.
     key: hash of the task in the file of the run.
-    models: reduced models of `scenes`, or where they are in shared memory, for a rank that does not have them.
+    models: reduced models of `scenes`, or files with them, for a rank that does not have them.
     """
 
     number: int
@@ -191,7 +191,7 @@ class MarchTask:
     start: Packed | None = field(default=None, compare=False, repr=False)
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
-    models: tuple[ReducedModel | Address, ...] = field(default=(), compare=False, repr=False)
+    models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def scenes(self) -> tuple[int, ...]:

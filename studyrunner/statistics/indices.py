@@ -1,56 +1,37 @@
-"""First and total Sobol' indices: which share of the variance an input decides, alone and with the others.
+"""What each input decides: Sobol' indices of a Saltelli design, rank correlations of any other one.
 
-By hand: `scipy.stats.sobol_indices`, which is used, has no bands and takes neither other designs nor gaps.
+By hand: `scipy.stats.sobol_indices`, which is used, takes no samples without a value, and `scipy.stats.spearmanr` gives
+no interval.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import norm, sobol_indices
+from scipy.stats import norm, rankdata, sobol_indices
 
 from studyrunner.scatter.design import SaltelliLayout
-from studyrunner.statistics import expansion
 from studyrunner.statistics.bands import Array, Band, SampleValues
+
+FEWEST = 10
+"""Samples, or base samples of a Saltelli design, below which nothing is said: the interval of a rank correlation covers
+what it should from 10 samples on (Bonett and Wright 2000)."""
+
+SOBOL = "Saltelli et al. 2010, scipy.stats.sobol_indices; interval by bootstrap of the base samples"
+RANKS = "Spearman's rank correlation; interval by Fisher's transformation (Bonett and Wright 2000)"
 
 _RESAMPLES = 50
 _SEED = 1
-_FEWEST = 8
-"""Samples below which no index is told."""
 _ROUND_OFF = 1e-12
 """Share of a value by which samples differ that are equal."""
 
-_Rows = NDArray[np.intp]
-_Estimate = Callable[[Array, _Rows], Array]
-"""From values (n_points, n) and some of the samples to (first or total, value or low or high, n_points, d)."""
+_Estimate = Callable[[Array], tuple[Array, Array, Array]]
+"""From values (n_points, n) to (..., n_points, d): estimates and the ends of their intervals."""
 
 
-@dataclass(frozen=True)
-class Indices:
-    """Sobol' indices, bands of shape (..., n_inputs) between 0 and 1; NaN where nothing varies or samples are too few.
-
-    first_method, total_method: name of the estimate, with its source.
-    """
-
-    first: Band
-    total: Band
-    first_method: str
-    total_method: str
-
-
-def plain_indices(inputs: Array, values: SampleValues, confidence: float, balanced: NDArray[np.bool_]) -> Indices:
-    """Indices from samples of any design.
-
-    First ones by classes of equal size (Plischke, Borgonovo and Smith 2013), total ones by a polynomial chaos
-    expansion (Sudret 2008), whose interval holds what the expansion leaves unexplained. Standard errors are those of
-    halves of the samples, drawn without replacement (delete-half jackknife, Shao and Wu 1989).
-
-    A sample without a value is taken between its bounds, and not above the largest of the others. The ends of a band
-    are those of 2 + 3 d cases: all low, all high; and for each input low below its median and high above, the
-    reverse, and the mean of the samples near in this input.
+def rank_correlations(inputs: Array, values: SampleValues, confidence: float) -> Band:
+    """Rank correlations (..., d) between -1 and 1; NaN where nothing varies or samples are too few.
 
     Parameters
     ----------
@@ -60,129 +41,102 @@ def plain_indices(inputs: Array, values: SampleValues, confidence: float, balanc
         (..., n), the quantity that is decided.
     confidence
         Of the intervals, between 0 and 1.
-    balanced
-        (d,), whether an input is a column of a Sobol' sequence: its classes are then even in the other inputs, and
-        what independent samples add to the variance between classes is not taken off.
     """
     n = len(inputs)
-    rng = np.random.default_rng(_SEED)
+    of_inputs = _normed_ranks(inputs.T)
 
-    def estimate(y: Array, rows: _Rows) -> Array:
-        y = y[:, rows]
-        first = _given_data(inputs[rows], y, balanced)
-        total, unexplained = expansion.expand(inputs[rows], y)
-        low = total * (1.0 - unexplained[:, None])
-        return np.array([[first, first, first], [total, low, low + unexplained[:, None]]])
+    def estimate(y: Array) -> tuple[Array, Array, Array]:
+        found = np.clip(_normed_ranks(y) @ of_inputs.T, -1.0, 1.0)
+        margin = norm.ppf(0.5 + 0.5 * confidence) * np.sqrt((1.0 + 0.5 * found**2) / (n - 3.0))
+        # that of 1 is infinite: the largest of other ranks, with two neighbours exchanged
+        most = 1.0 - 12.0 / (n**3 - n)
+        middle = np.arctanh(np.clip(found, -most, most))
+        low, high = np.tanh(middle - margin), np.tanh(middle + margin)
+        return found, np.minimum(low, found), np.maximum(high, found)
 
-    halves = (np.sort(rng.permutation(n)[: n // 2]) for _ in range(_RESAMPLES))
-    first, total = _bands(estimate, halves, inputs, values, confidence)
-    return Indices(first, total, "classes of equal size (Plischke et al. 2013)", expansion.NAME)
+    if n < FEWEST:
+        return _nothing(values, inputs.shape[1])
+    return _band(estimate, inputs, values)
 
 
-def saltelli_indices(layout: SaltelliLayout, inputs: Array, values: SampleValues, confidence: float) -> Indices:
-    """Indices by `scipy.stats.sobol_indices` (Saltelli et al. 2010), standard errors by bootstrap of base samples.
+def saltelli_indices(
+    layout: SaltelliLayout, inputs: Array, values: SampleValues, confidence: float
+) -> tuple[Band, Band]:
+    """First and total indices (..., d): the share of the variance that an input decides alone, and with the others.
 
-    inputs (n, d), values (..., n): as for `plain_indices`; layout: which of the n rows is what.
+    layout: which of the n rows is what; else as `rank_correlations`.
     """
     n_base = len(inputs) // layout.rows_per_base
+    if n_base < FEWEST:
+        return _nothing(values, inputs.shape[1]), _nothing(values, inputs.shape[1])
     rng = np.random.default_rng(_SEED)
     blocks = np.arange(len(inputs)).reshape(n_base, -1)
+    resampled = [blocks[rng.integers(n_base, size=n_base)].ravel() for _ in range(_RESAMPLES)]
 
-    def estimate(y: Array, rows: _Rows) -> Array:
+    def at(y: Array, which: int) -> Array:
         # scipy takes off dimensions of length 1: there are at least two points
-        f_A, f_B, f_AB = layout.split(np.vstack([y, y[:1]])[:, rows])
+        f_A, f_B, f_AB = layout.split(np.vstack([y, y[:1]]))
         found = sobol_indices(func={"f_A": f_A, "f_B": f_B, "f_AB": f_AB}, n=n_base)
-        both = np.stack([found.first_order, found.total_order]).reshape(2, len(y) + 1, -1)[:, :-1]
-        return np.repeat(both[:, None], 3, axis=1)
+        both = (found.first_order, found.total_order)
+        return np.asarray(both[which].reshape(len(y) + 1, -1)[:-1])
 
-    resampled = (blocks[rng.integers(n_base, size=n_base)].ravel() for _ in range(_RESAMPLES))
-    first, total = _bands(estimate, resampled, inputs, values, confidence)
-    return Indices(first, total, *["Saltelli et al. 2010, scipy.stats.sobol_indices"] * 2)
+    def of(which: int) -> Band:
+        def estimate(y: Array) -> tuple[Array, Array, Array]:
+            found = at(y, which)
+            spread = np.std([at(y[:, rows], which) for rows in resampled], axis=0)
+            margin = norm.ppf(0.5 + 0.5 * confidence) * spread
+            return tuple(np.clip(each, 0.0, 1.0) for each in (found, found - margin, found + margin))  # type: ignore[return-value]
 
+        return _band(estimate, inputs, values)
 
-def _given_data(inputs: Array, values: Array, balanced: NDArray[np.bool_]) -> Array:
-    """Variance between classes over the whole: (n_points, d). With M classes of n samples, independent samples add
-    M - 1 times the variance within classes over n - M.
-    """
-    n = values.shape[1]
-    starts = _class_starts(n)
-    n_classes, sizes = len(starts), np.diff(np.append(starts, n))
-    centred = values - values.mean(axis=1, keepdims=True)
-    whole = np.maximum((centred**2).sum(axis=1), np.finfo(np.float64).tiny)
-    found = np.zeros((len(values), inputs.shape[1]))
-    for column, each in enumerate(inputs.T):
-        if np.ptp(each) > 0.0:
-            sums = np.add.reduceat(centred[:, np.argsort(each, kind="stable")], starts, axis=1)
-            within = 1.0 - (sums**2 / sizes).sum(axis=1) / whole
-            found[:, column] = 1.0 - within * (1.0 if balanced[column] else (n - 1) / (n - n_classes))
-    return found
+    return of(0), of(1)
 
 
-def _class_starts(n: int) -> _Rows:
-    """First ranks of the classes of n samples: about as many classes as there are samples in two of them."""
-    n_classes = 2 ** int(0.5 * np.log2(2 * n))
-    return np.asarray(np.arange(n_classes) * n // n_classes)
+def _normed_ranks(values: Array) -> Array:
+    """Ranks (..., n) less their mean, with a sum of squares of 1; 0 for equal values."""
+    ranks = rankdata(values, axis=-1)
+    ranks -= ranks.mean(axis=-1, keepdims=True)
+    length = np.sqrt((ranks**2).sum(axis=-1, keepdims=True))
+    return np.asarray(np.divide(ranks, length, out=np.zeros_like(ranks), where=length > 0.0))
 
 
-def _bands(
-    estimate: _Estimate, resamples: Iterator[_Rows], inputs: Array, values: SampleValues, confidence: float
-) -> tuple[Band, Band]:
-    """Bands of the first and of the total indices."""
-    shape, n = values.low.shape[:-1], values.n_samples
-    if n < _FEWEST:
-        nothing = np.full((*shape, inputs.shape[1]), np.nan)
-        return Band(*[nothing] * 6), Band(*[nothing] * 6)
+def _band(estimate: _Estimate, inputs: Array, values: SampleValues) -> Band:
+    """The band of an estimate over all that samples without a value may be."""
+    n, shape = values.n_samples, values.low.shape[:-1]
 
-    def at(rows: _Rows, cases: Array) -> Array:
-        found = estimate(cases.reshape(-1, n), rows)
-        return found.reshape(2, 3, *cases.shape[:-1], -1)
+    def ends(cases: Array) -> tuple[Array, Array, Array, Array]:
+        """Lowest and highest estimate, and outer ends of the intervals, of cases (n_cases, n_points, n)."""
+        varies = np.ptp(cases, axis=-1) > _ROUND_OFF * np.abs(cases).max(axis=-1)
+        found = [each.reshape(*cases.shape[:-1], -1) for each in estimate(cases.reshape(-1, n))]
+        value, low, high = (np.where(varies[..., None], each, np.nan) for each in found)
+        pairs = ((np.fmin, value), (np.fmax, value), (np.fmin, low), (np.fmax, high))
+        return tuple(end.reduce(each, axis=0).reshape(*shape, -1) for end, each in pairs)
 
-    cases, widened = _cases(values, inputs), _cases(values, inputs, with_error=True)
-    varies = np.ptp(cases, axis=-1) > _ROUND_OFF * np.abs(cases).max(axis=-1)
-    value, low, high = np.moveaxis(np.where(varies[..., None], at(np.arange(n), cases), np.nan), 1, 0)
-    spread = np.std([at(rows, cases)[:, 0] for rows in resamples], axis=0)
-    margin = norm.ppf(0.5 + 0.5 * confidence) * spread
-    error = np.where(varies.any(axis=0)[:, None], at(np.arange(n), widened)[:, 0], np.nan)
-
-    def of(which: int, samples: Array, end: np.ufunc) -> Array:
-        found: Array = end.reduce(samples[which], axis=0).reshape(*shape, -1)
-        return np.clip(found, 0.0, 1.0)
-
-    first, total = (
-        Band(
-            of(which, value, np.fmin),
-            of(which, value, np.fmax),
-            of(which, low - margin, np.fmin),
-            of(which, high + margin, np.fmax),
-            of(which, error, np.fmin),
-            of(which, error, np.fmax),
-        )
-        for which in range(2)
-    )
-    return first, total
+    lowest, highest, low, high = ends(_cases(values, inputs))
+    error_low, error_high, *_ = ends(_cases(values, inputs, with_error=True))
+    return Band(lowest, highest, low, high, error_low, error_high)
 
 
 def _cases(values: SampleValues, inputs: Array, *, with_error: bool = False) -> Array:
-    """Cases (n_cases, n_points, n) of what the samples may be; one where each has a value and no error is asked for."""
+    """Cases (n_cases, n_points, n) of what the samples may be; one where each has a value and no error is asked for.
+
+    A sample without a value is between its bounds, and not above the largest of the others. The cases: all low, all
+    high; and for each input as far as the bounds allow in the order of this input, and in the reverse.
+    """
     low, high = (each.reshape(-1, values.n_samples) for each in (values.low, values.high))
-    largest = np.where(low == high, high, low).max(axis=-1, keepdims=True)
+    known = low == high
+    largest = np.where(known, high, low).max(axis=-1, keepdims=True)
     high = np.minimum(high, np.maximum(largest, low))
     if with_error:
         error = np.minimum(values.error.reshape(low.shape), np.abs(largest))
         low, high = low - error, high + error
     elif np.array_equal(low, high):
         return low[None]
-    sides = inputs > np.median(inputs, axis=0)
-    cases = [low, high, *(np.where(side, a, b) for side in sides.T for a, b in ((low, high), (high, low)))]
-    cases += [np.clip(_class_means(each, low, values.is_known.reshape(low.shape)), low, high) for each in inputs.T]
-    return np.stack(cases)
+    typical = np.where(known | ~known.any(axis=-1, keepdims=True), 0.5 * (low + high), np.nan)
+    place = (rankdata(inputs, axis=0) - 0.5) / values.n_samples
+    orders = [np.nanquantile(typical, each, axis=-1).T for column in place.T for each in (column, 1.0 - column)]
+    return np.stack([low, high, *(np.clip(order, low, high) for order in orders)])
 
 
-def _class_means(each: Array, values: Array, known: NDArray[np.bool_]) -> Array:
-    """Mean of the samples with a value that are of the same class of an input, (n_points, n)."""
-    order, starts = np.argsort(each, kind="stable"), _class_starts(len(each))
-    sums = np.add.reduceat(np.where(known, values, 0.0)[:, order], starts, axis=1)
-    counts = np.add.reduceat(known[:, order], starts, axis=1, dtype=np.intp)
-    means = np.empty(values.shape)
-    means[:, order] = np.repeat(sums / np.maximum(counts, 1), np.diff(np.append(starts, len(each))), axis=1)
-    return means
+def _nothing(values: SampleValues, n_inputs: int) -> Band:
+    return Band(*[np.full((*values.low.shape[:-1], n_inputs), np.nan)] * 6)

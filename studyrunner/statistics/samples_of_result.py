@@ -61,13 +61,6 @@ def inputs_of(dataset: xr.Dataset) -> dict[str, Array]:
     return {name: each.mean([d for d in each.dims if d != SAMPLE]).values for name, each in drawn.items()}
 
 
-def is_column(dataset: xr.Dataset, name: str) -> bool:
-    """Whether the drawn values of an input are one column of a Sobol' sequence."""
-    section = scatter_of(dataset)
-    sobol = section is None or section.method == "sobol"
-    return sobol and dataset[f"{_DRAWN}{name}"].dims == (SAMPLE,)
-
-
 def is_of_pairs(dataset: xr.Dataset, name: str) -> bool:
     """Whether an input has a draw for each contact pair, or for each surface."""
     return "contact" in dataset[f"{_DRAWN}{name}"].dims

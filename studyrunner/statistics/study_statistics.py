@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.scatter.design import SaltelliLayout
 from studyrunner.statistics.bands import Array, Band, SampleValues
-from studyrunner.statistics.indices import plain_indices, saltelli_indices
+from studyrunner.statistics.indices import FEWEST, RANKS, SOBOL, rank_correlations, saltelli_indices
 from studyrunner.statistics.quantiles import exceedance, mean, quantile
 from studyrunner.statistics.samples_of_result import (
     CYCLE,
@@ -20,7 +20,6 @@ from studyrunner.statistics.samples_of_result import (
     counted,
     depth_samples,
     inputs_of,
-    is_column,
     is_of_pairs,
     scatter_of,
     volume_samples,
@@ -63,8 +62,9 @@ def worn_volume_statistics(
     Returns
     -------
     xr.Dataset
-        worn_volume_quantile, worn_volume_mean (m3), worn_volume_exceedance, wear_depth_exceedance, first_index,
-        total_index (1), each with _interval and _error; n_samples, n_without_value; of the last count
+        worn_volume_quantile, worn_volume_mean (m3), worn_volume_exceedance, wear_depth_exceedance, and of each input
+        first_index and total_index (1) with saltelli, else rank_correlation (1), each with _interval and _error;
+        n_samples, n_without_value; of the last count
         worn_volume_density (1/m3) over worn_volume_grid (m3), group_size (2), group_gap (m3, two ends; NaN for one
         group), deciding_contact (-1: none), deciding_depth (m).
 
@@ -142,9 +142,7 @@ def _axis(name: str, values: Sequence[Any] | Array, units: str, long_name: str) 
 def _band_arrays(
     name: str, long_name: str, units: str, band: Band, dims: list[Hashable], axis: xr.DataArray | None = None
 ) -> dict[str, xr.DataArray]:
-    """NAME, NAME_interval and NAME_error; no quantity here is below 0. axis: of the last dimension, if it is no axis
-    of the result.
-    """
+    """NAME, NAME_interval and NAME_error. axis: of the last dimension, if it is no axis of the result."""
     coordinates = {} if axis is None else dict(axis.coords)
     found = {}
     for suffix, low, high, words in (
@@ -152,7 +150,10 @@ def _band_arrays(
         ("_interval", band.interval_low, band.interval_high, ", confidence interval"),
         ("_error", band.error_low, band.error_high, ", with numerical error"),
     ):
-        ends = np.maximum(np.stack([low, high], axis=-1), 0.0)
+        ends = np.stack([low, high], axis=-1)
+        if not name.endswith("correlation"):
+            # no other quantity here is below 0
+            ends = np.maximum(ends, 0.0)
         array = _array(ends, [*dims, *coordinates, _BOUND], units, long_name + words)
         found[name + suffix] = array.assign_coords({**coordinates, _BOUND: list(_BOUNDS)})
     return found
@@ -165,27 +166,27 @@ def _index_arrays(
     confidence: float,
     dims: list[Hashable],
 ) -> dict[str, xr.DataArray]:
-    """First and total indices; none where nothing scatters."""
+    """What each input decides; nothing where nothing scatters."""
     inputs = inputs_of(dataset)
     if not inputs:
         return {}
     table = np.stack(list(inputs.values()), axis=1)
-    if layout is None:
-        columns = np.array([is_column(dataset, name) for name in inputs])
-        indices = plain_indices(table, values, confidence, columns)
-        comment = "NaN for an input with a draw for each pair: the method saltelli tells what all of them decide."
-    else:
-        indices = saltelli_indices(layout, table, values, confidence)
-        comment = "Of an input with a draw for each pair: what all of them decide together."
     axis = _axis("input", list(inputs), "1", "input that scatters")
-    words = "share of the variance that the input decides"
-    found = _band_arrays("first_index", f"{words} alone", "1", indices.first, dims, axis)
-    found |= _band_arrays("total_index", f"{words}, with the others", "1", indices.total, dims, axis)
-    for name, array in found.items():
-        method = indices.first_method if name.startswith("first") else indices.total_method
-        array.attrs |= {"method": method, "comment": comment}
-        if layout is None:
-            found[name] = array.where(xr.DataArray([not is_of_pairs(dataset, each) for each in inputs], dims="input"))
+    if layout is None:
+        method, comment = RANKS, "Of an input with a draw for each pair nothing is said; the method saltelli does."
+        words = "rank correlation of the worn volume with the input"
+        band = rank_correlations(table, values, confidence)
+        found = _band_arrays("rank_correlation", words, "1", band, dims, axis)
+        of_one_draw = xr.DataArray([not is_of_pairs(dataset, each) for each in inputs], dims="input")
+        found = {name: array.where(of_one_draw) for name, array in found.items()}
+    else:
+        method, comment = SOBOL, "Of an input with a draw for each pair: what all of them decide together."
+        words = "share of the variance that the input decides"
+        first, total = saltelli_indices(layout, table, values, confidence)
+        found = _band_arrays("first_index", f"{words} alone", "1", first, dims, axis)
+        found |= _band_arrays("total_index", f"{words}, with the others", "1", total, dims, axis)
+    for array in found.values():
+        array.attrs |= {"method": method, "comment": comment, "fewest": FEWEST}
     return found
 
 

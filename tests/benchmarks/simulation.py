@@ -49,6 +49,11 @@ class MemoryIndex:
         del march
         return False
 
+    def is_suspect(self, key: str) -> bool:
+        """None is."""
+        del key
+        return False
+
     def known_starts(self, branch: BranchTask) -> list[StartResult]:
         """None is known."""
         del branch

@@ -248,22 +248,10 @@ def memory_of_mapping(name: str) -> dict[str, int]:
     return found
 
 
-def processes_may_share() -> bool:
-    """Whether the system lets one process map the memory of another one; where it does not, each has its own copy."""
-    if not hasattr(os, "memfd_create"):
-        return False
-    descriptor = os.memfd_create("test", os.MFD_CLOEXEC)
-    try:
-        opening = f"open('/proc/{os.getpid()}/fd/{descriptor}', 'rb')"
-        return subprocess.run([sys.executable, "-c", opening], capture_output=True, check=False).returncode == 0
-    finally:
-        os.close(descriptor)
-
-
-def count_rows(table: str, result: Path = Path("out.nc")) -> int:
-    """Number of rows of a table in the progress of a result, also of a run that is at work."""
+def count_entries(kind: str, result: Path = Path("out.nc")) -> int:
+    """Number of entries of a kind in the progress of a result, also of a run that is at work."""
     address = f"file:{result}.progress?mode=ro&immutable=1"
     with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(address, uri=True)) as database:
-        (number,) = database.execute(f"SELECT count(*) FROM {table}").fetchone()
+        (number,) = database.execute("SELECT count(*) FROM entries WHERE kind=?", [kind]).fetchone()
         return int(number)
     return 0

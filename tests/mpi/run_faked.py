@@ -61,6 +61,8 @@ def build_fake(model: object, *_: object) -> Callable[..., Iterator[StartResult 
                 if not left:
                     return
                 if in_branch and started.position == 3:
+                    # what was given before is on the disk by then
+                    time.sleep(1.0)
                     end_process(crash)
                 if place < gone_on_from(task):
                     continue

@@ -14,10 +14,10 @@ STUDY = [
     *("--set", "axes.scheme=['implicit']"),
     *("-o", "out.nc"),
 ]
-HOLDS = 40
-"""Seconds that a step of a march takes, in which others get the interpreter once a second."""
+STEPS = 60
+"""Steps of a march. In each of them the interpreter is kept from the other threads for a second."""
 
-ENVIRONMENT = {"FAKE_STEPS": "2", "FAKE_SECONDS": "0.02", "FAKE_HOLDS": str(HOLDS)}
+ENVIRONMENT = {"FAKE_STEPS": str(STEPS), "FAKE_SECONDS": "0.02", "FAKE_HOLDS": "1"}
 N_SIGNALS = 200
 
 
@@ -46,7 +46,7 @@ def test_two_hundred_signals_end_it_with_a_result(tmp_path):
     assert ended.said.count("run-study: interrupted: out.nc holds 0 of 6 points, the same command goes on") == 1
     assert "Traceback" not in ended.said
     assert "worn_volume" in results(tmp_path / "out.nc")
-    assert seconds < SOON < HOLDS
+    assert seconds < SOON < STEPS
 
 
 def test_the_launcher_is_gone_with_a_rank(tmp_path):
@@ -66,7 +66,7 @@ def test_the_launcher_is_gone_with_a_rank(tmp_path):
 STUCK = """
 import sys, time
 from studyrunner import run
-from studyrunner.checkpoint.writer import Writer
+from studyrunner.checkpoint.store import Store
 from studyrunner.system import endings
 endings.SECONDS_OF_GRACE = 1.0
 
@@ -75,7 +75,7 @@ def hang(*_, **__):
     while True:
         time.sleep(600)
 
-Writer.take = hang
+Store.tick = hang
 from studyrunner.cli import main
 sys.exit(main())
 """

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from tests.mpi.launching import CHEAP, FAKED, count_rows, fake_here, mounted, results, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, count_entries, fake_here, mounted, results, run_to_end
 
 STUDY = [
     FAKED,
@@ -32,7 +32,7 @@ def test_a_full_disk_costs_nothing_that_was_finished(small_disk, tmp_path):
     assert "No space left on device: make room there" in line
     assert "Traceback" not in ended.said
     assert not (small_disk / "out.nc").exists()
-    kept = count_rows("start_states", Path(target))
+    kept = count_entries("start", Path(target))
     assert kept > 0
     # as full as it is the run ends at once: without room for a trial before anything is computed
     again = run_to_end(2, [*STUDY, "-o", target], tmp_path, environment)
@@ -40,6 +40,6 @@ def test_a_full_disk_costs_nothing_that_was_finished(small_disk, tmp_path):
     assert "No space left on device" in again.said
     subprocess.run(["mount", "-o", "remount,size=100m", str(small_disk)], check=True)
     assert fake_here([*STUDY, "-o", target], tmp_path, environment) == 0
-    assert count_rows("start_states", Path(target)) >= kept
+    assert count_entries("start", Path(target)) >= kept
     assert fake_here([*STUDY, "-o", "whole.nc"], tmp_path, environment) == 0
     xr.testing.assert_identical(results(Path(target)), results(tmp_path / "whole.nc"))

@@ -11,7 +11,7 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from tests.benchmarks.overhead import run
-from tests.mpi.launching import CHEAP, FAKED, ROOT, SOON, launcher, processes_may_share, run_command, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, ROOT, SOON, launcher, run_command, run_to_end
 from tests.studyrunner.test_progress import LINE
 
 GRID = [
@@ -58,8 +58,8 @@ def test_an_exception_on_one_rank_ends_all(tmp_path):
     assert "unexpected failure on rank 1 of 2" in done.stderr
     assert re.search(r"ValueError: not \d results from MarchTask", done.stderr)
     # What was finished is kept, and the result is written when the run ends in good order only.
-    left = {path.name for path in tmp_path.iterdir()}
-    assert left - {"two_masses.nc.crashes", "two_masses.nc.progress-journal"} == {"two_masses.nc.progress"}
+    left = {path.name for path in tmp_path.iterdir() if path.suffix != ".partial"}
+    assert left - {"two_masses.nc.progress-journal"} == {"two_masses.nc.progress"}
 
 
 @pytest.fixture
@@ -144,10 +144,8 @@ N_BYTES = 64_000_000
 
 
 def test_ranks_of_a_machine_share_what_is_handed_out(tmp_path):
-    """But the last one, which the system does not let map the memory of others."""
+    """But the last one, which does not see the file."""
     refused = 2
-    if not processes_may_share():
-        pytest.skip("this system keeps the memory of processes apart")
     environment = {"SHARED_BYTES": str(N_BYTES), "CANNOT_MAP": str(refused)}
     done = start(3, [SCRIPT], tmp_path, environment)
     assert done.returncode == 0, done.stderr

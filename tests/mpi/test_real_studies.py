@@ -7,7 +7,7 @@ import signal
 import pytest
 import xarray as xr
 
-from tests.mpi.launching import count_rows, results, run_here, run_to_end
+from tests.mpi.launching import count_entries, results, run_here, run_to_end
 
 SCENES = (
     "sdof_slider",
@@ -76,8 +76,8 @@ cycles = 2000
     ("study", "kills"),
     [
         # when some of the scenes are built, then when some of the histories are there
-        (SCENES, [("computed", 0, 1), ("results", 0, 0)]),
-        (MODES, [("start_states", 2, 1)]),
+        (SCENES, [("computed", 0, 1), ("result", 0, 0)]),
+        (MODES, [("start", 2, 1)]),
         # two points with two scenes each: a rank gets both models of a mission with its task
         (MISSIONS, []),
         (ROOT, []),
@@ -85,22 +85,22 @@ cycles = 2000
     ids=["scenes", "modes", "missions", "root"],
 )
 def test_a_study_ends_with_the_result_of_one_process(study, kills, tmp_path):
-    """On two ranks; after kills on three, of which one has nothing to do. kills: (table, entries to wait for, rank)."""
+    """On two ranks; after kills on three, of which one has nothing to do. kills: (kind, entries to wait for, rank)."""
     if isinstance(study, str):
         (tmp_path / "study.toml").write_text(study, encoding="utf-8")
         study = [str(tmp_path / "study.toml")]
     (tmp_path / "alone").mkdir()
     expected = run_here(study, tmp_path / "alone")
     command = ["-m", "studyrunner.cli", *study, "-o", "out.nc"]
-    for table, n_entries, rank in kills:
+    for kind, n_entries, rank in kills:
 
-        def kill(running, table=table, n_entries=n_entries, rank=rank):
-            assert running.reaches(lambda: count_rows(table, tmp_path / "out.nc") > n_entries), running.said
+        def kill(running, kind=kind, n_entries=n_entries, rank=rank):
+            assert running.reaches(lambda: count_entries(kind, tmp_path / "out.nc") > n_entries), running.said
             with contextlib.suppress(ProcessLookupError, KeyError):
                 os.kill(running.ranks()[rank], signal.SIGKILL)
 
         assert run_to_end(2, command, tmp_path, disturb=kill).status != 0
-        assert count_rows(table, tmp_path / "out.nc") > n_entries
+        assert count_entries(kind, tmp_path / "out.nc") > n_entries
     ended = run_to_end(3 if kills else 2, command, tmp_path)
     assert ended.status == 0, ended.said
     xr.testing.assert_identical(results(tmp_path / "out.nc"), expected)

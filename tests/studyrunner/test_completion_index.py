@@ -4,7 +4,6 @@ import contextlib
 import importlib.metadata
 import itertools
 import shutil
-import sqlite3
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,9 +13,9 @@ import pytest
 import solver
 from solver.outcome import COMPLETE
 from solver.packing import Packed
-from studyrunner.checkpoint.completion_index import MOST_OF_OTHERS
-from studyrunner.checkpoint.database import RESULTS, STARTS
-from studyrunner.checkpoint.records import empty_record, pack_record, record_type, values_in
+from studyrunner.checkpoint.completion_index import MOST_CRASHES, MOST_OF_OTHERS
+from studyrunner.checkpoint.records import empty_record, pack_record, record_in, record_type
+from studyrunner.checkpoint.store import RESULTS, STARTS
 from studyrunner.plan import identity
 from studyrunner.plan.identity import Identities
 from studyrunner.plan.planning import build_tasks
@@ -163,9 +162,9 @@ def test_a_march_that_ended_its_process_has_failed(folder):
         compute(completion, 5)
         (march, *_) = [m for line in completion.plan.marches for m in line if not completion.is_finished(m)]
         n_before = completion.n_points_finished
-        assert completion.take_as_failed(completion.key(march), None, 12, "Segmentation fault") == 1
-        assert completion.take_as_failed(completion.key(march), None, 12, "Segmentation fault") == 0
-        assert completion.take_as_failed("0" * 32, None, 12, "of another study") == 0
+        assert completion.take_as_failed(completion.key(march), 12, "Segmentation fault") == 1
+        assert completion.take_as_failed(completion.key(march), 12, "Segmentation fault") == 0
+        assert completion.take_as_failed("0" * 32, 12, "of another study") == 0
         assert completion.n_points_finished == n_before + 1
         (record,), _ = completion.read_histories(completion.histories(march))
         assert (record["outcome"], record["message"]) == (12, "Segmentation fault")
@@ -177,18 +176,38 @@ def test_a_march_that_ended_its_process_has_failed(folder):
         assert compute(completion) == (0, 1)
 
 
-@pytest.mark.parametrize(("number", "position", "lost"), [(0, 1, {1, 2}), (1, 1, {0, 1}), (0, 0, {0, 1, 2})])
-def test_a_branch_that_ended_its_process_ends_there(number, position, lost, folder):
+@pytest.mark.parametrize(("number", "there", "lost"), [(0, 1, {1, 2}), (1, 1, {0, 1}), (0, 0, {0, 1, 2})])
+def test_a_branch_that_ended_its_process_ends_there(number, there, lost, folder):
+    """there: number of its states that an earlier run has left."""
     with completion_of(folder) as completion:
         branch = completion.plan.branches[number]
-        ended = completion.take_as_failed(completion.key(branch), position, 12, "why")
-        assert ended == 2 * len(lost)
+        for start in list(fake_branch(branch))[:there]:
+            completion.add_start(branch, start)
+        assert completion.take_as_failed(completion.key(branch), 12, "why") == 2 * len(lost)
         marches = [march for line in completion.plan.marches for march in line]
         lost_marches = {(m.branch, m.position) for m in marches if completion.is_finished(m)}
         assert lost_marches == {(number, place) for place in lost}
-        assert completion.take_as_failed(completion.key(branch), 99, 12, "no such place") == 0
         n_starts, n_marches = compute(completion)
-        assert (n_starts, n_marches) == (6 - len(lost), 12 - 2 * len(lost))
+        assert (n_starts, n_marches) == (6 - len(lost) - there, 12 - 2 * len(lost))
+
+
+def test_tasks_with_which_runs_have_crashed_are_tried_one_after_the_other_and_given_up_in_the_end(folder):
+    with completion_of(folder) as completion:
+        first, *others = completion.plan.branches
+        for branch in completion.plan.branches:
+            completion.store.crashes[completion.key(branch)] = 1
+        progress = TaskProgress(completion)
+        (tried,) = progress.begin()
+        assert tried.number == first.number
+        new = [progress.take(tried, start) for start in fake_branch(tried)]
+        assert [sum(isinstance(task, BranchTask) for task in tasks) for tasks in new] == [0, 0, 1]
+        marches = [task for tasks in new for task in tasks if isinstance(task, MarchTask)]
+        assert len(marches) == 6
+        assert list(completion.store.crashes) == [completion.key(each) for each in others]
+        completion.store.crashes[completion.key(marches[0])] = MOST_CRASHES
+        completion.give_up_crashed()
+        assert completion.is_finished(marches[0])
+        assert not completion.is_finished(marches[1])
 
 
 def test_only_states_that_something_is_to_be_marched_from_are_asked_for(finished):
@@ -217,37 +236,14 @@ def test_what_another_study_has_left_stays_up_to_a_size(most, expected, finished
         assert compute(completion) == expected
 
 
-def test_a_person_can_read_the_file(finished):
-    with completion_of(finished) as completion:
-        completion.store.note_study("a joint", "sdof_slider", ("hash", "layout"), completion.describe_tasks())
-        march = completion.plan.marches[1][2]
-        completion.keep(march, Packed("march", ()))
-        completion.keep(completion.plan.branches[1], Packed("branch", ()))
-    queries = {
-        "SELECT kind, count(*), sum(points) FROM tasks GROUP BY kind": {("integration", 12, 12), ("sweep", 2, None)},
-        "SELECT DISTINCT sweep, frequency FROM start_states WHERE unknowns > 0 AND frequency < 120": {
-            *(("up", 100.0), ("up", 110.0), ("down", 100.0), ("down", 110.0))
-        },
-        "SELECT kind, sweep, frequency, scheme FROM under_way": {
-            *(("integration", "down", 110.0, "implicit"), ("sweep", "down", 120.0, None))
-        },
-        "SELECT DISTINCT outcome, scheme, last_cycle, message FROM results": {("converged", "implicit", 20000.0, None)},
-        "SELECT count(*) FROM results WHERE worn_volume > 0 AND wear_coefficient = 1e-11": {(6,)},
-        "SELECT name, scene FROM study": {("a joint", "sdof_slider")},
-    }
-    with contextlib.closing(sqlite3.connect(finished)) as database:
-        for query, expected in queries.items():
-            assert set(database.execute(query)) == expected
-
-
 def test_a_record_of_another_study_is_none_of_this():
     study, other = (read_study("sdof_slider", (*BASE[:-1], f"slow_time.outputs={n}")) for n in (3, 4))
     kind = record_type(study, FACTS)
     packed = pack_record(empty_record(kind))
-    wrong = [replace(packed, arrays=arrays) for arrays in ((), (np.zeros(3),), (np.zeros(kind.itemsize),))]
-    for odd in (pack_record(empty_record(record_type(other, FACTS))), replace(packed, text=""), *wrong, None):
-        assert values_in(odd, kind) is None
-    assert values_in(packed, kind) is not None
+    wrong = [replace(packed, arrays=arrays) for arrays in ((), (np.zeros(3),), (*packed.arrays, *packed.arrays))]
+    for odd in (pack_record(empty_record(record_type(other, FACTS))), *wrong, None):
+        assert record_in(odd, kind) is None
+    assert record_in(packed, kind) == empty_record(kind).tobytes()
 
 
 def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder):

@@ -14,30 +14,6 @@ from tests.mpi.launching import run_command
 
 pytestmark = pytest.mark.processes
 
-WRITER = """
-import signal
-from studyrunner.checkpoint.writer import Writer
-
-class Disturbed(Exception): pass
-def disturb(*_): raise Disturbed
-
-writer = Writer(lambda job: job)
-signal.signal(signal.SIGALRM, disturb)
-for number in range(20_000):
-    try:
-        signal.setitimer(signal.ITIMER_REAL, 1e-5 + 1e-7 * (number % 1000))
-        # the loop of rank 0 looks without waiting, which is most of what it does
-        while True:
-            writer.take(lambda *_: None, lambda _: None)
-            if not writer.busy:
-                writer.begin(number)
-    except Disturbed:
-        pass
-writer.take(lambda *_: None, lambda _: None, wait=True)
-writer.close()
-print("closed")
-"""
-
 
 @pytest.fixture(autouse=True)
 def _as_before():
@@ -151,7 +127,6 @@ os._exit(0)
 @pytest.mark.parametrize(
     ("program", "said"),
     [
-        pytest.param(WRITER, "closed\n", marks=pytest.mark.slow, id="writer interrupted anywhere"),
         pytest.param(BUSY, "waited True\n", marks=pytest.mark.slow, id="wait interrupted past its deadline"),
     ],
 )

@@ -15,7 +15,7 @@ from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.mpi import schedule
 from studyrunner.plan.tasks import BranchTask, MarchTask
-from tests.mpi.launching import count_rows, results
+from tests.mpi.launching import count_entries, results
 from tests.studyrunner.faked_runs import SMALL
 from tests.studyrunner.fakes import fake_branch
 
@@ -68,7 +68,7 @@ def test_an_interrupt_in_any_task(at, solver, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("where", "at"), [("flush", 2), ("_begin", 3), ("put", 6)])
+@pytest.mark.parametrize(("where", "at"), [("flush", 5), ("note_life", 3), ("put", 6)])
 def test_an_interrupt_anywhere_in_the_main_thread(where, at, solver, monkeypatch):
     """Before and after each of the calls that change what is kept."""
     expected = whole(solver)
@@ -162,7 +162,7 @@ def test_progress_is_gone_on_from(solver, monkeypatch):
     assert len(marches) == 8
     assert all(task.resume == Packed("half of it", (np.array([task.number]),)) for task in marches)
     xr.testing.assert_identical(results(), expected)
-    assert count_rows("under_way") == 0
+    assert count_entries("progress") == 0
 
 
 def test_progress_beyond_states_that_are_lost_is_no_harm(solver, monkeypatch):
@@ -187,9 +187,9 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver, monkeypatch):
 
     monkeypatch.setattr(solver, "evaluate", resuming)
     assert main(TWO_WAYS) == 130
-    assert count_rows("under_way") > 0
+    assert count_entries("progress") > 0
     with contextlib.closing(sqlite3.connect("out.nc.progress")) as database, database:
-        database.execute("DELETE FROM start_states")
+        database.execute("DELETE FROM entries WHERE kind = 'start'")
     assert main(TWO_WAYS) == 0
     xr.testing.assert_identical(results(), expected)
 
@@ -233,7 +233,7 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
     assert [resume is not None for resume in begun] == [False, True]
     # but for the limit, which stands in their attributes
     xr.testing.assert_equal(results(), results("whole.nc"))
-    assert count_rows("under_way") == 0
+    assert count_entries("progress") == 0
 
 
 def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver):

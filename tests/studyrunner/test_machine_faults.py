@@ -101,6 +101,3 @@ def test_a_sick_rank_gets_no_more_tasks_unless_all_are():
     dispatcher.shun(1)
     dispatcher.add([Job("chore", 1.0)])
     assert [rank for rank, _ in dispatcher.assign()] == [1]
-    # where the others are lost a sick one is better than none
-    dispatcher.add_lost([task for task, _ in dispatcher.lose(1)])
-    assert {rank for rank, _ in dispatcher.assign()} == {2}

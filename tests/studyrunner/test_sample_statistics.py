@@ -1,14 +1,14 @@
-"""Quantiles, probabilities, Sobol' indices and groups of samples against closed forms."""
+"""Quantiles, probabilities, indices, rank correlations and groups of samples against closed forms."""
 
 import numpy as np
 import pytest
 from scipy.special import ndtri
-from scipy.stats import norm
+from scipy.stats import norm, spearmanr
 from scipy.stats import t as student
 
 from studyrunner.scatter.design import SaltelliLayout, unit_design
 from studyrunner.statistics.bands import SampleValues
-from studyrunner.statistics.indices import plain_indices, saltelli_indices
+from studyrunner.statistics.indices import FEWEST, rank_correlations, saltelli_indices
 from studyrunner.statistics.quantiles import exceedance, mean, quantile
 from studyrunner.statistics.two_groups import deciding_pair, density, two_groups
 
@@ -18,9 +18,6 @@ MEDIAN = 2e-9
 FACTORS = np.exp(LOGARITHMS**2)
 FIRST = (FACTORS - 1.0) / (FACTORS.prod() - 1.0)
 TOTAL = FIRST * FACTORS.prod() / FACTORS
-
-
-SOBOL = np.ones(3, dtype=np.bool_)
 
 
 def archard(unit):
@@ -112,67 +109,69 @@ def test_bands_hold_what_the_missing_samples_would_have_said():
         assert contains(exceedance(part, grid, 0.95), exceedance(whole, grid, 0.95))
 
 
-# --- Sobol' indices ---
+# --- what decides ---
 
 
-@pytest.mark.parametrize("method", ["sobol", "saltelli"])
 @pytest.mark.parametrize(
     ("model", "first", "total"), [(archard, FIRST, TOTAL), (ishigami, *ishigami_indices())], ids=["archard", "ishigami"]
 )
-def test_indices_of_a_design(method, model, first, total):
-    design = unit_design(method, 2, 256 if method == "sobol" else 1024, 3)
-    values = known(model(design))
-    if method == "sobol":
-        found = plain_indices(design, values, 0.95, SOBOL[: design.shape[1]])
-        assert "Plischke" in found.first_method
-        assert "Sudret" in found.total_method
-    else:
-        found = saltelli_indices(SaltelliLayout(3), design, values, 0.95)
-    for band, exact in ((found.first, first), (found.total, total)):
+def test_indices_of_a_saltelli_design(model, first, total):
+    design = unit_design("saltelli", 2, 1024, 3)
+    found = saltelli_indices(SaltelliLayout(3), design, known(model(design)), 0.95)
+    for band, exact in zip(found, (first, total), strict=True):
         np.testing.assert_allclose(band.lowest, exact, atol=0.06)
         np.testing.assert_array_equal(band.lowest, band.highest)
         assert (band.interval_low <= exact + 0.01).all()
         assert (band.interval_high >= exact - 0.01).all()
 
 
-def test_indices_of_one_input_and_of_several_points():
-    """One input decides all of it; a point at which nothing varies has no index."""
-    design = unit_design("sobol", 1, 64, 1)
-    points = known(np.stack([np.ones(64), design[:, 0]]))
-    rows = unit_design("saltelli", 1, 64, 1)
-    both = known(np.stack([np.ones(192), rows[:, 0]]))
-    for found in (
-        plain_indices(design, points, 0.95, SOBOL[: design.shape[1]]),
-        saltelli_indices(SaltelliLayout(1), rows, both, 0.95),
-    ):
-        assert found.first.lowest.shape == (2, 1)
-        assert np.isnan(found.first.lowest[0]).all()
-        assert found.first.lowest[1, 0] == pytest.approx(1.0, abs=0.08)
-        assert found.total.lowest[1, 0] == pytest.approx(1.0, abs=0.08)
+def test_correlations_are_those_of_scipy():
+    design = unit_design("random", 2, 40, 3)
+    values = archard(design)
+    found = rank_correlations(design, known(np.stack([values, np.ones(40)])), 0.95)
+    assert found.lowest.shape == (2, 3)
+    np.testing.assert_allclose(found.lowest[0], [spearmanr(column, values).statistic for column in design.T])
+    assert np.isnan(found.lowest[1]).all()
+
+
+@pytest.mark.parametrize("n", [FEWEST, 40])
+@pytest.mark.parametrize("noise", [0.3, 3.0])
+def test_the_interval_of_a_correlation_covers_it_as_often_as_it_says(n, noise):
+    """Of normal numbers, whose rank correlation is 6 / pi asin(r / 2)."""
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(500, n))
+    y = x + noise * rng.normal(size=x.shape)
+    exact = 6.0 / np.pi * np.arcsin(0.5 / np.sqrt(1.0 + noise**2))
+    bands = [rank_correlations(one[:, None], known(other), 0.95) for one, other in zip(x, y, strict=True)]
+    inside = [band.interval_low[0] <= exact <= band.interval_high[0] for band in bands]
+    assert np.mean(inside) > 0.93
 
 
 def test_an_input_without_width_decides_nothing():
     design = unit_design("random", 1, 128, 3)
     design[:, 1] = 0.5
-    found = plain_indices(design, known(archard(design)), 0.95, ~SOBOL[: design.shape[1]])
-    assert found.first.lowest[1] == found.total.lowest[1] == found.total.interval_low[1] == 0.0
-    assert found.first.lowest[0] > 0.8
+    found = rank_correlations(design, known(archard(design)), 0.95)
+    assert found.lowest[1] == 0.0
+    assert found.lowest[0] > 0.8
 
 
-def test_bands_of_indices_hold_the_full_estimate_and_the_error_widens_them():
+def test_bands_hold_the_full_correlation_and_the_error_widens_them():
     design = unit_design("sobol", 1, 128, 3)
     full = archard(design)
-    whole = plain_indices(design, known(full, error=0.05), 0.95, SOBOL[: design.shape[1]])
-    part = plain_indices(design, without(full, np.arange(3, 128, 20), 0.5 * full), 0.95, SOBOL[: design.shape[1]])
-    assert contains(part.first, whole.first)
-    assert (part.first.lowest < part.first.highest).any()
-    assert (whole.first.error_low < whole.first.lowest).all()
-    assert (whole.first.error_high > whole.first.highest).all()
+    whole = rank_correlations(design, known(full, error=0.05), 0.95)
+    part = rank_correlations(design, without(full, np.arange(3, 128, 20), 0.5 * full), 0.95)
+    assert contains(part, whole)
+    assert (part.lowest < part.highest).any()
+    assert (whole.error_low < whole.lowest).all()
+    assert (whole.error_high > whole.highest).all()
 
 
-def test_few_samples_say_no_index():
-    design = unit_design("random", 1, 5, 2)
-    assert np.isnan(plain_indices(design, known(design[:, 0]), 0.95, ~SOBOL[: design.shape[1]]).total.highest).all()
+def test_few_samples_say_nothing():
+    design = unit_design("random", 1, FEWEST - 1, 2)
+    assert np.isnan(rank_correlations(design, known(design[:, 0]), 0.95).highest).all()
+    rows = unit_design("saltelli", 1, 8, 1)
+    bands = saltelli_indices(SaltelliLayout(1), rows, known(rows[:, 0]), 0.95)
+    assert all(np.isnan(band.highest).all() for band in bands)
 
 
 # --- two groups ---

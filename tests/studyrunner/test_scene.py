@@ -11,7 +11,7 @@ from solver.model import ReducedModel, needed_nodal_diameters
 from studies import build_scene
 from studies.scene_file import write_scene
 from studyrunner.cli import main
-from studyrunner.mpi.shared_memory import Address, open_shared
+from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.tasks import BranchTask
 from studyrunner.scene.scene import (
@@ -132,14 +132,14 @@ STIFFNESSES = (1.6e5, 1.7e5, 1.8e5)
 
 
 class Sent:
-    """What ranks 0 and 1, which share memory, and rank 2 get with tasks of three scenes."""
+    """What ranks 0 and 1, which see the files, and rank 2 get with tasks of three scenes."""
 
-    def __init__(self):
+    def __init__(self, folder):
         study = read_study("sdof_slider", [f"axes.stiffness={list(STIFFNESSES)}"])
         self.branches = {branch.joint.scene: branch for branch in build_tasks(study, 2).branches}
         self.models = [build_scene("sdof_slider", stiffness=stiffness) for stiffness in STIFFNESSES]
         self.read: list[int] = []
-        self._handed = SceneModels(self._read, {0, 1})
+        self._handed = SceneModels(self._read, {0, 1}, folder / "out.nc.progress")
 
     def _read(self, scene):
         self.read.append(scene)
@@ -151,13 +151,13 @@ class Sent:
         return task.models[0] if task.models else None
 
 
-def test_ranks_that_share_memory_get_one_copy_and_others_their_own():
-    sent = Sent()
+def test_ranks_that_see_the_files_get_one_copy_and_others_their_own(tmp_path):
+    sent = Sent(tmp_path)
     first, second = sent(0, 1), sent(1, 1)
-    assert isinstance(first, Address)
+    assert isinstance(first, MappedFile)
     assert first == second
     assert sent.read == [1]
-    model = open_shared(first)
+    model = open_mapped(first)
     assert isinstance(model, ReducedModel)
     assert describe_scene(model).digest == describe_scene(sent.models[1]).digest
     assert sent(1, 1) is None
@@ -165,18 +165,17 @@ def test_ranks_that_share_memory_get_one_copy_and_others_their_own():
     assert sent(2, 1) is None
 
 
-def test_a_copy_is_closed_once_no_rank_of_the_machine_holds_it():
-    sent = Sent()
-    address = sent(0, 0)
-    assert isinstance(address, Address)
-    assert sent(1, 0) == address
+def test_a_file_goes_once_no_rank_holds_its_model(tmp_path):
+    sent = Sent(tmp_path)
+    given = sent(0, 0)
+    assert sent(1, 0) == given
     for scene in (1, 2):
         sent(0, scene)
-    assert open_shared(address) is not None, "rank 1 may not have opened it yet"
+    assert open_mapped(given) is not None, "rank 1 may not have opened it yet"
     for scene in (1, 2):
-        assert isinstance(sent(1, scene), Address)
-    with pytest.raises(OSError, match=r"No such file|another file"):
-        open_shared(address)
+        assert isinstance(sent(1, scene), MappedFile)
+    with pytest.raises(FileNotFoundError):
+        open_mapped(given)
     assert sent.read == [0, 1, 2]
-    assert isinstance(sent(0, 0), Address)
+    assert isinstance(sent(0, 0), MappedFile)
     assert sent.read == [0, 1, 2, 0]

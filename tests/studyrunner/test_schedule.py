@@ -2,16 +2,15 @@
 
 import sys
 import threading
-import time
 from dataclasses import dataclass
 
 import pytest
 
 from studyrunner.mpi import dispatch
-from studyrunner.mpi.dispatch import Assignment, Dispatcher
+from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.mpi.launcher import LauncherError, launcher_rank, launcher_size
 from studyrunner.mpi.ranks import Alone, start_ranks
-from studyrunner.mpi.schedule import Handlers, _Delivery, serve_tasks
+from studyrunner.mpi.schedule import Handlers, serve_tasks
 from studyrunner.plan.cost_model import CostModel
 
 
@@ -83,61 +82,6 @@ def test_several_processes_without_mpi_are_refused(monkeypatch):
     monkeypatch.setitem(sys.modules, "mpi4py", None)
     with pytest.raises(LauncherError, match="2 processes were started that cannot talk"):
         start_ranks()
-
-
-class Losing:
-    """Ranks of which the last is lost as soon as it has a task; another one does at once what it gets."""
-
-    rank = 0
-    size = 3
-    lost: frozenset[int] = frozenset()
-
-    def __init__(self):
-        self._replies: list[tuple[int, object]] = []
-
-    def send(self, message, rank):
-        if rank == 2 and isinstance(message, Assignment):
-            # its first result is on its way
-            self._replies.append((2, _Delivery(message.number, "of a lost rank", 0.1)))
-            self.lost = frozenset([2])
-        elif isinstance(message, Assignment):
-            self._replies += [(1, _Delivery(message.number, "done", 0.1))] * message.task.n_results
-
-    def flush(self): ...
-
-    def receive(self):
-        return self._replies.pop(0) if self._replies else None
-
-    def close(self): ...
-
-    def abort(self, status): ...
-
-
-def test_tasks_of_a_lost_rank_are_given_to_others():
-    """What it has sent is not taken any more, as the task is done again; the rest is as if it had not been there."""
-    taken: list[tuple[str, object]] = []
-    backs: list[tuple[int, list[tuple[str, int]]]] = []
-
-    def take(job, result):
-        taken.append((job.kind, result))
-        return []
-
-    def take_back(rank, lost):
-        backs.append((rank, [(job.kind, n_left) for job, n_left in lost]))
-        return [Job(f"{job.kind} again", job.cost, n_left) for job, n_left in lost]
-
-    def run(job, keep):
-        for _ in range(job.n_results):
-            time.sleep(0.01)
-            yield "done"
-
-    jobs = [Job(name, 1.0, 2) for name in "abcdef"]
-    serve_tasks(Losing(), jobs, run, Handlers(take, take_back=take_back), CostModel())
-    ((rank, [(name, n_left)]),) = backs
-    assert (rank, n_left) == (2, 2)
-    assert sorted(taken) == sorted(
-        [(job.kind, "done") for job in jobs if job.kind != name for _ in range(2)] + [(f"{name} again", "done")] * 2
-    )
 
 
 @dataclass(frozen=True)
@@ -215,19 +159,3 @@ def test_a_task_that_does_not_end_teaches_and_is_forgotten_when_it_does():
     dispatcher.deliver(first[0], first[1], 2.0)
     assert costs.measured("a") == 2.0
     assert costs.correction((("all", "a"),)) < 2.0 < late
-
-
-def test_tasks_of_a_lost_rank_go_to_rank_0_only_where_there_is_no_other():
-    dispatcher, _ = make(3, Job("a", 1.0), Job("a", 1.0), Job("a", 1.0, n_results=2))
-    assert dict(handed_out(dispatcher)) == {0: 0, 1: 1, 2: 2}
-    dispatcher.deliver(2, 2, 0.5)
-    ((task, n_left),) = dispatcher.lose(2)
-    assert n_left == 1
-    dispatcher.add_lost([task])
-    dispatcher.deliver(0, 0, 1.0)
-    assert handed_out(dispatcher) == []
-    assert not dispatcher.done
-    dispatcher.deliver(1, 1, 1.0)
-    assert handed_out(dispatcher) == [(1, 3)]
-    dispatcher.add_lost([task for task, _ in dispatcher.lose(1)])
-    assert handed_out(dispatcher) == [(0, 4)]

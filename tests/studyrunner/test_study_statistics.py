@@ -10,6 +10,7 @@ import xarray as xr
 
 from studyrunner.scatter.drawn_values import ScatteredPairs, drawn
 from studyrunner.scatter.section import ScatterSection
+from studyrunner.statistics.ranking import deciding_input, describe_ranking
 from studyrunner.statistics.sentence import sentences
 from studyrunner.statistics.study_statistics import worn_volume_statistics
 
@@ -75,7 +76,7 @@ def test_every_statistic_is_labelled_and_stands_over_the_other_dimensions():
     found = worn_volume_statistics(dataset, exceed=[1e-10, 2e-10], depth=1e-6)
     assert found["worn_volume_quantile"].dims == ("frequency", "cycle", "quantile", "bound")
     assert found["wear_depth_exceedance"].dims == ("frequency", "cycle", "exceeded_depth", "bound")
-    assert found["first_index"].dims == ("frequency", "cycle", "input", "bound")
+    assert found["rank_correlation"].dims == ("frequency", "cycle", "input", "bound")
     assert all({"units", "long_name"} <= array.attrs.keys() for array in found.data_vars.values())
     assert list(found["input"].values) == ["friction_coefficient", "wear_coefficient", "gap"]
     np.testing.assert_array_equal(found["frequency"], dataset["frequency"])
@@ -91,15 +92,35 @@ def test_every_statistic_is_labelled_and_stands_over_the_other_dimensions():
     np.testing.assert_allclose(error / median, [[0.99, 1.01]] * 2)
 
 
-def test_indices_are_those_of_the_product():
-    """ln V = ln k_w + ln mu + gap: shares of the variance of the logarithm, which is nearly the one of the volume."""
-    found = plain_statistics()["first_index"].isel(cycle=-1, bound=0)
-    variances = np.array([0.06**2, np.log(1.5) ** 2, 0.01**2 / 3])
-    shares = variances / variances.sum()
+def test_correlations_tell_which_input_decides():
+    found = plain_statistics()["rank_correlation"].isel(cycle=-1, bound=0)
+    assert (found.sel(input="wear_coefficient") > 0.95).all()
     # the mean over the pairs would tell nothing of what their own draws decide
-    shares[2] = np.nan
-    np.testing.assert_allclose(found, [shares] * 2, atol=0.06)
-    assert plain_statistics()["first_index"].isel(cycle=0).isnull().all()
+    assert found.sel(input="gap").isnull().all()
+    assert plain_statistics()["rank_correlation"].isel(cycle=0).isnull().all()
+
+
+@pytest.mark.parametrize(
+    ("noise", "n", "says"),
+    [
+        (0.0, 6, "6 samples are too few to say which input decides"),
+        (0.1, 12, r"wear coefficient decides most \(rank correlation 0\.\d\d, interval 0\.\d\d to (0\.9\d|1\.00)\)"),
+        (30.0, 12, r"which input decides is not known: \w+ coefficient has rank correlation -?0\.\d\d, interval .*"),
+    ],
+)
+def test_a_ranking_says_its_uncertainty_and_none_is_made_of_too_few_samples(noise, n, says):
+    rng = np.random.default_rng(3)
+    friction, wear = rng.normal(0.5, 0.03, n), rng.lognormal(-25.0, 0.5, n)
+    volume = wear * np.exp(noise * rng.normal(size=n))
+    dataset = result().isel(sample=slice(n)).drop_vars("sample_gap")
+    dataset["worn_volume"][:] = volume[:, None] * dataset["cycle"].values
+    dataset["worn_volume_error"][:] = 0.0
+    dataset = dataset.assign_coords(
+        sample_friction_coefficient=("sample", friction), sample_wear_coefficient=("sample", wear)
+    ).assign_attrs(study="")
+    found = worn_volume_statistics(dataset).isel(frequency=0, cycle=-1)
+    assert re.fullmatch(says, describe_ranking(found))
+    assert (deciding_input(found) is None) == ("most" not in says)
 
 
 def test_a_saltelli_design_is_read_as_one():
@@ -127,9 +148,7 @@ def test_samples_without_a_value_and_sensitive_ones_are_bands():
     low[5], low[6] = whole["worn_volume"][0, 5, 1], 0.0
     assert mean[0, 0] == pytest.approx(low.mean())
     # what the missing samples may have is no part of the numerical error
-    said = (
-        r"\(numerical error 1 %\); 2 without a value to be trusted; wear coefficient decides \d\d to \d\d % \(gap not"
-    )
+    said = r"\(numerical error 1 %\); 2 without a value to be trusted; wear coefficient decides most \(rank corr"
     assert re.search(said, sentences(found)[0])
     # with more than 5 % of them there is no upper end
     part["worn_volume"][0, 8:20, 2], low[8:20] = np.nan, whole["worn_volume"][0, 8:20, 1]
@@ -140,7 +159,7 @@ def test_samples_without_a_value_and_sensitive_ones_are_bands():
 def test_the_sentence_says_range_median_error_and_what_decides():
     first, second = sentences(plain_statistics())
     assert first.startswith("211.5 Hz: 5 to 95 % of 128 samples 0.256 to 0.969 mm3, median 0.506 ")
-    assert re.search(r"\(numerical error 1 %\); wear coefficient decides 9\d % \(gap not told\)$", first)
+    assert re.search(r"\(numerical error 1 %\); wear coefficient decides most \(rank .*\) \(gap not told\)$", first)
     assert second.startswith("212 Hz: ")
 
 
@@ -161,7 +180,7 @@ def test_samples_of_zero_width_say_one_value():
     found = worn_volume_statistics(result(zero))
     last = found["worn_volume_quantile"].isel(cycle=-1)
     np.testing.assert_array_equal(last, last.isel(quantile=0).broadcast_like(last))
-    assert found["first_index"].isnull().all()
+    assert found["rank_correlation"].isnull().all()
     assert (found["group_size"].isel(group=1) == 0).all()
     assert "decides" not in sentences(found)[0]
 

@@ -12,7 +12,9 @@ from studyrunner.report.page.encoding import encode_floats
 from studyrunner.report.reading.result import NO_VOLUME, Point, Result
 from studyrunner.report.reading.sample_statistics import SAMPLE
 from studyrunner.report.reading.units import scale_for
-from studyrunner.report.scatter.points import deciding_input, drawn_values, ends, last_of, statistics_at
+from studyrunner.report.scatter.indices import measures_of
+from studyrunner.report.scatter.points import drawn_values, ends, last_of, statistics_at
+from studyrunner.statistics.ranking import leading_input
 from studyrunner.statistics.sentence import sentence
 
 _BANDS = "worn_volume_quantile"
@@ -20,7 +22,6 @@ _EXCEEDANCES = (
     ("worn_volume_exceedance", "exceeded_volume", "worn volume"),
     ("wear_depth_exceedance", "exceeded_depth", "largest wear depth"),
 )
-_INDICES = ("first_index", "first_index_interval", "total_index", "total_index_interval")
 
 
 def build_scatter_numbers(result: Result, floats: float, notes: list[str]) -> dict[str, object] | None:
@@ -29,7 +30,7 @@ def build_scatter_numbers(result: Result, floats: float, notes: list[str]) -> di
     `axis`: place of the samples among the axes. `held`: combinations of the other axes, numbered with the last axis
     fastest: all, or the shown one alone where all do not fit; arrays begin with these. `bands`: (count, quantile,
     lowest and highest), `wrong`: the outer ends with the numerical error (count, 2), `gap`: (2), NaN for one group.
-    `inputs`: drawn values (sample), and shares (input, lowest and highest) of the last count. All in SI.
+    `inputs`: drawn values (sample), `measures` of the inputs (input, lowest and highest) at the last count. All in SI.
     """
     statistics = result.statistics
     if statistics is None or "input" not in statistics.dims or not float(result.worn[result.held].max()) > NO_VOLUME:
@@ -58,8 +59,16 @@ def build_scatter_numbers(result: Result, floats: float, notes: list[str]) -> di
         "wrong": encode_floats([np.stack([one[:, 0, 0], one[:, -1, 1]], axis=-1) for one in wrong]),
         "exceedances": [_exceedance(last, *names) for names in _EXCEEDANCES if names[0] in statistics],
         "inputs": [_input(result, str(name), chosen) for name in statistics["input"].values],
-        "deciding": [deciding_input(one) or 0 for one in last],
-        **{name: encode_floats([ends(one, name, "input") for one in last]) for name in _INDICES},
+        "deciding": [leading_input(one) for one in last],
+        "measures": [
+            {
+                "name": name,
+                "words": words,
+                "data": encode_floats([ends(one, name, "input") for one in last]),
+                "interval": encode_floats([ends(one, f"{name}_interval", "input") for one in last]),
+            }
+            for name, words in measures_of(statistics).items()
+        ],
         "gap": encode_floats([one["group_gap"].values for one in last]),
         "told": [f"{sentence(one)}." for one in last],
     }

@@ -14,7 +14,8 @@ from studyrunner.report.drawing import COLOURS, Drawing, add_legend, new_figure,
 from studyrunner.report.reading.result import Point, Result, as_sentences
 from studyrunner.report.reading.sample_statistics import SAMPLE
 from studyrunner.report.reading.units import Scale, scale_for
-from studyrunner.report.scatter.points import choose_points, deciding_input, drawn_values, last_of, panel_grid
+from studyrunner.report.scatter.points import choose_points, drawn_values, last_of, panel_grid
+from studyrunner.statistics.ranking import deciding_input, describe_ranking, leading_input
 from studyrunner.system.progress import count
 
 GROUPS = ("one group", "lower group", "upper group", "between")
@@ -44,8 +45,7 @@ def draw_deciding(result: Result, statistics: xr.Dataset) -> Drawing:
         figure, panels = panel_grid(len(shown.points), 3.0, sharey=True)
     names, highest = [], 0.0
     for panel, (point, label, found) in zip(panels.flat, shown, strict=True):
-        place = deciding_input(found)
-        names.append(str(found["input"].values[place or 0]))
+        names.append(str(found["input"].values[leading_input(found)]))
         highest = max(highest, _draw_samples(panel, result, point, found, names[-1], scale))
         panel.set_title(label)
     for row in panels:
@@ -54,10 +54,15 @@ def draw_deciding(result: Result, statistics: xr.Dataset) -> Drawing:
     if density is not None:
         _draw_density(density, shown.statistics[0], scale)
     add_legend(figure)
-    decided = any(deciding_input(found) is not None for found in shown.statistics)
+    unknown = [
+        f"{f'{label}: ' if label else ''}{describe_ranking(found)}"
+        for _, label, found in shown
+        if deciding_input(found) is None and describe_ranking(found)
+    ]
     text = as_sentences(
         f"Worn volume of each sample {result.when(-1)}"
-        + (", over the input that decides most of it alone" if decided else ""),
+        + ("" if unknown else ", over the input that decides most of it alone"),
+        *unknown,
         "Bars: numerical error of the sample" if np.isfinite(result.errors).any() else "",
         *_tell_groups(shown.labels, shown.statistics, scale),
         "Right: density of the samples" if density is not None else "",

@@ -64,13 +64,6 @@ def largest(*values: NDArray[np.float64]) -> float:
     return max((float(each[np.isfinite(each)].max(initial=0.0)) for each in values), default=0.0)
 
 
-def deciding_input(point: xr.Dataset) -> int | None:
-    """Place along `input` of the input that decides the largest share alone; None where no share is known."""
-    if "first_index" not in point or not point["first_index"].notnull().any():
-        return None
-    return int(np.argmax(np.nan_to_num(ends(point, "first_index", "input")[:, LOWEST])))
-
-
 def drawn_values(result: Result, name: str, point: Point) -> tuple[NDArray[np.float64], str, str]:
     """What the samples draw of an input (n_samples,) at a point, its unit and its name in words.
 

@@ -62,9 +62,9 @@ def test_samples_without_a_value_leave_the_band_open(dataset, items):
 
 
 def test_the_wear_coefficient_decides(items):
-    item = items["sobol_indices"]
+    item = items["deciding_inputs"]
     bars = {bar.get_label(): bar for bar in item.figure.axes[0].containers if hasattr(bar, "patches")}
-    shares = [patch.get_height() for patch in bars["alone"].patches]
+    shares = [patch.get_height() for patch in bars["rank correlation"].patches]
     names = [text.get_text().replace("\n", " ") for text in item.figure.axes[0].get_xticklabels()]
     assert names[int(np.argmax(shares))] == "wear coefficient"
     assert max(shares) > 0.9
@@ -89,7 +89,7 @@ def test_two_groups_have_two_colours():
 
 
 def test_few_samples_have_no_indices():
-    item = drawn(sample_file(4))["sobol_indices"]
+    item = drawn(sample_file(4))["deciding_inputs"]
     assert isinstance(item, Missing)
     assert "raise samples" in item.sentence
 

@@ -13,7 +13,8 @@ const N_QUANTILES = 5;
 const LEGEND = { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 };
 
 if (scatter) {
-  for (const name of ["bands", "wrong", "gap", "first_index", "first_index_interval", "total_index", "total_index_interval"]) scatter[name] = decode(scatter[name]);
+  for (const name of ["bands", "wrong", "gap"]) scatter[name] = decode(scatter[name]);
+  for (const entry of scatter.measures) for (const name of ["data", "interval"]) entry[name] = decode(entry[name]);
   for (const entry of scatter.inputs) entry.values = decode(entry.data);
   for (const entry of scatter.exceedances) for (const name of ["at", "data", "interval"]) entry[name] = decode(entry[name]);
 }
@@ -129,17 +130,18 @@ function drawExceedance(row) {
 function drawIndices(row) {
   const n = scatter.inputs.length;
   const names = scatter.inputs.map((entry) => plain(entry.label).replace(/(.{7,}?) /g, "$1<br>"));
-  const traces = [["first_index", "alone"], ["total_index", "with the others"]].map(([name, words], colour) => {
-    const end = (key, i, bound) => scatter[key][(row * n + i) * 2 + bound];
-    const middle = names.map((_, i) => (end(name, i, 0) + end(name, i, 1)) / 2);
+  const shares = scatter.measures.length > 1;
+  const traces = scatter.measures.map(({ name, words, data: values, interval }, colour) => {
+    const end = (of, i, bound) => of[(row * n + i) * 2 + bound];
+    const middle = names.map((_, i) => (end(values, i, 0) + end(values, i, 1)) / 2);
     return {
       type: "bar", x: names, y: middle, name: words, meta: name, marker: { color: data.colours[colour] }, hovertemplate: "%{y:.2f}<extra></extra>",
       error_y: { type: "data", symmetric: false, thickness: 1.2, width: 4, color: INK,
-        array: middle.map((each, i) => Math.max(end(`${name}_interval`, i, 1) - each, 0) || 0), arrayminus: middle.map((each, i) => Math.max(each - end(`${name}_interval`, i, 0), 0) || 0) },
+        array: middle.map((each, i) => Math.max(end(interval, i, 1) - each, 0) || 0), arrayminus: middle.map((each, i) => Math.max(each - end(interval, i, 0), 0) || 0) },
     };
   });
   Plotly.react("index-plot", traces, layout({
-    height: 340, legend: LEGEND, showlegend: true, barmode: "group", xaxis: axisLayout("", { type: "category" }), yaxis: axisLayout("", { ...upright("share of the variance", ""), range: [0, 1.02] }),
+    height: 340, legend: LEGEND, showlegend: true, barmode: "group", xaxis: axisLayout("", { type: "category" }), yaxis: axisLayout("", { ...upright(shares ? "share of the variance" : "rank correlation", ""), range: [shares ? 0 : -1.02, 1.02] }),
   }), CONFIG);
 }
 
