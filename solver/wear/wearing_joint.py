@@ -20,8 +20,8 @@ from solver.newton.solve_balance import Budget, solve_balance
 from solver.results.history import PeriodicState
 from solver.settings import FollowedFrequency, Resolution
 from solver.structure.joint import Case, Hold, Joint
-from solver.wear.friction_history import history_along
 from solver.wear.followed import end_at_resonance, lost_resonance
+from solver.wear.friction_history import history_along
 from solver.wear.rates import WearRates
 from solver.wear.state import Choice, Failure, Reached, WearState
 from solver.wear.step_limit import explicit_step_limit
