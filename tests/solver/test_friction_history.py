@@ -1,7 +1,5 @@
 """Slow time of adaptive histories against exact ones and against many short steps."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -44,11 +42,11 @@ def steps_and_volume(scene_name: str, start: StartState, settings: SolverSetting
 
 
 @pytest.fixture(scope="module")
-def dovetail_start() -> Iterator[StartState]:
+def dovetail_start() -> StartState:
     (start,) = branch_states(
         scene("dovetail_sector", 13, mesh=1), 0.5, 0.5, [2.0 * np.pi * 212.6], SolverSettings(9, 128)
     )
-    yield start
+    return start
 
 
 @pytest.mark.slow
