@@ -21,8 +21,8 @@ from solver.settings import RESOLUTION, Resolution, SolverSettings
 
 RTOL_RATIO = 2.0
 """Ratio of the step tolerances of reference solution and history: BDF2 steps are then a quarter longer. With 4 the
-steps of a reference solution are too long for pairs that stick again: dovetail, 16 pairs, 13 harmonics, 212.75 Hz: 1.208
-mm3 for 1.540, an error of 32 % where 0.4 % is true."""
+steps of a reference solution are too long for pairs that stick again: dovetail, 16 pairs, 13 harmonics, 212.75 Hz:
+1.208 mm3 for 1.540, an error of 32 % where 0.4 % is true."""
 
 AUTOMATIC = SolverSettings()
 """Settings that let `fewer` reduce both harmonics and samples."""
