@@ -94,9 +94,11 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
     error = np.fmax(difference @ area, crossing(apart @ area))
     # the error of the start state remains, even where later states agree by chance
     at_start = np.fmax(_start_error(fine, reference, area), fine["wear_rate_error"][0])
-    error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume)
+    from_start = np.where(volume > 0.0, at_start, 0.0) * volume
     # the local errors of Euler steps have one sign and add up
-    error = np.fmax(error, (1.0 if scheme == "adaptive" else safety) * fine["local"])
+    by_steps = (1.0 if scheme == "adaptive" else safety) * fine["local"]
+    # start state and steps have nothing to do with each other: the worst case is their sum
+    error = np.fmax(error, from_start + by_steps)
     reached = np.isfinite(volume)
     unknown = reached & ~np.isfinite(difference).all(axis=1)
     relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)

@@ -249,7 +249,8 @@ class DenseOutput:
         between["wear_depth"] = depth
         between["depth_rate"] = start.rate + fraction * (end.rate - start.rate)
         between["wear_rate"] = float(between["depth_rate"] @ self.area)
-        between["local"] = end.local
+        # a step may be much longer than the history to the count
+        between["local"] = start.local + fraction * (end.local - start.local)
         for name in CERTIFIED:
             # within a step, the larger violation of its two ends
             between[name] = np.fmax(getattr(one.certificate, name), getattr(other.certificate, name))

@@ -21,6 +21,7 @@ from solver.results.history import PeriodicState
 from solver.settings import FollowedFrequency, Resolution
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.followed import end_at_resonance, lost_resonance
+from solver.wear.friction_history import history_along
 from solver.wear.rates import WearRates
 from solver.wear.state import Choice, Failure, Reached, WearState
 from solver.wear.step_limit import explicit_step_limit
@@ -197,5 +198,8 @@ class WearingJoint:
         if self.follow is not None:
             omega = state.omega + (length / before) * faster
             there = replace(balance, joint=self.case.joint(omega, self.excitation_amplitude))
-        nearer = there.evaluate(ahead).scaled_residual() <= balance.evaluate(now).scaled_residual()
-        return (ahead, there) if nearer else (now, balance)
+        found = there.evaluate(ahead)
+        if found.scaled_residual() > balance.evaluate(now).scaled_residual():
+            return now, balance
+        history = history_along(there.joint, state.point.evaluation, state.point.history, found)
+        return ahead, replace(there, history=history)

@@ -1,0 +1,56 @@
+"""Tangential history of the pairs at the end of a step on the slow time scale.
+
+A pair that does not wear may slide all the same: the wear of other pairs changes its force, and at its friction limit
+it slides a little in each cycle. The place to which it comes depends on the way. A balance alone marches the law from
+the history before the step straight to the last period of the step: one slide for the whole way, in the direction of
+its end. This is an error of first order in the step that the local error of the depths does not show (dovetail, 16 pairs,
+212.6 Hz, `rtol` 1e-2: 1.8 % of the worn volume, with the way in parts 0.4 %).
+
+Here the predicted force goes along a straight line from the state before the step to the extrapolated state, and the
+law is marched at each part of the line until the period repeats. This costs little beside a balance, which still slides
+from the extrapolated to its own state.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solver.contact.alternating_frequency_time import Marched
+from solver.contact.coulomb import STICK, friction_limit
+from solver.contact.options import CONTACT
+from solver.contact.period_march import march_period
+from solver.model import FloatArray
+from solver.options import COMMON
+from solver.structure.joint import Joint
+from solver.wear.options import WEAR
+
+
+def history_along(joint: Joint, before: Marched, history: FloatArray, ahead: Marched) -> FloatArray:
+    """Tangential history (n_contact, 2), m, at the end of a step, for the balance there.
+
+    Parameters
+    ----------
+    joint
+        The joint.
+    before
+        State at the start of the step.
+    history
+        (n_contact, 2), that this state leaves, m.
+    ahead
+        Extrapolated state at the end of the step, marched from this history.
+    """
+    # a pair that sticks with one history at both ends sticks everywhere between: its force lies on a straight line
+    sticks = (before.status_t == STICK).all(axis=1) & (ahead.status_t == STICK).all(axis=1) & (ahead.periods == 1)
+    moving = np.flatnonzero(~(sticks | joint.penalty.inertial))
+    found = history.copy()
+    if moving.size:
+        first, last = before.predicted_t[moving], ahead.predicted_t[moving]
+        friction, stiffness = joint.friction_coefficient[moving], joint.state_stiffness[moving, None]
+        largest = float(friction_limit(friction, last[:, 0].max(axis=1)).max())
+        state = history[moving] * stiffness
+        for part in np.linspace(0.0, 1.0, WEAR.parts_of_step + 1)[1:]:
+            between = first + part * (last - first)
+            state_t = march_period(between, friction, state, COMMON.round_off * largest, CONTACT.most_periods)[1]
+            state = state_t[:, :, -1]
+        found[moving] = state / stiffness
+    return found

@@ -1,0 +1,84 @@
+"""Slow time of adaptive histories against exact ones and against many short steps."""
+
+import numpy as np
+import pytest
+
+from solver.outcome import Outcome
+from solver.results.history import StartState
+from solver.settings import SolverSettings
+from solver.structure.joint import build_case
+from solver.wear import wearing_joint
+from solver.wear.solutions import SlowTime, Solutions
+from solver.wear_history import march_wear
+from tests.references import slider_amplitude, slider_wear_depth
+from tests.solver.models import branch_states, scene
+
+WEAR = 1.1e-11
+AREA = 1e-4
+
+
+def exact_volume(cycles: float, wear: float) -> float:
+    """Worn volume of the default slider at 160 Hz and 10 N, by Den Hartog, m3."""
+    depth = slider_wear_depth(
+        np.array([0.0, cycles]),
+        wear_coefficient=wear,
+        area=AREA,
+        friction_coefficient=0.5,
+        normal_load=10.0,
+        normal_stiffness=1e5,
+        amplitude=lambda limit: slider_amplitude(0.1, 0.0, 1.6e5, 10.0, limit, 2.0 * np.pi * 160.0),
+    )
+    return float(depth[-1]) * AREA
+
+
+def steps_and_volume(scene_name: str, start: StartState, settings: SolverSettings, cycles: float) -> tuple[int, float]:
+    """Number of steps and worn volume, m3, of an adaptive history without its reference solution."""
+    model = scene(scene_name, 13, **({"mesh": 1} if scene_name == "dovetail_sector" else {}))
+    case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
+    solutions = Solutions(case, start, SlowTime(WEAR, "adaptive", np.array([0.0, cycles])))
+    ended = solutions.history()
+    depth = solutions.output_of(ended).read(np.array([cycles]))["wear_depth"]
+    return len(ended.output.course.ends), float((depth @ model.contact.area)[0])
+
+
+@pytest.fixture(scope="module")
+def dovetail_start() -> StartState:
+    (start,) = branch_states(
+        scene("dovetail_sector", 13, mesh=1), 0.5, 0.5, [2.0 * np.pi * 212.6], SolverSettings(9, 128)
+    )
+    return start
+
+
+@pytest.mark.slow
+def test_sticking_pairs_slide_along_the_way_of_a_step(dovetail_start, monkeypatch):
+    """Pairs that stick slide slowly while others wear: with one slide for each step the volume is too small."""
+
+    def volume(rtol: float) -> float:
+        return steps_and_volume("dovetail_sector", dovetail_start, SolverSettings(9, 128, rtol=rtol), 3e4)[1]
+
+    fine = volume(1e-3)
+    assert volume(1e-2) == pytest.approx(fine, rel=3e-3)
+    monkeypatch.setattr(wearing_joint, "history_along", lambda *given: given[2])
+    assert volume(1e-2) < 0.99 * fine
+
+
+@pytest.mark.slow
+def test_the_slow_time_of_the_slider_is_of_second_order():
+    model, settings = scene("sdof_slider", 13), SolverSettings(13, 128)
+    (start,) = branch_states(model, 0.5, 10.0, [2.0 * np.pi * 160.0], settings)
+    given = [SolverSettings(13, 128, rtol=rtol) for rtol in (1e-2, 1e-3, 1e-6)]
+    (few, coarse), (many, fine), (_, finest) = (steps_and_volume("sdof_slider", start, one, 1e5) for one in given)
+    order = np.log(abs(coarse - finest) / abs(fine - finest)) / np.log(many / few)
+    assert order > 1.7
+
+
+@pytest.mark.parametrize(
+    ("wear", "cycles", "outputs", "rtol"), [(1e-13, 1e3, 2, 0.1), (WEAR, 5e3, 101, 1e-2), (WEAR, 1e5, 11, 5e-2)]
+)
+def test_the_error_of_a_history_covers_and_does_not_alarm(wear, cycles, outputs, rtol):
+    """Also for a count at the beginning of a long step, and where start state and steps have similar errors."""
+    counts = np.linspace(0.0, cycles, outputs)
+    history = march_wear(scene("sdof_slider", 21), 160.0, 10.0, 0.5, wear, counts, settings=SolverSettings(rtol=rtol))
+    true = abs(float(history.worn_volume[-1]) / exact_volume(cycles, wear) - 1.0)
+    assert history.outcome is Outcome.CONVERGED
+    assert true <= history.error_estimate <= 2.0 * rtol
