@@ -195,7 +195,7 @@ class Solutions:
         work, end = self._joint(), float(compared[-1])
         resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in like.resolutions)
         integration = Integration(
-            AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, bounded=False, end=self._last_step_end(end)),
+            AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, end=self._last_step_end(end)),
             PlainCheck(resolutions),
             AtCount(end),
             DenseOutput(work.area, compared, smooth=True),
