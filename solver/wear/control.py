@@ -126,6 +126,9 @@ def step_across(work: WearingJoint, state: WearState, shortest: float, end: floa
     shortest: length of the step whose end is not found, cycles.
     end: cycle count beyond which no step goes.
     """
+    # a search without success leaves no trace: where a joint begins to slide, round-off decides what is found next
+    kept = work.solver
+    work.drop_factor()
     for doubling in range(1, WEAR.doublings_across + 1):
         length = 2.0**doubling * shortest
         if state.cycle + length > end:
@@ -134,6 +137,7 @@ def step_across(work: WearingJoint, state: WearState, shortest: float, end: floa
         if tried is not None and is_smooth(state, tried):
             size = float(np.abs(tried.error) @ work.area)
             return Step(work.accepted(state, tried.end, length).planned(length), size, length)
+    work.solver = kept
     return None
 
 
