@@ -18,9 +18,9 @@ class WearOptions:
     """Shortest step, as a fraction of the first step."""
 
     doublings_across: int = 4
-    """Most doublings of the shortest step to go across corners. Dovetail, mesh 2, nodal diameter 3, 213.5 Hz: two or
-    four are needed; mesh 1, 212.42 Hz, rtol 0.05: three. Without them both end as `march_failed` with some kernels of
-    the BLAS. The local errors of these steps are 0.1 to 2 times the allowed ones."""
+    """Most doublings of the shortest step to go across corners. Dovetail, mesh 2, nodal diameter 3, 213.5 Hz, and mesh
+    1, 212.42 Hz, rtol 0.05: three are needed. Without them both end as `march_failed` with some kernels of the BLAS. The
+    local errors of these steps are 0.1 to 2.7 times the allowed ones."""
 
     # Euler steps
     largest_moved_load: float = 10.0
