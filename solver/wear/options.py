@@ -19,7 +19,7 @@ class WearOptions:
 
     doublings_across: int = 4
     """Most doublings of the shortest step to go across corners. Dovetail, mesh 2, nodal diameter 3, 213.5 Hz, and mesh
-    1, 212.42 Hz, rtol 0.05: three are needed. Without them both end as `march_failed` with some kernels of the BLAS. The
+    1, 212.42 Hz, rtol 0.05: three are needed. Without them both end as `march_failed` with some BLAS kernels. The
     local errors of these steps are 0.1 to 2.7 times the allowed ones."""
 
     # Euler steps
