@@ -14,7 +14,7 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.converged import vibration_change
 from solver.options import COMMON
 from solver.settings import Scheme
-from solver.wear.bdf2 import bdf2_attempt
+from solver.wear.bdf2 import Attempt, bdf2_attempt
 from solver.wear.options import WEAR
 from solver.wear.state import Failure, WearState
 from solver.wear.step import Step, bounded_euler_step, euler_step
@@ -72,14 +72,12 @@ class AdaptiveSteps:
     `k_w h`. So histories that differ in k_w only take equal steps in `k_w h`.
 
     rtol: relative error of the worn volume.
-    bounded: whether a step that moves many times the normal forces is refused.
     end: cycle count beyond which no step goes; inf for steps that go beyond the last count. At least two steps lead
         there, where the first one has its usual length.
     first: length of the first step over its usual length.
     """
 
     rtol: float
-    bounded: bool = True
     end: float = np.inf
     first: float = 1.0
 
@@ -98,7 +96,8 @@ class AdaptiveSteps:
         """One step within the allowed error.
 
         The shortest step is half of the accuracy to which the end of a branch is located. Where the vibration changes
-        much over the shortest step, or its end is not found, an Euler step shows whether the branch ends there.
+        much over the shortest step, or its end is not found, an Euler step shows whether the branch ends there. An end
+        that a longer step goes across is only a corner.
         """
         length = min(state.length, self.end - state.cycle)
         shortest = max(0.5 * WEAR.fold_resolution * state.cycle, WEAR.shortest_slow_step * state.first_length)
@@ -110,16 +109,46 @@ class AdaptiveSteps:
                 before, after = (float(at @ work.area) for at in (state.depth, tried.end.point.evaluation.wear_depth))
                 ratio = size / allowed_error(self.rtol, before, after, state.cycle, length)
                 # at the shortest step: a corner of the wear rate, or the end of the branch if the vibration changes
-                calm = vibration_change(state.point.evaluation, tried.end.point.evaluation) < CONTINUATION.smooth_change
-                if ratio <= 1.0 or (length <= shortest and calm):
+                if ratio <= 1.0 or (length <= shortest and is_smooth(state, tried)):
                     ahead = length * next_ratio(ratio, accepted=True)
                     return Step(work.accepted(state, tried.end, length).planned(ahead), size, length)
                 shorter = next_ratio(ratio, accepted=False)
             if length <= shortest:
-                one_step = bounded_euler_step if self.bounded else euler_step
-                taken = one_step(work, state, length, "implicit")
-                return taken if isinstance(taken, Failure) else replace(taken, state=taken.state.planned(length))
+                taken = euler_step(work, state, length, "implicit")
+                across = step_across(work, state, length, self.end) if tried is None and not taken.arrived else None
+                return across or replace(taken, state=taken.state.planned(length))
             length = max(shorter * length, 0.999 * shortest)
+
+
+def step_across(work: WearingJoint, state: WearState, shortest: float, end: float) -> Step | None:
+    """A step that is longer than the shortest one, across corners of the branch; None where it is not found.
+
+    Where the last pairs that stick come loose one by one, the mean position of the joint is soft, and the branch has a
+    corner with a small fold at each pair. Between such corners no step ends, however short, while Newton's method finds
+    the state behind all of them.
+
+    shortest: length of the step whose end is not found, cycles.
+    end: cycle count beyond which no step goes.
+    """
+    # a search without success leaves no trace: where a joint begins to slide, round-off decides what is found next
+    kept = work.solver
+    work.drop_factor()
+    for doubling in range(1, WEAR.doublings_across + 1):
+        length = 2.0**doubling * shortest
+        if state.cycle + length > end:
+            break
+        tried = bdf2_attempt(work, state, length)
+        if tried is not None and is_smooth(state, tried):
+            size = float(np.abs(tried.error) @ work.area)
+            return Step(work.accepted(state, tried.end, length).planned(length), size, length)
+    work.solver = kept
+    return None
+
+
+def is_smooth(state: WearState, tried: Attempt) -> bool:
+    """Whether the vibration changes so little over a step that the branch does not end within the step."""
+    change = vibration_change(state.point.evaluation, tried.end.point.evaluation)
+    return change < CONTINUATION.smooth_change
 
 
 def allowed_error(rtol: float, before: float, after: float, count: float, length: float) -> float:

@@ -195,7 +195,7 @@ class Solutions:
         resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in like.resolutions)
         # a short history may consist of its first steps, which do not depend on rtol
         first = 2.0 if self.asked.ends_at_last else 1.0
-        steps = AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, False, self._last_step_end(end), first)
+        steps = AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, self._last_step_end(end), first)
         integration = Integration(
             steps,
             PlainCheck(resolutions, with_resonance=self._shifts),

@@ -113,6 +113,35 @@ def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monk
     assert depths(states)[1] == pytest.approx(euler.length * rates(states)[1], rel=1e-6)
 
 
+@pytest.mark.parametrize(("found_from", "end", "doublings"), [(3.0, np.inf, 2), (3.0, 3.5, None), (40.0, np.inf, None)])
+def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeypatch, found_from, end, doublings):
+    work, state = begun(WEAR)
+    first = AdaptiveSteps(1e-2).begin(work, state)
+    shortest = OPTIONS.shortest_slow_step * first.length
+    own, tried, ended = control.bdf2_attempt, list[float](), list[Step]()
+
+    def attempt(joint, at, length):
+        tried.append(length)
+        return own(joint, at, length) if ended and length > found_from * shortest else None
+
+    def end_here(_, at, length, __):
+        ended.append(Step(at, 0.0, length, arrived=False, end_known_to=0.01 * length))
+        return ended[-1]
+
+    monkeypatch.setattr(control, "bdf2_attempt", attempt)
+    monkeypatch.setattr(control, "euler_step", end_here)
+    step = AdaptiveSteps(1e-2, end=end * shortest).step(work, first)
+    (corner,) = ended
+    assert step.arrived == (doublings is not None)
+    if doublings is None:
+        assert step.state.cycle == corner.state.cycle
+        assert step.end_known_to == corner.end_known_to
+    else:
+        assert tried[-2:] == [2.0 * corner.length, 4.0 * corner.length]
+        assert step.state.cycle == step.length == 2.0**doublings * corner.length
+        assert step.error > 0.0
+
+
 def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
     # no error is refused, so that steps grow as they may
     monkeypatch.setattr(control, "COMMON", replace(COMMON, step_error_fraction=1e9))
