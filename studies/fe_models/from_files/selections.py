@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,14 +19,20 @@ _MOST_NAMED = 6
 
 @dataclass(frozen=True)
 class Selections:
-    """What the names of a deck stand for in its mesh. Names may be written in small letters."""
+    """What the names of a deck stand for in its mesh. Names may be written in small letters.
+
+    references: rows of nodes without elements that others follow.
+    """
 
     deck: Deck
     mesh: SolidMesh
+    references: Mapping[int, int] = field(default_factory=dict)
 
     def rows(self, numbers: IntArray) -> IntArray:
-        """Rows of the nodes that are in the mesh; others, as reference points, are left out."""
+        """Rows of the nodes that are in the mesh; of other nodes alone, those that others follow."""
         inside = np.intersect1d(numbers, self.mesh.numbers)
+        if not len(inside):
+            return np.array([self.references[each] for each in numbers if each in self.references], dtype=np.int64)
         return np.searchsorted(self.mesh.numbers, inside).astype(np.int64)
 
     def nodes(self, name: str, key: str) -> IntArray:

@@ -14,6 +14,7 @@ from scipy import sparse
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.condensation.dissection import Dissection, dissect
 from studies.finite_element.condensation.ordered_form import OrderedForm, order_form
+from studies.finite_element.joint.constraints import Constraints
 from studies.finite_element.joint.cut_faces import CutFaces
 from studies.finite_element.joint.pairing import ContactPairs
 from studies.scene_error import SceneError
@@ -34,12 +35,14 @@ class Supports:
     held (n_nodes, 3): displacements that are 0.
     cut: cut faces; None where the structure is no cyclic sector.
     n_reductions: number of nodal diameters at which the structure will be reduced. More are possible and take longer.
+    constraints: displacements that follow others, which are held as well; None where there are none.
     """
 
     numbers: IntArray
     held: BoolArray
     cut: CutFaces | None
     n_reductions: int = 1
+    constraints: Constraints | None = None
 
     @property
     def keeps_cut(self) -> bool:
@@ -86,9 +89,28 @@ class Supports:
         master[held[master] | held] = -1
         return master
 
+    def opposite(self, pairs: ContactPairs) -> sparse.csr_matrix:
+        """Displacements (3 n_contact, 3 n_nodes) of the opposite points from those that depend on no other."""
+        points = sparse.kron(pairs.opposite, np.eye(3), format="csr")
+        return points if self.constraints is None else (points @ self.constraints.transformation).tocsr()
+
     def phase(self, nodal_diameter: int) -> complex | float:
         """Phase in the elimination: `exp(i phi)` of a nodal diameter, or 1.0."""
         return 1.0 if self.cut is None or self.keeps_cut else self.cut.phase(nodal_diameter)
+
+
+def check_followers(supports: Supports, pairs: ContactPairs, ties: ContactPairs | None) -> None:
+    """Raises SceneError where a node follows others by a constraint and in another way as well."""
+    if supports.constraints is None:
+        return
+    followers = [(pairs.moving, "moves in a contact pair", "take it out of one of them, or refine the other surface")]
+    if ties is not None:
+        followers.append((ties.moving, "is tied", "take it out of one of them"))
+    if supports.cut is not None:
+        both = np.concatenate([supports.cut.left, supports.cut.right])
+        followers.append((both, "is on a cut face", "let other nodes depend on this one"))
+    for nodes, what, remedy in followers:
+        supports.constraints.check_free(nodes, supports.numbers, what, remedy)
 
 
 def consistent_supports(supports: Supports) -> Supports:
@@ -250,10 +272,10 @@ class OrderedStructure:
         pairs, supports, first = self.pairs, self.supports, self.dissection.n_eliminated
         n_kept, n_contact = len(self.free) - first, pairs.n_contact
         all_nodes = self.followers(nodal_diameter)[:, 3 * first :]
-        moving, follow = [pairs.moving], [sparse.kron(pairs.opposite, np.eye(3), format="csr")]
+        moving, follow = [pairs.moving], [supports.opposite(pairs)]
         if self.ties is not None:
             moving.append(self.ties.moving)
-            follow.append(sparse.kron(self.ties.opposite, np.eye(3), format="csr"))
+            follow.append(supports.opposite(self.ties))
         if supports.cut is not None and supports.keeps_cut:
             loose_cut = self.place[supports.cut.right] >= 0
             moving.append(supports.cut.right[loose_cut])
@@ -315,7 +337,7 @@ def order_structure(
     ones = np.ones(np.count_nonzero(both), dtype=np.int8)
     couplings = sparse.csr_matrix((ones, (rows[both], columns[both])), shape=(len(free), len(free)))
     bound = [pairs] if ties is None else [pairs, ties]
-    nodes = [part for each in bound for part in (each.moving, each.opposite.indices)]
+    nodes = [part for each in bound for part in (each.moving, supports.opposite(each).indices // 3)]
     if supports.cut is not None and supports.keeps_cut:
         nodes += [supports.cut.left, supports.cut.right]
     involved = master[np.concatenate(nodes)]

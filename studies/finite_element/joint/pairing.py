@@ -26,6 +26,7 @@ class ContactSurfaces:
     friction_coefficient: of these surfaces; None where all pairs have the same.
     with_gaps: whether distances in the mesh are gaps of the joint. Otherwise they are errors of flat facets on curved
         surfaces, and the pairs touch.
+    clearance: gap of all pairs in place of the distances, m, negative for an interference; None for the distances.
     label: of the pairs; the names of both surfaces if empty.
     """
 
@@ -34,6 +35,7 @@ class ContactSurfaces:
     tolerance: float | None = None
     friction_coefficient: float | None = None
     with_gaps: bool = False
+    clearance: float | None = None
     label: str = ""
 
     @property
@@ -197,7 +199,9 @@ def _pair(coordinates: FloatArray, contact: ContactSurfaces, place: int, along: 
         area=area,
         position=coordinates[nodes],
         distance=distance,
-        gap=distance if contact.with_gaps else np.zeros(n),
+        gap=np.full(n, contact.clearance or 0.0)
+        if contact.clearance is not None or not contact.with_gaps
+        else distance,
         surface=np.full(n, place),
         moving_name=(moving.name,),
         opposite_name=(opposite.name,),

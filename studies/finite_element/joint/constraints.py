@@ -1,0 +1,158 @@
+"""Linear constraints: displacements that depend on others, and are eliminated before anything is reduced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from solver.model import BoolArray, FloatArray, IntArray
+from studies.scene_error import SceneError
+
+_LONGEST_CHAIN = 100  # displacements that depend on others that depend on others
+_NOTHING = 1e-12  # square of a motion that moves no node, over that of one that does
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """Displacements (d,) that are sums of others, by their places in (3 n_nodes,).
+
+    dependent (d,): the displacements. row, column, value (t,): coefficients; rows count the dependent ones.
+    origin (d,): what makes each depend, a place in `origins`. origins: where they stand, for messages.
+    """
+
+    dependent: IntArray
+    row: IntArray
+    column: IntArray
+    value: FloatArray
+    origin: IntArray
+    origins: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """`u = transformation @ q`: q are the displacements that depend on no other and are not held, the rest of q is 0.
+
+    transformation (3 n_nodes, 3 n_nodes). dependent (n_nodes, 3): which displacements move with others.
+    origin (n_nodes,): what makes a node depend on others, a place in `origins`; -1 for none.
+    """
+
+    transformation: sparse.csr_matrix
+    dependent: BoolArray
+    origin: IntArray
+    origins: Sequence[str]
+
+    def apply(self, form: sparse.csr_matrix) -> sparse.csr_matrix:
+        """A form of q: `T^T K T`."""
+        return (self.transformation.T @ form @ self.transformation).tocsr()
+
+    def forces(self, vectors: FloatArray) -> FloatArray:
+        """Forces (3 n_nodes, ...) on q."""
+        return np.asarray(self.transformation.T @ vectors)
+
+    def check_free(self, nodes: IntArray, numbers: IntArray, what: str, remedy: str) -> None:
+        """Raises SceneError where one of the nodes depends on others. what: the nodes are, for the message."""
+        wrong = nodes[self.dependent[nodes].any(axis=1)]
+        if len(wrong):
+            found = f"{self.origins[self.origin[wrong[0]]]}: node {numbers[wrong[0]]} depends on others and {what}"
+            raise SceneError("model", found, remedy)
+
+
+def eliminate(
+    dependence: Dependence, held: BoolArray, numbers: IntArray, motions: Sequence[IntArray]
+) -> tuple[Constraints, BoolArray]:
+    """Constraints, and which displacements (n_nodes, 3) are 0 or follow others.
+
+    Parameters
+    ----------
+    dependence
+        Which displacements depend on others.
+    held
+        (n_nodes, 3): displacements that are 0.
+    numbers
+        (n_nodes,): of the nodes in the file, for messages.
+    motions
+        Displacements of nodes without elements, each (m,): those of their motions that move nothing are held.
+
+    Raises
+    ------
+    SceneError
+        Where a displacement depends twice, on itself, or is held as well.
+    """
+    size, dependent = held.size, dependence.dependent
+    _check_once(dependence, held, numbers)
+    shape = (size, size)
+    steps = sparse.csr_matrix((dependence.value, (dependent[dependence.row], dependence.column)), shape=shape)
+    own = np.ones(size)
+    own[dependent] = 0.0
+    total = sparse.diags(own, format="csr")
+    power = steps
+    for _ in range(_LONGEST_CHAIN):
+        total = total + power @ sparse.diags(own)
+        power = power @ steps
+        power.eliminate_zeros()
+        if power.nnz == 0:
+            break
+    else:
+        found = f"{dependence.origins[dependence.origin[0]]}: displacements depend on each other in a circle"
+        raise SceneError("model", found, "let each depend on others that do not depend on it")
+    fixed = held.ravel().copy()
+    total = total @ sparse.diags((~fixed).astype(float))
+    total, idle = _without_idle(total.tocsr(), motions, fixed)
+    fixed[idle] = True
+    total.eliminate_zeros()
+    moves = np.zeros(size, dtype=np.bool_)
+    moves[dependent] = np.diff(total.indptr)[dependent] > 0
+    fixed[dependent] = True
+    origin = np.full(len(held), -1)
+    origin[dependent // 3] = dependence.origin
+    return Constraints(total, moves.reshape(-1, 3), origin, dependence.origins), fixed.reshape(-1, 3)
+
+
+def _check_once(dependence: Dependence, held: BoolArray, numbers: IntArray) -> None:
+    """Each displacement depends once, and is not held."""
+    dependent, origins = dependence.dependent, dependence.origins
+    order = np.argsort(dependent, kind="stable")
+    twice = np.flatnonzero(dependent[order][1:] == dependent[order][:-1])
+    if len(twice):
+        first, second = order[twice[0]], order[twice[0] + 1]
+        where = f"displacement {dependent[first] % 3 + 1} of node {numbers[dependent[first] // 3]}"
+        found = (
+            f"{origins[dependence.origin[second]]}: {where} depends on others by {origins[dependence.origin[first]]}"
+        )
+        raise SceneError("model", found, "let each displacement depend once: take it out of one of them")
+    wrong = np.flatnonzero(held.ravel()[dependent])
+    if len(wrong):
+        at = dependent[wrong[0]]
+        found = f"{origins[dependence.origin[wrong[0]]]}: displacement {at % 3 + 1} of node {numbers[at // 3]}"
+        raise SceneError("model", f"{found} depends on others and is held", "take the node out of one of them")
+
+
+def _without_idle(
+    total: sparse.csr_matrix, motions: Sequence[IntArray], fixed: BoolArray
+) -> tuple[sparse.csr_matrix, IntArray]:
+    """The transformation with motions of which some move nothing, as a turn about a line of nodes, and these."""
+    change = sparse.eye(len(fixed), format="lil")
+    idle: list[int] = []
+    others = np.setdiff1d(np.arange(len(fixed)), np.concatenate([*motions, np.empty(0, dtype=np.int64)]))
+    moved = total[others]
+    for motion in motions:
+        motion = motion[~fixed[motion]]
+        columns = moved[:, motion]
+        gram = (columns.T @ columns).toarray()
+        scale = np.sqrt(np.diag(gram))
+        idle += motion[scale == 0.0].tolist()
+        motion, scale = motion[scale > 0.0], scale[scale > 0.0]
+        if not len(motion):
+            continue
+        live = gram[np.ix_(np.diag(gram) > 0.0, np.diag(gram) > 0.0)] / np.outer(scale, scale)
+        values, vectors = np.linalg.eigh(live)
+        nothing = values < _NOTHING * values[-1]
+        if nothing.any():
+            change[np.ix_(motion, motion)] = vectors / scale[:, None]
+            idle += motion[nothing].tolist()
+    keep = np.ones(len(fixed))
+    keep[idle] = 0.0
+    return (total @ change.tocsr() @ sparse.diags(keep)).tocsr(), np.array(idle, dtype=np.int64)
