@@ -15,6 +15,7 @@ from studies.fe_models.deck import material_keywords as materials
 from studies.fe_models.deck import step_keywords as steps
 from studies.fe_models.deck.draft import Draft
 from studies.fe_models.text.keyword_lines import Block
+from studies.fe_models.text.read_errors import shown
 
 Reader = Callable[[Draft, Block], None]
 
@@ -42,20 +43,33 @@ PROCEDURES = (
 )
 """Keywords that say what a step computes; their parameters and data do not matter."""
 
-HARMLESS = frozenset(
-    # output
-    "OUTPUT NODEOUTPUT ELEMENTOUTPUT CONTACTOUTPUT ENERGYOUTPUT MODALOUTPUT INTEGRATEDOUTPUT RADIATIONOUTPUT"
-    " NODEPRINT ELPRINT CONTACTPRINT ENERGYPRINT FACEPRINT SECTIONPRINT MODALPRINT PRINT PREPRINT NODEFILE ELFILE"
-    " CONTACTFILE ENERGYFILE MODALFILE FILEFORMAT FILEOUTPUT MONITOR FILTER TIMEPOINTS MATRIXOUTPUT RESTART"
-    " INCREMENTATIONOUTPUT DIAGNOSTICS INTEGRATEDOUTPUTSECTION ELEMENTMATRIXOUTPUT"
-    # how a program computes its steps
-    " CONTROLS SOLVERCONTROLS CONTACTCONTROLS SECTIONCONTROLS AMPLITUDE SELECTCYCLICSYMMETRYMODES SELECTEIGENMODES"
-    " MODALDAMPING BASEMOTION SUBSTRUCTUREOUTPUT"
-    # heat, without which there are no strains by heat; what has no meaning for isotropic solids
-    " CONDUCTIVITY SPECIFICHEAT LATENTHEAT PHYSICALCONSTANTS FILM RADIATE CFLUX DFLUX SFILM DSFLUX GAPCONDUCTANCE"
-    " ORIENTATION".split()
-)
+_OUTPUT = """
+OUTPUT NODEOUTPUT ELEMENTOUTPUT CONTACTOUTPUT ENERGYOUTPUT MODALOUTPUT INTEGRATEDOUTPUT RADIATIONOUTPUT NODEPRINT
+ELPRINT CONTACTPRINT ENERGYPRINT FACEPRINT SECTIONPRINT MODALPRINT PRINT PREPRINT NODEFILE ELFILE CONTACTFILE ENERGYFILE
+MODALFILE FILEFORMAT FILEOUTPUT MONITOR FILTER TIMEPOINTS MATRIXOUTPUT RESTART INCREMENTATIONOUTPUT DIAGNOSTICS
+INTEGRATEDOUTPUTSECTION ELEMENTMATRIXOUTPUT SUBSTRUCTUREOUTPUT
+"""
+_HOW_STEPS_ARE_COMPUTED = """
+CONTROLS SOLVERCONTROLS CONTACTCONTROLS SECTIONCONTROLS AMPLITUDE SELECTCYCLICSYMMETRYMODES SELECTEIGENMODES
+MODALDAMPING BASEMOTION
+"""
+_HEAT_AND_DIRECTIONS = """
+CONDUCTIVITY SPECIFICHEAT LATENTHEAT PHYSICALCONSTANTS FILM RADIATE CFLUX DFLUX SFILM DSFLUX GAPCONDUCTANCE ORIENTATION
+"""  # strains by heat are refused, and materials are isotropic
+
+HARMLESS = frozenset((_OUTPUT + _HOW_STEPS_ARE_COMPUTED + _HEAT_AND_DIRECTIONS).split())
 """Keywords that cannot change the model, in capitals without blanks. They are skipped and named."""
+
+_INSTEAD = {
+    **dict.fromkeys(("CONTACT", "CONTACTINCLUSIONS"), "give *CONTACT PAIR for the surfaces that touch"),
+    "DAMPING": "remove it: the damping is loss_factor of the study",
+    "EMBEDDEDELEMENT": "give *TIE, or meshes that share their nodes",
+    "DISTRIBUTING": "write *KINEMATIC, or give the load on the surface",
+    "PARAMETER": "write numbers in place of <names>",
+    "PLASTIC": "remove it: materials are elastic",
+    "PRE-TENSIONSECTION": "remove it, and give the force of the bolt with `preload` in the study",
+}
+"""Remedies for some of the others."""
 
 _LOAD = "OP AMPLITUDE"
 
@@ -135,11 +149,11 @@ def read_keyword(draft: Draft, block: Block) -> None:
         if block.keyword in HARMLESS:
             draft.skip(block)
             return
-        remedy = "remove it if the model is right without it, or write what it does with keywords that are"
+        remedy = _INSTEAD.get(block.keyword, "remove it if the model is right without it")
         raise block.place.wrong(f"*{block.written} is not read, and may change the model", remedy)
     if "*" not in known.parameters:
         for name in block.parameters:
             if name not in known.parameters and name not in known.harmless:
-                found = f"*{block.written} with {name[:40]}, which is not read and may change the model"
-                raise block.place.wrong(found, f"leave {name[:40]} out if the model is right without it")
+                found = f"*{block.written} with {shown(name)}, which is not read and may change the model"
+                raise block.place.wrong(found, f"leave {shown(name)} out if the model is right without it")
     known.reader(draft, block)

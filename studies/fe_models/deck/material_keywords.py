@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from studies.fe_models.deck.draft import Draft, DraftMaterial, Lookup, refuse
-from studies.fe_models.deck.mesh import SolidSection
+from studies.fe_models.deck.mesh import IntArray, SolidSection
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import read_float, read_floats
 from studies.fe_models.text.read_errors import shown
@@ -64,9 +64,11 @@ def read_other_section(draft: Draft, block: Block) -> None:
     """*BEAM SECTION, *MASS and others: elements that are not read carry something."""
     reference = draft.refer(f'"{block.name("ELSET")}"', block.place)
 
-    def unassembled(found: Lookup) -> list[str]:
-        kinds = found.other_kinds(found.elements(reference)[1])
-        return [f"{block.place}: *{block.written} of elements of type {' and '.join(kinds)}"] if kinds else []
+    def unassembled(found: Lookup) -> list[tuple[str, IntArray]]:
+        elements = found.elements(reference)[1]
+        kinds = found.other_kinds(elements)
+        text = f"{block.place}: *{block.written} of elements of type {' and '.join(kinds)}, which are not read"
+        return [(text, elements)] if kinds else []
 
     draft.add("unassembled", unassembled)
 

@@ -35,6 +35,9 @@ the code itself.
 """
 
 
+_MOST_NAMED = 20  # keywords in one line
+
+
 @dataclass(frozen=True)
 class ElementBlock:
     """Elements of one kind.
@@ -299,6 +302,13 @@ class Deck:
     skipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     included: tuple[str, ...] = ()
+
+    @property
+    def remarks(self) -> tuple[tuple[str, str], ...]:
+        """Label and text of lines for the user: what was skipped, where there is something, and the notes."""
+        more = len(self.skipped) - _MOST_NAMED
+        skipped = "; ".join(self.skipped[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+        return (*((("skipped", skipped),) if skipped else ()), *(("note", text) for text in self.notes))
 
     def rows_of_nodes(self, numbers: IntArray) -> IntArray:
         """Places of nodes in `coordinates`, of the shape of `numbers`; all of them must exist."""

@@ -35,7 +35,7 @@ def read_node(draft: Draft, block: Block) -> None:
 
 
 def read_system(draft: Draft, block: Block) -> None:
-    """*SYSTEM: origin, a point on the first axis, a point in the plane of the first two; without data the global one."""
+    """*SYSTEM: origin, a point on the first axis, a point in the plane of two axes; no data: the global one."""
     draft.system = draft.world
     if not block.lines:
         return
@@ -68,8 +68,6 @@ def read_element(draft: Draft, block: Block) -> None:
         raise block.place.wrong(found, f"mesh the model with {known}, and remove elements that carry nothing")
     records = read_records(block, length + 1, f"a {kind} of {length} nodes with its number")
     draft.elements.append(Records(draft.scope, records[:, 0], records[:, 1:], block.place, kind))
-    if kind in OTHER_KINDS:
-        draft.skipped.append(f"{block.place}: *{block.written} of type {kind}, without a section")
     if "ELSET" in block.parameters:
         draft.element_sets.add(draft.scope, block.name("ELSET"), records[:, 0])
 

@@ -72,7 +72,7 @@ class _Resolved:
         gone = self._gone(fields)
         blocks = [_without(block, gone) for block in self.blocks if block.kind in NODES_OF_KIND]
         kept = np.setdiff1d(self.all_elements[self.solid], gone)
-        names = ("ties", "boundaries", "transforms", "equations", "rigid_motions", "sections", "forces", "unassembled")
+        names = ("ties", "boundaries", "transforms", "equations", "rigid_motions", "sections", "forces")
         loads = [load for load in fields.get("centrifugal", []) if np.isin(load.elements, kept).any() or not kept.size]
         return Deck(
             path=draft.name,
@@ -88,7 +88,8 @@ class _Resolved:
             centrifugal=tuple(loads),
             gravity=self._gravity(fields, kept),
             n_instances=len(draft.placed),
-            skipped=tuple(draft.skipped),
+            unassembled=tuple(text for text, _ in fields.get("unassembled", [])),
+            skipped=(*draft.skipped, *self._idle(fields)),
             notes=(*self.node_sets.notes, *self.element_sets.notes, *draft.notes, *self._numbering()),
             included=tuple(draft.included),
             **{name: tuple(fields.get(name, ())) for name in names},
@@ -200,6 +201,13 @@ class _Resolved:
     def _n_faces(self) -> IntArray:
         faces = {kind: FACES_OF_CORNERS[n] for kind, n in NODES_OF_KIND.items()}
         return np.array([faces.get(kind, 0) for kind in self.kinds], dtype=np.int64)
+
+    def _idle(self, fields: Mapping[str, list[Any]]) -> Iterator[str]:
+        """Elements that are not read, and carry nothing as no section has them."""
+        carry = np.concatenate([np.empty(0, dtype=np.int64), *(own for _, own in fields.get("unassembled", []))])
+        for each in self.draft.elements:
+            if each.kind not in NODES_OF_KIND and not np.isin(each.numbers + self.offsets[each.scope], carry).all():
+                yield f"{each.place}: *ELEMENT of type {each.kind} without a section"
 
     def _gone(self, fields: Mapping[str, list[Any]]) -> IntArray:
         """Elements that *MODEL CHANGE takes away."""

@@ -65,7 +65,7 @@ def describe_model(
     pull = _static_pull(scene.model)
     if pull is not None:
         rows.append(("static", pull))
-    rows += [("left out", text) for text in (*deck.skipped, *deck.notes)]
+    rows += deck.remarks
     return rows
 
 

@@ -45,7 +45,7 @@ def refused(path, sentence):
         (LEAST + "2,1,2,3,4,\n", None),
         (LEAST + "2,1,2,3,9\n", r"deck.inp, line 6: element 2 has the node 9, which does not exist"),
         (LEAST + "1,4,3,2,1\n", "deck.inp, line 6: element 1 is defined again"),
-        (LEAST + "*ELEMENT,TYPE=S4R\n5,1,2,3,4\n", r"deck.inp, line 8: elements of type S4R; mesh the model with C3D4"),
+        (LEAST + "*ELEMENT,TYPE=XYZ\n5,1,2,3,4\n", r"deck.inp, line 8: elements of type XYZ; mesh the model with C3D4"),
         (LEAST + "*ELEMENT\n5,1,2,3,4\n", r"deck.inp, line 8: \*ELEMENT without TYPE"),
         (LEAST + "*NSET,NSET=A,GENERATE\n1,1000000000,1\n", None),
         (LEAST + "*NSET,NSET=A,GENERATE\n" + "1,2000000000\n" * 10_000, None),
@@ -70,13 +70,13 @@ def refused(path, sentence):
         (LEAST + "*MATERIAL,NAME=M\n*ELASTIC\n-1,0.3\n", "deck.inp, line 10: Young's modulus -1"),
         (LEAST + "*SOLID SECTION,ELSET=E,MATERIAL=M\n", "deck.inp, line 8: there is no material M"),
         (LEAST + "*STEP\n*DLOAD\nE,CENTRIF,1.,0,0,0,0,0,0\n", "deck.inp, line 10: CENTRIF without a direction"),
-        ("*PART,NAME=A\n*END PART\n*PART,NAME=B\n", r"deck.inp, line 3: a second \*PART; write a flat deck"),
-        (PART.replace("*End Assembly", "*Instance,name=B\n*End Instance"), r"a second \*INSTANCE; write a flat deck"),
+        ("*PART,NAME=A\n*END PART\n*PART,NAME=A\n", r"deck.inp, line 3: \*PART A again"),
+        (PART.replace("*End Assembly", "*Instance,name=B,part=C\n"), r"line 38: \*INSTANCE B of C, which is no part"),
         ("*INCLUDE,INPUT=deck.inp\n", "deck.inp, line 1: deck.inp includes itself"),
         ("*INCLUDE,INPUT=none.inp\n", "deck.inp, line 1: there is no file none.inp; copy it beside the deck"),
         ("*INCLUDE,INPUT=../../etc/passwd\n", "deck.inp, line 1: ../../etc/passwd is outside the deck's folder"),
         ("*NODE,INPUT=/dev/zero\n", "deck.inp, line 1: /dev/zero is outside the deck's folder"),
-        ("*NODE,SYSTEM=C\n1,0,0,0\n", "deck.inp, line 1: nodes in cylindrical"),
+        ("*NODE,SYSTEM=C\n1,0,0,0\n", r"deck.inp, line 1: \*NODE: nodes in cylindrical"),
     ],
 )
 def test_hostile_deck(tmp_path, text, sentence):
@@ -128,7 +128,7 @@ def test_too_many_lines(tmp_path, monkeypatch):
 
 def test_sets_that_grow(tmp_path, monkeypatch):
     monkeypatch.setattr("studies.fe_models.deck.sets._MOST_MEMBERS", 100)
-    monkeypatch.setattr("studies.fe_models.deck.finish._MOST_FACES", 20)
+    monkeypatch.setattr("studies.fe_models.deck.resolve._MOST_FACES", 20)
     refused(write(tmp_path, LEAST + "*NSET,NSET=A\n" + "NALL\n" * 30), "the sets have more than 100 members")
     refused(write(tmp_path, LEAST + "*SURFACE,NAME=S\n" + "E,S1\n" * 30), "more than 20 faces")
 
