@@ -133,6 +133,7 @@ class Boundary:
     first_dof, last_dof: 1 to 3 are displacements along x, y and z, or along the directions of a `Transform`; 4 to 6
         rotations of reference points; larger numbers are possible.
     value: displacement; 0 for held ones.
+    place: in the file, for messages.
     """
 
     name: str
@@ -140,6 +141,7 @@ class Boundary:
     first_dof: int
     last_dof: int
     value: float
+    place: str = ""
 
 
 @dataclass(frozen=True)
@@ -268,6 +270,8 @@ class Deck:
         Constant loads of static steps; the acceleration (3,) acts on all elements, None where there is none.
     unassembled
         What has a stiffness or a mass that only matrices of another program hold, as "deck.inp, line 7: ...".
+    n_removed
+        Elements that *MODEL CHANGE takes away; they are not among the others.
     n_instances
         Of parts; where there are several, numbers are not those of the file.
     skipped
@@ -298,6 +302,7 @@ class Deck:
     forces: tuple[NodalForce, ...] = ()
     gravity: FloatArray | None = None
     unassembled: tuple[str, ...] = ()
+    n_removed: int = 0
     n_instances: int = 0
     skipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

@@ -87,6 +87,7 @@ class _Resolved:
             materials={name: self._material(each, fields) for name, each in draft.materials.items()},
             centrifugal=tuple(loads),
             gravity=self._gravity(fields, kept),
+            n_removed=gone.size,
             n_instances=len(draft.placed),
             unassembled=tuple(text for text, _ in fields.get("unassembled", [])),
             skipped=(*draft.skipped, *self._idle(fields)),
@@ -117,7 +118,9 @@ class _Resolved:
         if (reference.scope, reference.target) in self.draft.node_sets.unsorted and found.size > 1:
             raise reference.place.wrong(f"the set {shown(str(reference.target))} is UNSORTED", "give nodes one by one")
         if not found.size:
-            raise reference.place.wrong(f"{shown(str(reference.target))} has no node", "give nodes that exist")
+            raise reference.place.wrong(
+                f"{shown(str(reference.target))} of a constraint has no node", "give nodes that exist"
+            )
         return found
 
     def surface(self, reference: Reference) -> str:

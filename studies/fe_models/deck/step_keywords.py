@@ -71,7 +71,7 @@ def read_boundary(draft: Draft, block: Block) -> None:
 
 
 def _boundary(nodes: Reference, first: int, last: int, value: float) -> Items:
-    return lambda found: [Boundary(*found.nodes(nodes), first, last, value)]
+    return lambda found: [Boundary(*found.nodes(nodes), first, last, value, str(nodes.place))]
 
 
 def read_cload(draft: Draft, block: Block) -> None:

@@ -94,7 +94,7 @@ class _Builder:
         if not self.entries:
             return Supported(own, extra, None, own.copy(), forces, references)
         everything = np.concatenate([self.numbers, extra])
-        constraints, fixed = eliminate(self._dependence(), own, everything, list(self._motions()))
+        constraints, fixed = eliminate(self._dependence(), own, everything, len(self.numbers))
         return Supported(fixed, extra, constraints, own, forces, references)
 
     def _dependence(self) -> Dependence:
@@ -108,31 +108,6 @@ class _Builder:
             origin=np.repeat(np.arange(len(counts)), counts),
             origins=[each[4] for each in self.entries],
         )
-
-    def _motions(self) -> Iterator[IntArray]:
-        """Displacements of reference nodes without elements with their rotations: each in one of them."""
-        groups: dict[int, set[int]] = {}
-        used: set[int] = set()
-        for motion in self.deck.rigid_motions:
-            rows = {self._row(motion.reference, motion.place)}
-            if motion.turns:
-                rows.add(self._turn(motion))
-            rows = {row for row in rows if row >= len(self.numbers)}
-            for other in [other for other, members in groups.items() if members & rows]:
-                rows |= groups.pop(other)
-            if rows:
-                groups[min(rows)] = rows
-            used |= rows
-        for row in range(len(self.numbers), len(self.numbers) + len(self.extra)):
-            if row not in used and row not in self.local:
-                groups[row] = {row}
-        for members in groups.values():
-            yield np.array([3 * row + k for row in sorted(members) for k in range(3)])
-
-    @property
-    def local(self) -> set[int]:
-        """Rows that stand for nodes of the model in their own directions."""
-        return {row for (kind, _), row in self.rows.items() if kind == "local"}
 
     def _row(self, number: int, place: str) -> int:
         """Row of a node; one without elements is added. Raises SceneError where it does not exist."""
@@ -185,7 +160,7 @@ class _Builder:
         for boundary in self.deck.boundaries:
             first, last = max(boundary.first_dof, 1), min(boundary.last_dof, 6)
             if first <= min(last, 3) and boundary.value != 0.0:
-                found = f"{self.deck.path} moves {boundary.name} by {boundary.value:g}"
+                found = f"{boundary.place or self.deck.path}: *BOUNDARY moves {boundary.name} by {boundary.value:g}"
                 raise SceneError("clamp", found, "hold it, or give `clamp`")
             for node in boundary.nodes:
                 wanted.setdefault(int(node), set()).update(range(first, last + 1))

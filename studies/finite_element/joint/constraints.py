@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.scene_error import SceneError
@@ -61,7 +62,7 @@ class Constraints:
 
 
 def eliminate(
-    dependence: Dependence, held: BoolArray, numbers: IntArray, motions: Sequence[IntArray]
+    dependence: Dependence, held: BoolArray, numbers: IntArray, n_with_elements: int
 ) -> tuple[Constraints, BoolArray]:
     """Constraints, and which displacements (n_nodes, 3) are 0 or follow others.
 
@@ -73,8 +74,8 @@ def eliminate(
         (n_nodes, 3): displacements that are 0.
     numbers
         (n_nodes,): of the nodes in the file, for messages.
-    motions
-        Displacements of nodes without elements, each (m,): those of their motions that move nothing are held.
+    n_with_elements
+        Number of nodes with elements. Motions of the others that move none of these are held.
 
     Raises
     ------
@@ -100,7 +101,7 @@ def eliminate(
         raise SceneError("model", found, "let each depend on others that do not depend on it")
     fixed = held.ravel().copy()
     total = total @ sparse.diags((~fixed).astype(float))
-    total, idle = _without_idle(total.tocsr(), motions, fixed)
+    total, idle = _without_idle(total.tocsr(), 3 * n_with_elements, fixed)
     fixed[idle] = True
     total.eliminate_zeros()
     moves = np.zeros(size, dtype=np.bool_)
@@ -130,29 +131,28 @@ def _check_once(dependence: Dependence, held: BoolArray, numbers: IntArray) -> N
         raise SceneError("model", f"{found} depends on others and is held", "take the node out of one of them")
 
 
-def _without_idle(
-    total: sparse.csr_matrix, motions: Sequence[IntArray], fixed: BoolArray
-) -> tuple[sparse.csr_matrix, IntArray]:
-    """The transformation with motions of which some move nothing, as a turn about a line of nodes, and these."""
+def _without_idle(total: sparse.csr_matrix, first: int, fixed: BoolArray) -> tuple[sparse.csr_matrix, IntArray]:
+    """The transformation with motions of nodes without elements of which some move nothing, and these.
+
+    A turn about a line on which all nodes are moves nothing. Displacements from `first` on have no elements.
+    """
     change = sparse.eye(len(fixed), format="lil")
-    idle: list[int] = []
-    others = np.setdiff1d(np.arange(len(fixed)), np.concatenate([*motions, np.empty(0, dtype=np.int64)]))
-    moved = total[others]
-    for motion in motions:
-        motion = motion[~fixed[motion]]
-        columns = moved[:, motion]
-        gram = (columns.T @ columns).toarray()
-        scale = np.sqrt(np.diag(gram))
-        idle += motion[scale == 0.0].tolist()
-        motion, scale = motion[scale > 0.0], scale[scale > 0.0]
-        if not len(motion):
+    extra = first + np.flatnonzero(~fixed[first:])
+    columns = total[:first][:, extra]
+    gram = (columns.T @ columns).tocsr()
+    scale = np.sqrt(gram.diagonal())
+    idle: list[int] = extra[scale == 0.0].tolist()
+    _, groups = connected_components(gram, directed=False)
+    order = np.argsort(groups, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(groups[order])) + 1) if len(order) else []:
+        rows = rows[scale[rows] > 0.0]
+        if len(rows) < 2:
             continue
-        live = gram[np.ix_(np.diag(gram) > 0.0, np.diag(gram) > 0.0)] / np.outer(scale, scale)
-        values, vectors = np.linalg.eigh(live)
+        values, vectors = np.linalg.eigh(gram[rows][:, rows].toarray() / np.outer(scale[rows], scale[rows]))
         nothing = values < _NOTHING * values[-1]
         if nothing.any():
-            change[np.ix_(motion, motion)] = vectors / scale[:, None]
-            idle += motion[nothing].tolist()
+            change[np.ix_(extra[rows], extra[rows])] = vectors / scale[rows][:, None]
+            idle += extra[rows][nothing].tolist()
     keep = np.ones(len(fixed))
     keep[idle] = 0.0
     return (total @ change.tocsr() @ sparse.diags(keep)).tocsr(), np.array(idle, dtype=np.int64)
