@@ -211,7 +211,7 @@ def prepare_model(
     progress("assembly of the prestressed stiffness")
     stressed = assemble_tangent_stiffness(model.mesh, displacements[: 3 * model.mesh.n_nodes])
     stiffness = (_with_extra(stressed, model) + spin_softening(mass, model.rotation)).tocsr()
-    forms = {"stiffness": stiffness if constraints is None else constraints.apply(stiffness)}
+    forms = {"stiffness": stiffness if constraints is None else constraints.apply(stiffness, stiffness=True)}
     forms |= {"mass": still.reduction.forms["mass"], "elastic": still.reduction.forms["stiffness"]}
     return replace(still, reduction=Reduction(ordered, forms), at_rest=still.reduction)
 
@@ -230,7 +230,7 @@ def _prepare(
     along_x = (~np.isnan(model.coordinates)).all(axis=1)[:, None] * np.array([1.0, 0.0, 0.0])
     weight = (mass @ along_x.ravel()).reshape(-1, 3)[:, 0] * along_x[:, 0]
     if constraints is not None:
-        forms = {name: constraints.apply(form) for name, form in forms.items()}
+        forms = {name: constraints.apply(form, stiffness=name == "stiffness") for name, form in forms.items()}
         load = constraints.forces(load)
     coupled = find_couplings(forms["stiffness"])
     if isinstance(model, MatrixModel):

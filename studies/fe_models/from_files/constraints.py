@@ -34,7 +34,9 @@ class Supported:
     references: Mapping[int, int]
 
 
-def find_constraints(deck: Deck, numbers: IntArray, clamped: BoolArray | None, units: Units) -> Supported:
+def find_constraints(
+    deck: Deck, numbers: IntArray, clamped: BoolArray | None, units: Units, cut: IntArray
+) -> Supported:
     """Held displacements, constraints and nodal forces of a deck.
 
     Parameters
@@ -47,13 +49,15 @@ def find_constraints(deck: Deck, numbers: IntArray, clamped: BoolArray | None, u
         (n_nodes, 3): displacements that the study holds in place of the deck's boundary conditions; None of none.
     units
         Of the file.
+    cut
+        Rows of nodes on cut faces.
 
     Raises
     ------
     SceneError
         Where a displacement depends on others and is held, depends twice, or nodes are missing.
     """
-    return _Builder(deck, numbers, units).build(clamped)
+    return _Builder(deck, numbers, units, set(cut.tolist())).build(clamped)
 
 
 @dataclass
@@ -63,6 +67,8 @@ class _Builder:
     deck: Deck
     numbers: IntArray
     units: Units
+    cut: set[int]
+    oblique: dict[int, FloatArray] = field(default_factory=dict)
     extra: list[int] = field(default_factory=list)
     rows: dict[tuple[str, int], int] = field(default_factory=dict)
     entries: list[tuple[IntArray, IntArray, IntArray, FloatArray, str]] = field(default_factory=list)
@@ -70,6 +76,7 @@ class _Builder:
     def build(self, clamped: BoolArray | None) -> Supported:
         deck = self.deck
         self.order = np.argsort(self.numbers)
+        self.first_terms = {int(equation.nodes[0]) for equation in deck.equations}
         self.frames = {int(node): each for each in deck.transforms for node in each.nodes}
         for motion in deck.rigid_motions:
             self._rigid(motion)
@@ -91,13 +98,16 @@ class _Builder:
         own = own.reshape(-1, 3)
         extra = np.array(self.extra, dtype=np.int64)
         references = {number: row for (kind, number), row in self.rows.items() if kind == "node"}
-        if not self.entries:
+        if not self.entries and not self.oblique:
             return Supported(own, extra, None, own.copy(), forces, references)
         everything = np.concatenate([self.numbers, extra])
-        constraints, fixed = eliminate(self._dependence(), own, everything, len(self.numbers))
+        constraints, fixed = eliminate(self._dependence(), own, self.oblique, everything, len(self.numbers))
         return Supported(fixed, extra, constraints, own, forces, references)
 
     def _dependence(self) -> Dependence:
+        if not self.entries:
+            nothing = np.empty(0, dtype=np.int64)
+            return Dependence(nothing, nothing, nothing, np.empty(0), nothing, ())
         counts = [len(dependent) for dependent, *_ in self.entries]
         starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
         return Dependence(
@@ -178,9 +188,12 @@ class _Builder:
         frame = self._frame(node)
         across = frame[local].T @ frame[local]
         straight = np.abs(across - np.diag(np.round(np.diag(across)))).max() < _ROUND_OFF
-        if straight:
+        if straight and not (row in self.cut and node in self.frames and 0 < len(local) < 3):
             return [3 * row + k for k in np.flatnonzero(np.round(np.diag(across)))]
-        return [3 * self._localised(node) + k for k in local]
+        if node in self.first_terms:
+            return [3 * self._localised(node) + k for k in local]
+        self.oblique[row] = across
+        return []
 
     def _localised(self, node: int) -> int:
         """Row of a node in its own directions, on which the node of the model depends."""

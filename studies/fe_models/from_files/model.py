@@ -105,7 +105,8 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         nodal = _ordered(matrices, mesh, units)
         clamped = None if clamped is None else np.pad(clamped, ((0, len(nodal.numbers) - len(clamped)), (0, 0)))
     numbers = mesh.numbers if nodal is None else nodal.numbers
-    supported = find_constraints(deck, numbers, clamped, units)
+    on_cut = np.empty(0, dtype=np.int64) if cut is None else np.concatenate([cut.left, cut.right])
+    supported = find_constraints(deck, numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
     n_nodes = len(supported.held)
     preload = supported.forces if not parameters.preload else np.zeros(3 * n_nodes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from solver.model import BoolArray, FloatArray, IntArray
 from studies.scene_error import SceneError
 
 _LONGEST_CHAIN = 100  # displacements that depend on others that depend on others
+_ROUND_OFF = 1e-6  # of a direction, which decks give with few digits
 _NOTHING = 1e-12  # square of a motion that moves no node, over that of one that does
 
 
@@ -38,16 +39,21 @@ class Constraints:
 
     transformation (3 n_nodes, 3 n_nodes). dependent (n_nodes, 3): which displacements move with others.
     origin (n_nodes,): what makes a node depend on others, a place in `origins`; -1 for none.
+    oblique (n_nodes,): nodes that are held along directions that are not x, y or z. There q has all three
+        displacements, of which u lacks these directions. across (3 n_nodes, 3 n_nodes): projection on them.
     """
 
     transformation: sparse.csr_matrix
     dependent: BoolArray
     origin: IntArray
     origins: Sequence[str]
+    oblique: BoolArray
+    across: sparse.csr_matrix
 
-    def apply(self, form: sparse.csr_matrix) -> sparse.csr_matrix:
-        """A form of q: `T^T K T`."""
-        return (self.transformation.T @ form @ self.transformation).tocsr()
+    def apply(self, form: sparse.csr_matrix, *, stiffness: bool) -> sparse.csr_matrix:
+        """A form of q: `T^T K T`. What moves nothing stands on springs of its own in a stiffness."""
+        spring = float(np.abs(form.diagonal()).mean()) if stiffness else 0.0
+        return (self.transformation.T @ form @ self.transformation + spring * self.across).tocsr()
 
     def forces(self, vectors: FloatArray) -> FloatArray:
         """Forces (3 n_nodes, ...) on q."""
@@ -60,9 +66,32 @@ class Constraints:
             found = f"{self.origins[self.origin[wrong[0]]]}: node {numbers[wrong[0]]} depends on others and {what}"
             raise SceneError("model", found, remedy)
 
+    def check_straight(self, nodes: IntArray, numbers: IntArray, what: str) -> None:
+        """Raises SceneError where one of the nodes is held obliquely. what: the nodes are, for the message."""
+        wrong = nodes[self.oblique[nodes]]
+        if len(wrong):
+            found = f"node {numbers[wrong[0]]} is held in a direction of *TRANSFORM and {what}"
+            raise SceneError("model", found, "hold it along x, y and z, or not at all, or refine the other surface")
+
+    def check_turned(self, left: IntArray, right: IntArray, rotation: FloatArray, numbers: IntArray) -> None:
+        """Raises SceneError where nodes and their images under a rotation (3, 3) are not held alike."""
+        for one, other in zip(left, right, strict=True):
+            if not (self.oblique[one] or self.oblique[other]):
+                continue
+            own, image = (
+                self.across[3 * node : 3 * node + 3, 3 * node : 3 * node + 3].toarray() for node in (one, other)
+            )
+            if np.abs(rotation @ own @ rotation.T - image).max() > _ROUND_OFF:
+                found = f"nodes {numbers[one]} and {numbers[other]} of the cut faces are held in other directions"
+                raise SceneError("clamp", found, "give both *TRANSFORM, TYPE=C about the axis, and the same dofs")
+
 
 def eliminate(
-    dependence: Dependence, held: BoolArray, numbers: IntArray, n_with_elements: int
+    dependence: Dependence,
+    held: BoolArray,
+    oblique: Mapping[int, FloatArray],
+    numbers: IntArray,
+    n_with_elements: int,
 ) -> tuple[Constraints, BoolArray]:
     """Constraints, and which displacements (n_nodes, 3) are 0 or follow others.
 
@@ -72,6 +101,8 @@ def eliminate(
         Which displacements depend on others.
     held
         (n_nodes, 3): displacements that are 0.
+    oblique
+        Projections (3, 3) of nodes on other directions in which they are held.
     numbers
         (n_nodes,): of the nodes in the file, for messages.
     n_with_elements
@@ -83,7 +114,9 @@ def eliminate(
         Where a displacement depends twice, on itself, or is held as well.
     """
     size, dependent = held.size, dependence.dependent
-    _check_once(dependence, held, numbers)
+    slanted = np.zeros(len(held), dtype=np.bool_)
+    slanted[list(oblique)] = True
+    _check_once(dependence, held | slanted[:, None], numbers)
     shape = (size, size)
     steps = sparse.csr_matrix((dependence.value, (dependent[dependence.row], dependence.column)), shape=shape)
     own = np.ones(size)
@@ -100,7 +133,11 @@ def eliminate(
         found = f"{dependence.origins[dependence.origin[0]]}: displacements depend on each other in a circle"
         raise SceneError("model", found, "let each depend on others that do not depend on it")
     fixed = held.ravel().copy()
-    total = total @ sparse.diags((~fixed).astype(float))
+    across = sparse.lil_matrix(shape)
+    for node, projection in oblique.items():
+        across[3 * node : 3 * node + 3, 3 * node : 3 * node + 3] = projection
+    across = across.tocsr()
+    total = (total @ (sparse.eye(size) - across)) @ sparse.diags((~fixed).astype(float))
     total, idle = _without_idle(total.tocsr(), 3 * n_with_elements, fixed)
     fixed[idle] = True
     total.eliminate_zeros()
@@ -109,7 +146,8 @@ def eliminate(
     fixed[dependent] = True
     origin = np.full(len(held), -1)
     origin[dependent // 3] = dependence.origin
-    return Constraints(total, moves.reshape(-1, 3), origin, dependence.origins), fixed.reshape(-1, 3)
+    constraints = Constraints(total, moves.reshape(-1, 3), origin, dependence.origins, slanted, across)
+    return constraints, fixed.reshape(-1, 3)
 
 
 def _check_once(dependence: Dependence, held: BoolArray, numbers: IntArray) -> None:

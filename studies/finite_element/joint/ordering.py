@@ -107,10 +107,14 @@ def check_followers(supports: Supports, pairs: ContactPairs, ties: ContactPairs 
     if ties is not None:
         followers.append((ties.moving, "is tied", "take it out of one of them"))
     if supports.cut is not None:
-        both = np.concatenate([supports.cut.left, supports.cut.right])
+        cut = supports.cut
+        both = np.concatenate([cut.left, cut.right])
         followers.append((both, "is on a cut face", "let other nodes depend on this one"))
+        supports.constraints.check_turned(cut.left, cut.right, cut.rotation, supports.numbers)
     for nodes, what, remedy in followers:
         supports.constraints.check_free(nodes, supports.numbers, what, remedy)
+    for nodes, what, _ in followers[:2] if ties is not None else followers[:1]:
+        supports.constraints.check_straight(nodes, supports.numbers, what)
 
 
 def consistent_supports(supports: Supports) -> Supports:
