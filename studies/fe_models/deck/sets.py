@@ -92,7 +92,7 @@ def _range(scope: str, fields: list[str], place: Place) -> _Members:
         raise place.wrong(f"{len(fields)} numbers below GENERATE", "give first, last and step")
     first, last = (read_integer(part, place) for part in fields[:2])
     step = read_integer(fields[2].lstrip("-"), place) if len(fields) == 3 and fields[2] else 1
-    backwards = len(fields) == 3 and fields[2].startswith("-")
+    backwards = fields[2].startswith("-") if len(fields) == 3 and fields[2] else last < first
     if first != last and backwards != (last < first):
         found = f"from {first} to {last} in steps of {'-' if backwards else ''}{step} below GENERATE"
         raise place.wrong(found, "give a step that leads from the first to the last number")
