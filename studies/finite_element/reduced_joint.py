@@ -227,7 +227,7 @@ def _prepare(
     """A model with the forms as they are, without what depends on others."""
     mass, constraints = forms["mass"], joint.constraints
     load = _static_load(mass, model.coordinates, model)
-    along_x = (~np.isnan(model.coordinates)).all(axis=1)[:, None] * np.array([1.0, 0.0, 0.0])
+    along_x = np.where(np.isnan(model.coordinates), 0.0, np.array([1.0, 0.0, 0.0]))
     weight = (mass @ along_x.ravel()).reshape(-1, 3)[:, 0] * along_x[:, 0]
     if constraints is not None:
         forms = {name: constraints.apply(form, stiffness=name == "stiffness") for name, form in forms.items()}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
-from studies.fe_models.deck.draft import Draft, Lookup, chosen, refuse
+from studies.fe_models.deck.draft import Draft, Lookup, chosen, refused
 from studies.fe_models.deck.mesh import Equation, IntArray, RigidMotion, Transform
 from studies.fe_models.deck.sets import Reference
 from studies.fe_models.text.keyword_lines import Block
@@ -20,7 +21,7 @@ def read_transform(draft: Draft, block: Block) -> None:
     """*TRANSFORM: directions of the displacements of nodes."""
     kind = chosen(block, "TYPE", ("R", "C", "S"), "R")
     if kind == "S":
-        refuse(block, "spherical directions are not read", "give rectangular or cylindrical ones")
+        raise refused(block, "spherical directions are not read", "give rectangular or cylindrical ones")
     nodes, scope = draft.refer(f'"{block.name("NSET")}"', block.place), draft.scope
     values = read_floats(block, 0, 6)
     points = np.array(values[:6]).reshape(2, 3)
@@ -39,7 +40,9 @@ def read_equation(draft: Draft, block: Block) -> None:
     """*EQUATION: the number of terms, then node or set, dof and coefficient of each; or REMOVE ALL in a step."""
     if "REMOVEALL" in block.parameters or "REMOVE" in block.parameters:
         if draft.step is None or "REMOVE" in block.parameters:
-            refuse(block, "REMOVE of some equations is not read", "write REMOVE ALL in the step that writes matrices")
+            raise refused(
+                block, "REMOVE of some equations is not read", "write REMOVE ALL in the step that writes matrices"
+            )
         draft.step.writes = True
         return
     line = 0
@@ -59,7 +62,7 @@ def read_equation(draft: Draft, block: Block) -> None:
         ]
         if terms[0][2] == 0.0:
             raise place.wrong("the first coefficient is 0", "give a first term that depends on the others")
-        draft.add("equations", lambda found, each=terms, at=place: _equations(found, each, at))  # type: ignore[misc]
+        draft.add("equations", partial(_equations, terms=terms, place=place))
         line += 1
 
 
@@ -87,20 +90,19 @@ def read_mpc(draft: Draft, block: Block) -> None:
         if kind == "BEAM":
             draft.notes.append(f"{place}: *{block.written} BEAM is rigid, as in Abaqus.")
         one, other = (draft.refer(text, place) for text in fields[1:])
-        text, turns = f"{place}: *{block.written}", kind == "BEAM"
+        text = f"{place}: *{block.written}"
+        draft.add("rigid_motions", partial(_mpc, one=one, other=other, text=text, turns=kind == "BEAM"))
 
-        def motions(
-            found: Lookup, one: Reference = one, other: Reference = other, text: str = text, turns: bool = turns
-        ) -> Iterator[RigidMotion]:
-            first, second = found.ordered(one), found.ordered(other)
-            if len(second) not in (1, len(first)) or not len(first):
-                remedy = "give sets of as many nodes, or one node for all"
-                raise one.place.wrong(f"*MPC of {len(first)} and {len(second)} nodes", remedy)
-            parts = [first] if len(second) == 1 else np.split(first, len(first))
-            for nodes, reference in zip(parts, second, strict=True):
-                yield RigidMotion(text, nodes, _ALL, int(reference), turns=turns)
 
-        draft.add("rigid_motions", motions)
+def _mpc(found: Lookup, one: Reference, other: Reference, text: str, *, turns: bool) -> Iterator[RigidMotion]:
+    """A node or set that follows a node, or the nodes of a set in their order."""
+    first, second = found.ordered(one), found.ordered(other)
+    if len(second) not in (1, len(first)) or not len(first):
+        remedy = "give sets of as many nodes, or one node for all"
+        raise one.place.wrong(f"*MPC of {len(first)} and {len(second)} nodes", remedy)
+    parts = [first] if len(second) == 1 else np.split(first, len(first))
+    for nodes, reference in zip(parts, second, strict=True):
+        yield _motion(text, nodes, _ALL, int(reference), 0, one.place, turns=turns)
 
 
 def read_rigid_body(draft: Draft, block: Block) -> None:
@@ -125,12 +127,19 @@ _SETS_OF_NODES = ("NSET", "PINNSET", "TIENSET")
 
 
 def _motion(
-    text: str, nodes: IntArray, dofs: tuple[int, ...], reference: int, rotation: int, place: Place
+    text: str,
+    nodes: IntArray,
+    dofs: tuple[int, ...],
+    reference: int,
+    rotation: int,
+    place: Place,
+    *,
+    turns: bool = True,
 ) -> RigidMotion:
     nodes = nodes[(nodes != reference) & (nodes != rotation)]
     if not nodes.size:
         raise place.wrong("no node follows the reference node", "give the nodes that are rigid")
-    return RigidMotion(text, nodes, dofs, reference, rotation)
+    return RigidMotion(text, nodes, dofs, reference, rotation, turns)
 
 
 def read_coupling(draft: Draft, block: Block) -> None:
@@ -144,12 +153,9 @@ def read_kinematic(draft: Draft, block: Block) -> None:
     head, draft.coupling = draft.coupling, None
     if head is None:
         raise block.place.wrong(f"*{block.written} without *COUPLING", "write it below its *COUPLING")
-    dofs: set[int] = set()
-    for line in range(len(block.lines)):
-        place, fields = block.place_of(line), read_fields(block, line)
-        dofs.update(_dofs(fields, place))
+    lines = [_dofs(read_fields(block, line), block.place_of(line)) for line in range(len(block.lines))]
+    following = tuple(dof for dof in _ALL if not lines or any(dof in dofs for dofs in lines))
     surface, reference = (draft.refer(head.name(key), head.place) for key in ("SURFACE", "REFNODE"))
-    following = tuple(dof for dof in _ALL if not dofs or dof in dofs)
     text = f"{block.place}: *{block.written}"
 
     def motions(found: Lookup) -> list[RigidMotion]:
@@ -164,19 +170,20 @@ def read_kinematic_coupling(draft: Draft, block: Block) -> None:
     reference = draft.refer(block.name("REFNODE"), block.place)
     for fields, place in draft.lines(block, 1, "node or set, first and last dof"):
         nodes, dofs = draft.refer(fields[0], place), _dofs(fields[1:], place)
-        following = tuple(dof for dof in _ALL if not dofs or dof in dofs)
         text = f"{place}: *{block.written}"
-
-        def motions(
-            found: Lookup, nodes: Reference = nodes, dofs: tuple[int, ...] = following, text: str = text
-        ) -> list[RigidMotion]:
-            return [_motion(text, found.nodes(nodes)[1], dofs, found.node(reference), 0, nodes.place)] if dofs else []
-
-        draft.add("rigid_motions", motions)
+        draft.add("rigid_motions", partial(_coupled, nodes=nodes, dofs=dofs, reference=reference, text=text))
 
 
-def _dofs(fields: list[str], place: Place) -> set[int]:
-    """From the first to the last dof of a line. Raises SceneError."""
+def _coupled(
+    found: Lookup, nodes: Reference, dofs: tuple[int, ...], reference: Reference, text: str
+) -> list[RigidMotion]:
+    if not dofs:
+        return []
+    return [_motion(text, found.nodes(nodes)[1], dofs, found.node(reference), 0, nodes.place)]
+
+
+def _dofs(fields: list[str], place: Place) -> tuple[int, ...]:
+    """Displacements from the first to the last dof of a line; all of them without. Raises SceneError."""
     if len(fields) > 2 or not all(is_integer(text) and 1 <= int(text) <= 6 for text in fields):
         raise place.wrong("no first and last dof", "give numbers from 1 to 6")
-    return set(range(int(fields[0]), int(fields[-1]) + 1)) if fields else set()
+    return tuple(dof for dof in _ALL if not fields or int(fields[0]) <= dof <= int(fields[-1]))

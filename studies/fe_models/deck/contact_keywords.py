@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studies.fe_models.deck.draft import Draft, DraftInteraction, Lookup, chosen, refuse
+from studies.fe_models.deck.draft import Draft, DraftInteraction, Items, Lookup, chosen, refused
 from studies.fe_models.deck.mesh import ContactPair, Tie
 from studies.fe_models.deck.sets import Reference
 from studies.fe_models.text.keyword_lines import Block, read_name
@@ -69,7 +69,7 @@ def read_behavior(draft: Draft, block: Block) -> None:
         raise block.place.wrong(f"*{block.written} without an interaction", "write *SURFACE INTERACTION above it")
     if law not in ("HARD", "LINEAR", "TIED"):
         remedy = "write HARD, and give contact_stiffness in the study where the surfaces are soft"
-        refuse(block, f"PRESSURE-OVERCLOSURE={shown(law)} is not read", remedy)
+        raise refused(block, f"PRESSURE-OVERCLOSURE={shown(law)} is not read", remedy)
     if law == "LINEAR":
         draft.notes.append(f"{block.place}: *{block.written}, LINEAR is read as hard contact (see contact_stiffness).")
     draft.interaction.glued = f"{block.place}: *{block.written}, PRESSURE-OVERCLOSURE=TIED" if law == "TIED" else ""
@@ -93,45 +93,48 @@ def read_friction(draft: Draft, block: Block) -> None:
 def read_clearance(draft: Draft, block: Block) -> None:
     """*CLEARANCE: the distance of two surfaces; negative for an interference."""
     if "VALUE" not in block.parameters:
-        refuse(block, "a clearance without VALUE", "give VALUE=..., one for both surfaces")
+        raise refused(block, "a clearance without VALUE", "give VALUE=..., one for both surfaces")
     value = read_float(block.parameters["VALUE"], block.place)
     dependent, independent = (draft.refer(block.name(name), block.place) for name in ("SLAVE", "MASTER"))
     text = f"{block.place}: *{block.written} of {value:g}"
-    draft.add("fits", lambda found: [(found.surface(dependent), found.surface(independent), text, value, block.place)])
+    draft.add("fits", _fits(dependent, independent, text, value, block.place))
 
 
 def read_interference(draft: Draft, block: Block) -> None:
     """*CONTACT INTERFERENCE: the overlap of the mesh presses, as what is allowed of it ends at 0."""
     chosen(block, "TYPE", ("CONTACTPAIR",), "CONTACTPAIR")
     if "AMPLITUDE" in block.parameters and "SHRINK" not in block.parameters:
-        refuse(block, "an interference that does not end at 0", "leave AMPLITUDE out")
+        raise refused(block, "an interference that does not end at 0", "leave AMPLITUDE out")
     text = f"{block.place}: *{block.written}"
     for dependent, independent, place in read_pairs(draft, block):
+        draft.add("fits", _fits(dependent, independent, text, None, place))
 
-        def fits(found: Lookup, one: Reference = dependent, other: Reference = independent, at: Place = place) -> list:
-            return [(found.surface(one), found.surface(other), text, None, at)]
 
-        draft.add("fits", fits)
+def _fits(dependent: Reference, independent: Reference, text: str, value: float | None, place: Place) -> Items:
+    return lambda found: [(found.surface(dependent), found.surface(independent), text, value, place)]
 
 
 def read_model_change(draft: Draft, block: Block) -> None:
     """*MODEL CHANGE: contact pairs or elements that are taken away, or added again."""
     kind = chosen(block, "TYPE", ("CONTACTPAIR", "ELEMENT"), "ELEMENT")
     if draft.step is None or ("REMOVE" in block.parameters) == ("ADD" in block.parameters):
-        refuse(block, "neither REMOVE nor ADD in a step", "write one of them, in a step")
+        raise refused(block, "neither REMOVE nor ADD in a step", "write one of them, in a step")
     removed = "REMOVE" in block.parameters
     if kind == "ELEMENT":
         for fields, place in draft.lines(block, 1, "sets of elements"):
             for text in fields:
-                reference = draft.refer(text, place)
-                draft.add("removed", lambda found, each=reference: [(removed, found.elements(each)[1])])  # type: ignore[misc]
+                draft.add("removed", _removed(removed, draft.refer(text, place)))
         return
     for dependent, independent, _ in read_pairs(draft, block):
+        draft.add("apart", _apart(removed, dependent, independent))
 
-        def apart(found: Lookup, one: Reference = dependent, other: Reference = independent) -> list:
-            return [(removed, (found.surface(one), found.surface(other)))]
 
-        draft.add("apart", apart)
+def _removed(removed: bool, elements: Reference) -> Items:
+    return lambda found: [(removed, found.elements(elements)[1])]
+
+
+def _apart(removed: bool, dependent: Reference, independent: Reference) -> Items:
+    return lambda found: [(removed, (found.surface(dependent), found.surface(independent)))]
 
 
 def read_cyclic_symmetry(draft: Draft, block: Block) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from studies.fe_models.deck.sets import Reference, SetDefinitions, read_referenc
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import read_fields
 from studies.fe_models.text.read_errors import Place, shown
+from studies.scene_error import SceneError
 
 
 class Lookup(Protocol):
@@ -46,7 +47,7 @@ class Lookup(Protocol):
         """Points or vectors (n, 3) of an instance where the instance stands."""
 
 
-Items = Callable[[Lookup], Iterable[object]]
+Items = Callable[[Lookup], Iterable[Any]]
 """Gives entries of a field of the deck, once names can be looked up."""
 
 
@@ -184,6 +185,6 @@ def chosen(block: Block, parameter: str, known: Iterable[str], default: str) -> 
     return value
 
 
-def refuse(block: Block, found: str, remedy: str) -> None:
-    """Raises the SceneError about a keyword that changes the model in a way that is not read."""
-    raise block.place.wrong(f"*{block.written}: {found}", remedy)
+def refused(block: Block, found: str, remedy: str) -> SceneError:
+    """The error about a keyword that changes the model in a way that is not read."""
+    return block.place.wrong(f"*{block.written}: {found}", remedy)

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from studies.fe_models.deck.draft import Draft, Records, refuse
+from studies.fe_models.deck.draft import Draft, Records, refused
 from studies.fe_models.deck.mesh import FloatArray, IntArray
 from studies.fe_models.deck.sets import Reference, Resolver
 from studies.fe_models.text.keyword_lines import Block, read_name
@@ -19,7 +19,7 @@ _MOST_MADE = 4_000_000  # nodes or elements that one keyword may make
 def read_ngen(draft: Draft, block: Block) -> None:
     """*NGEN: first and last node, and the step of the numbers between them, on a straight line."""
     if block.parameters.get("LINE", ""):
-        refuse(block, f"LINE={shown(block.parameters['LINE'])}", "give nodes on curves one by one")
+        raise refused(block, f"LINE={shown(block.parameters['LINE'])}", "give nodes on curves one by one")
     rows = [
         (_numbers(fields, place, 3, (0, 0, 1)), place)
         for fields, place in draft.lines(block, 2, "first and last node and the step of their numbers")
@@ -64,7 +64,7 @@ def read_nfill(draft: Draft, block: Block) -> None:
 def read_ncopy(draft: Draft, block: Block) -> None:
     """*NCOPY, SHIFT: the nodes of a set again, with larger numbers, shifted and then turned about an axis."""
     if "SHIFT" not in block.parameters:
-        refuse(block, "a copy without SHIFT", "give the nodes of copies that are mirrored or scaled")
+        raise refused(block, "a copy without SHIFT", "give the nodes of copies that are mirrored or scaled")
     (change,) = _numbers([block.parameters.get("CHANGENUMBER", "")], block.place, 1, (0,))
     old = draft.refer(block.name("OLDSET"), block.place)
     shift, turn = read_placement(block)
@@ -110,9 +110,10 @@ def read_elgen(draft: Draft, block: Block) -> None:
             counts, of_nodes, of_elements = rule[::3], rule[1::3], rule[2::3]
             if np.prod([float(n) for n in counts]) > _MOST_MADE:
                 raise place.wrong(f"*{block.written} of more than {_MOST_MADE} elements", "give smaller numbers")
-            steps = np.array(list(product(*(range(n) for n in counts))))[1:]
+            steps = np.array(list(product(*(range(n) for n in counts))), dtype=np.int64).reshape(-1, 3)[1:]
             own = np.array([master], dtype=np.int64)
-            _make_elements(now, block, scope, own, steps @ of_elements, steps @ of_nodes, name)
+            by_element, by_node = (steps @ np.array(each, dtype=np.int64) for each in (of_elements, of_nodes))
+            _make_elements(now, block, scope, own, by_element, by_node, name)
 
     draft.generators.append(generate)
 

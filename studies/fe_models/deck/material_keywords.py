@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from studies.fe_models.deck.draft import Draft, DraftMaterial, Lookup, refuse
+from studies.fe_models.deck.draft import Draft, DraftMaterial, Items, Lookup, refused
 from studies.fe_models.deck.mesh import IntArray, SolidSection
+from studies.fe_models.deck.sets import Reference
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import read_float, read_floats
 from studies.fe_models.text.read_errors import shown
@@ -80,10 +81,13 @@ def read_initial_conditions(draft: Draft, block: Block) -> None:
         draft.skip(block)
         return
     if kind != "TEMPERATURE":
-        refuse(block, f"TYPE={shown(kind)} is not read", "remove it: the prestress is that of the rotation")
+        raise refused(block, f"TYPE={shown(kind)} is not read", "remove it: the prestress is that of the rotation")
     for fields, place in draft.lines(block, 2, "set of nodes and temperature"):
-        nodes, value = draft.refer(fields[0], place), read_float(fields[1], place)
-        draft.add("temperatures", lambda found, each=nodes, t=value: [(found.nodes(each)[1], t)])  # type: ignore[misc]
+        draft.add("temperatures", _temperatures(draft.refer(fields[0], place), read_float(fields[1], place)))
+
+
+def _temperatures(nodes: Reference, value: float) -> Items:
+    return lambda found: [(found.nodes(nodes)[1], value)]
 
 
 def read_thermal(draft: Draft, block: Block) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from studies.fe_models.deck.draft import Draft, Records, chosen, refuse
+from studies.fe_models.deck.draft import Draft, Records, chosen, refused
 from studies.fe_models.deck.mesh import NODES_OF_KIND, FloatArray
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import read_fields, read_floats, read_points, read_records
@@ -24,7 +24,7 @@ OTHER_KINDS = {
 def read_node(draft: Draft, block: Block) -> None:
     """*NODE: number, x, y, z, in the coordinates of *SYSTEM."""
     if chosen(block, "SYSTEM", ("R", "C", "S"), "R") != "R":
-        refuse(block, "nodes in cylindrical or spherical coordinates", "give them in Cartesian ones")
+        raise refused(block, "nodes in cylindrical or spherical coordinates", "give them in Cartesian ones")
     numbers, coordinates = read_points(block)
     origin, axes = draft.system
     if draft.system is not draft.world:

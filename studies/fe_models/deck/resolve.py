@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.fe_models.deck.draft import Draft, DraftMaterial, Records
+from studies.fe_models.deck.draft import Draft, DraftMaterial
 from studies.fe_models.deck.mesh import (
     NODES_OF_KIND,
     ContactPair,
@@ -21,11 +21,10 @@ from studies.fe_models.deck.mesh import (
     Material,
     Surface,
 )
+from studies.fe_models.deck.numbering import build_blocks, build_nodes, find_offsets
 from studies.fe_models.deck.sets import Key, Reference, Resolver, scope_of
-from studies.fe_models.text.numbers import LARGEST_NUMBER
 from studies.fe_models.text.read_errors import Place, shown
 from studies.finite_element.elements.kinds import ELEMENT_KINDS
-from studies.scene_error import SceneError
 
 FACES_OF_CORNERS = {4: 4, 10: 4, 6: 5, 15: 5, 8: 6, 20: 6}
 """Numbers of faces of an element by its number of nodes."""
@@ -46,9 +45,9 @@ class _Resolved:
 
     def __init__(self, draft: Draft) -> None:
         self.draft = draft
-        self.offsets = _offsets(draft)
-        self.numbers, self.coordinates = _nodes(draft, self.offsets)
-        self.blocks = _blocks(draft, self.offsets, self.numbers)
+        self.offsets = find_offsets(draft)
+        self.numbers, self.coordinates = build_nodes(draft, self.offsets)
+        self.blocks = build_blocks(draft, self.offsets, self.numbers)
         order = np.concatenate([block.numbers for block in self.blocks] or [np.empty(0, dtype=np.int64)])
         kinds = np.repeat([block.kind for block in self.blocks], [block.numbers.size for block in self.blocks])
         rows = np.argsort(order)
@@ -68,7 +67,7 @@ class _Resolved:
             surfaces.update(dict.fromkeys(self._names(key, draft.surfaces), self._surface(key)))
         fields = {
             name: [item for items in each.values() for item in items(self)] for name, each in draft.fields.items()
-        }  # type: ignore[arg-type]
+        }
         gone = self._gone(fields)
         blocks = [_without(block, gone) for block in self.blocks if block.kind in NODES_OF_KIND]
         kept = np.setdiff1d(self.all_elements[self.solid], gone)
@@ -229,32 +228,26 @@ class _Resolved:
 
     def _material(self, draft: DraftMaterial, fields: Mapping[str, list[Any]]) -> Material:
         """Values at the temperature of all nodes; of several temperatures without one they are a problem."""
-        given, problem = fields.get("temperatures", []), draft.problem
-        both = self.draft.thermal.keys() >= {"TEMPERATURE", "EXPANSION"}
-        if both:
-            place = self.draft.thermal["TEMPERATURE"]
-            raise place.wrong("*TEMPERATURE strains materials with *EXPANSION", "remove one of them")
-        values = {value for _, value in given}
-        solid = [block.nodes.ravel() for block in self.blocks if block.kind in NODES_OF_KIND]
-        known = (
-            len(values) == 1
-            and "TEMPERATURE" not in self.draft.thermal
-            and np.isin(np.concatenate(solid), np.concatenate([nodes for nodes, _ in given])).all()
-        )
-        found: list[float | None] = []
-        for keyword, rows, column in (
-            ("ELASTIC", draft.elastic, 0),
-            ("ELASTIC", draft.elastic, 1),
-            ("DENSITY", draft.density, 0),
-        ):
-            own = [row[column] for row in rows]
-            if len(set(own)) > 1 and not known:
-                problem = (
-                    problem or f"{draft.places[keyword]}: *{keyword} at several temperatures, of which none is given"
-                )
-            at = [row[-1] if len(row) > (2 if keyword == "ELASTIC" else 1) else 0.0 for row in rows]
-            found.append(float(np.interp(min(values), at, own)) if known and len(own) > 1 else own[0] if own else None)
-        return Material(*found, problem)
+        given, thermal, empty = fields.get("temperatures", []), self.draft.thermal, np.empty(0, dtype=np.int64)
+        if thermal.keys() >= {"TEMPERATURE", "EXPANSION"}:
+            found = "*TEMPERATURE strains materials with *EXPANSION"
+            raise thermal["TEMPERATURE"].wrong(found, "remove one of them")
+        solid = np.concatenate([empty, *(each.nodes.ravel() for each in self.blocks if each.kind in NODES_OF_KIND)])
+        everywhere = np.isin(solid, np.concatenate([empty, *(nodes for nodes, _ in given)])).all()
+        values = {value for _, value in given} if everywhere and "TEMPERATURE" not in thermal else set()
+        problem = draft.problem
+
+        def at_temperature(keyword: str, rows: list[list[float]], column: int, n_values: int) -> float | None:
+            nonlocal problem
+            own = {(row[n_values] if len(row) > n_values else 0.0): row[column] for row in rows}
+            if len(set(own.values())) > 1 and len(values) != 1:
+                several = f"*{keyword} at several temperatures, of which none is given"
+                problem = problem or f"{draft.places[keyword]}: {several}"
+            at = sorted(own)
+            return float(np.interp(min(values, default=0.0), at, [own[each] for each in at])) if own else None
+
+        young, poisson = (at_temperature("ELASTIC", draft.elastic, column, 2) for column in (0, 1))
+        return Material(young, poisson, at_temperature("DENSITY", draft.density, 0, 1), problem)
 
     def _numbering(self) -> list[str]:
         """Which numbers the nodes of instances have."""
@@ -263,71 +256,6 @@ class _Resolved:
             for name, offset in self.offsets.items()
             if offset
         ]
-
-
-def _offsets(draft: Draft) -> dict[str, int]:
-    """What is added to the numbers of every scope: 0 for the first one, then a power of ten and its multiples."""
-    largest: dict[str, int] = {}
-    for each in (*draft.nodes, *draft.elements):
-        largest[each.scope] = max(largest.get(each.scope, 0), int(each.numbers.max(initial=0)))
-    step = 10 ** len(str(max(largest.values(), default=0)))
-    if step * len(largest) > LARGEST_NUMBER and len(largest) > 1:
-        raise SceneError("model", f"{draft.name}: {len(largest)} instances with numbers up to {step}", "number from 1")
-    return {scope: place * step for place, scope in enumerate(largest)} or {"": 0}
-
-
-def _nodes(draft: Draft, offsets: Mapping[str, int]) -> tuple[IntArray, FloatArray]:
-    """Numbers (n,), ascending, and coordinates (n, 3)."""
-    if not any(each.numbers.size for each in draft.nodes):
-        what = "nodes: no *PART has an *INSTANCE" if draft.parts and not draft.placed else "nodes"
-        raise SceneError("model", f"{draft.name} has no {what}", "give the deck with its mesh")
-    numbers = np.concatenate([each.numbers + offsets[each.scope] for each in draft.nodes])
-    parts = []
-    for each in draft.nodes:
-        shift, turn = draft.placed.get(each.scope, draft.world)
-        parts.append(each.values @ turn.T + shift if each.scope else each.values)
-    coordinates = np.concatenate(parts)
-    order = np.argsort(numbers, kind="stable")
-    numbers, coordinates = numbers[order], coordinates[order]
-    again = np.flatnonzero(numbers[1:] == numbers[:-1])
-    moved = again[np.any(coordinates[again] != coordinates[again + 1], axis=1)]
-    if moved.size:
-        number = numbers[moved[0]]
-        place = _place_of(draft.nodes, offsets, number)
-        raise place.wrong(f"node {number} is defined again at another position", "give each node once")
-    keep = np.ones(numbers.size, dtype=bool)
-    keep[again] = False
-    return numbers[keep], coordinates[keep]
-
-
-def _place_of(records: list[Records], offsets: Mapping[str, int], number: int) -> Place:
-    """Place of the last record of a number."""
-    return next(each.place for each in reversed(records) if number - offsets[each.scope] in each.numbers)
-
-
-def _blocks(draft: Draft, offsets: Mapping[str, int], nodes: IntArray) -> tuple[ElementBlock, ...]:
-    """Elements, one block a kind, by ascending number."""
-    kinds: dict[str, list[tuple[IntArray, IntArray]]] = {}
-    for each in draft.elements:
-        used = each.values.astype(np.int64) + offsets[each.scope]
-        at = np.minimum(np.searchsorted(nodes, used), nodes.size - 1)
-        missing = nodes[at] != used
-        if missing.any():
-            row, column = np.argwhere(missing)[0]
-            found = f"element {each.numbers[row]} has the node {each.values[row, column]}, which does not exist"
-            raise each.place.wrong(found, "give the whole mesh")
-        kinds.setdefault(each.kind, []).append((each.numbers + offsets[each.scope], used))
-    blocks: list[ElementBlock] = []
-    for kind, parts in kinds.items():
-        numbers, used = (np.concatenate(each) for each in zip(*parts, strict=True))
-        order = np.argsort(numbers, kind="stable")
-        blocks.append(ElementBlock(kind, numbers[order], used[order]))
-    numbers = np.sort(np.concatenate([block.numbers for block in blocks] or [np.empty(0, dtype=np.int64)]))
-    again = numbers[1:][numbers[1:] == numbers[:-1]]
-    if again.size:
-        place = _place_of(draft.elements, offsets, again[0])
-        raise place.wrong(f"element {again[0]} is defined again", "give each element once")
-    return tuple(block for block in blocks if block.numbers.size)
 
 
 def _without(block: ElementBlock, gone: IntArray) -> ElementBlock:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from studies.fe_models.deck.draft import Draft, DraftStep, Items, refuse
+from studies.fe_models.deck.draft import Draft, DraftStep, Items, refused
 from studies.fe_models.deck.mesh import Boundary, CentrifugalLoad, FloatArray, NodalForce
 from studies.fe_models.deck.sets import Reference
 from studies.fe_models.text.keyword_lines import Block
@@ -53,7 +53,7 @@ def read_boundary(draft: Draft, block: Block) -> None:
     if draft.step is not None and _value(block, "OP") == "NEW":
         draft.clear("boundaries")
     if _value(block, "TYPE") not in ("", "DISPLACEMENT") or _value(block, "LOADCASE") not in ("", "1"):
-        refuse(block, "TYPE or LOAD CASE is not read", "give displacements of one load case")
+        raise refused(block, "TYPE or LOAD CASE is not read", "give displacements of one load case")
     for line in range(len(block.lines)):
         place, fields = block.place_of(line), read_fields(block, line)
         if len(fields) < 2:
@@ -82,10 +82,11 @@ def read_cload(draft: Draft, block: Block) -> None:
         value = read_float(fields[2], place) if len(fields) > 2 else 0.0
         if dof > 3 and value and step.loads_count:
             raise place.wrong(f"*{block.written} along dof {dof}", "give forces: a moment is not read")
-        key, text = (nodes.scope, nodes.target, dof), f"{place}: *{block.written}"
-        draft.add(
-            "forces", lambda found, n=nodes, d=dof, v=value, text=text: [NodalForce(text, found.nodes(n)[1], d, v)], key
-        )  # type: ignore[misc]
+        draft.add("forces", _forces(nodes, dof, value, f"{place}: *{block.written}"), (nodes.scope, nodes.target, dof))
+
+
+def _forces(nodes: Reference, dof: int, value: float, text: str) -> Items:
+    return lambda found: [NodalForce(text, found.nodes(nodes)[1], dof, value)]
 
 
 def read_dload(draft: Draft, block: Block) -> None:
@@ -108,9 +109,7 @@ def read_dload(draft: Draft, block: Block) -> None:
         elements = draft.refer(fields[0], place)
         if kind == "GRAV":
             load = values[0] * _unit(np.array(values[1:4]), "GRAV without a direction", what, place)
-            draft.add(
-                "gravity", lambda found, e=elements, a=load: [(found.elements(e)[1], a, e.place)], elements.target
-            )  # type: ignore[misc]
+            draft.add("gravity", _gravity(elements, load), elements.target)
             continue
         values += [0.0] * (7 - len(values))
         found = "CENTRIF without a direction, or with omega^2 < 0"
@@ -119,6 +118,10 @@ def read_dload(draft: Draft, block: Block) -> None:
             draft.clear("centrifugal")  # the last step that has some
         fresh = step.fresh = False
         draft.add("centrifugal", _centrifugal(elements, values, axis))
+
+
+def _gravity(elements: Reference, acceleration: FloatArray) -> Items:
+    return lambda found: [(found.elements(elements)[1], acceleration, elements.place)]
 
 
 def _unit(vector: FloatArray, found: str, what: str, place: Place) -> FloatArray:
@@ -136,7 +139,7 @@ def read_other_load(draft: Draft, block: Block) -> None:
     """Loads that are not read: they are refused in static steps, and do not matter in others."""
     step = _loaded(draft, block, "")
     if step.loads_count:
-        refuse(block, "this load is not read", "give forces with *CLOAD, or `preload` in the study")
+        raise refused(block, "this load is not read", "give forces with *CLOAD, or `preload` in the study")
     draft.skip(block)
 
 
@@ -147,7 +150,7 @@ def _loaded(draft: Draft, block: Block, field: str) -> DraftStep:
     if _value(block, "OP") == "NEW" and field:
         draft.clear(field)
     if "AMPLITUDE" in block.parameters and draft.step.loads_count:
-        refuse(block, "a load with AMPLITUDE is not read", "give its last value without AMPLITUDE")
+        raise refused(block, "a load with AMPLITUDE is not read", "give its last value without AMPLITUDE")
     return draft.step
 
 

@@ -93,9 +93,7 @@ class _Builder:
         forces = np.zeros(3 * (len(self.numbers) + len(self.extra)))
         for dof, value in self._forces():
             forces[dof] += value
-        own = np.zeros(len(forces), dtype=np.bool_)
-        own[list(held)] = True
-        own = own.reshape(-1, 3)
+        own: BoolArray = np.isin(np.arange(len(forces)), list(held)).reshape(-1, 3)
         extra = np.array(self.extra, dtype=np.int64)
         references = {number: row for (kind, number), row in self.rows.items() if kind == "node"}
         if not self.entries and not self.oblique:
@@ -189,7 +187,7 @@ class _Builder:
         across = frame[local].T @ frame[local]
         straight = np.abs(across - np.diag(np.round(np.diag(across)))).max() < _ROUND_OFF
         if straight and not (row in self.cut and node in self.frames and 0 < len(local) < 3):
-            return [3 * row + k for k in np.flatnonzero(np.round(np.diag(across)))]
+            return [3 * row + int(k) for k in np.flatnonzero(np.round(np.diag(across)))]
         if node in self.first_terms:
             return [3 * self._localised(node) + k for k in local]
         self.oblique[row] = across
