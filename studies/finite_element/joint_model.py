@@ -51,6 +51,12 @@ class MeshModel:
         """Numbers (n_nodes,) of the nodes in the file."""
         return np.concatenate([self.mesh.numbers, self.extra])
 
+    def padded(self, form: sparse.csr_matrix) -> sparse.csr_matrix:
+        """A form of the mesh with empty rows for nodes without elements."""
+        if len(self.extra):
+            form.resize((3 * len(self.numbers), 3 * len(self.numbers)))
+        return form
+
 
 @dataclass(frozen=True)
 class MatrixModel:

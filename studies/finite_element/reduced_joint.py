@@ -26,10 +26,10 @@ from studies.finite_element.elements.assembly import (
     spin_softening,
 )
 from studies.finite_element.elements.solid_mesh import Rotation
+from studies.finite_element.joint.constraints import check_followers
 from studies.finite_element.joint.layers import find_couplings, find_layers
 from studies.finite_element.joint.ordering import (
     Supports,
-    check_followers,
     consistent_supports,
     order_structure,
     pairs_of_sector,
@@ -186,7 +186,8 @@ def prepare_model(
     glued = None
     if joint.ties:
         glued = build_contact_pairs(model.coordinates, model.numbers, joint.ties, _along(model, joint))
-    check_followers(supports, pairs, glued)
+    if joint.constraints is not None:
+        check_followers(joint.constraints, model.numbers, joint.cut, pairs, glued)
     supports = consistent_supports(supports)
     pairs = pairs_of_sector(pairs, supports)
     ties = None if glued is None else ties_of_structure(glued, supports, pairs)
@@ -194,7 +195,7 @@ def prepare_model(
         return _prepare(model, {"stiffness": model.stiffness, "mass": model.mass}, joint, supports, pairs, ties)
     progress("assembly of stiffness and mass")
     check_elements(model.mesh)
-    elastic, mass = (_with_extra(form, model) for form in (assemble_stiffness(model.mesh), assemble_mass(model.mesh)))
+    elastic, mass = (model.padded(form) for form in (assemble_stiffness(model.mesh), assemble_mass(model.mesh)))
     still = _prepare(model, {"stiffness": elastic, "mass": mass}, joint, supports, pairs, ties)
     if not model.prestress or model.rotation is None:
         return still
@@ -210,7 +211,7 @@ def prepare_model(
         displacements = np.asarray(constraints.transformation @ displacements)
     progress("assembly of the prestressed stiffness")
     stressed = assemble_tangent_stiffness(model.mesh, displacements[: 3 * model.mesh.n_nodes])
-    stiffness = (_with_extra(stressed, model) + spin_softening(mass, model.rotation)).tocsr()
+    stiffness = (model.padded(stressed) + spin_softening(mass, model.rotation)).tocsr()
     forms = {"stiffness": stiffness if constraints is None else constraints.apply(stiffness, stiffness=True)}
     forms |= {"mass": still.reduction.forms["mass"], "elastic": still.reduction.forms["stiffness"]}
     return replace(still, reduction=Reduction(ordered, forms), at_rest=still.reduction)
@@ -239,13 +240,6 @@ def _prepare(
     places = find_layers(model.coordinates, coupled, joint.cut) if layers is None else layers.astype(float)
     ordered = order_structure(supports, pairs, ties, coupled, places)
     return PreparedModel(Reduction(ordered, forms), load, None, model.rotation, weight)
-
-
-def _with_extra(form: sparse.csr_matrix, model: MeshModel) -> sparse.csr_matrix:
-    """A form with empty rows for nodes without elements."""
-    if len(model.extra):
-        form.resize((3 * len(model.numbers), 3 * len(model.numbers)))
-    return form
 
 
 def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int) -> FloatArray:

@@ -183,10 +183,12 @@ class _Builder:
     def _held(self, node: int, local: list[int]) -> list[int]:
         """Displacements that are 0 where those along some directions of a node are."""
         row = self._row(node, "")
+        if node not in self.frames:
+            return [3 * row + k for k in local]
         frame = self._frame(node)
         across = frame[local].T @ frame[local]
         straight = np.abs(across - np.diag(np.round(np.diag(across)))).max() < _ROUND_OFF
-        if straight and not (row in self.cut and node in self.frames and 0 < len(local) < 3):
+        if straight and not (row in self.cut and 0 < len(local) < 3):
             return [3 * row + int(k) for k in np.flatnonzero(np.round(np.diag(across)))]
         if node in self.first_terms:
             return [3 * self._localised(node) + k for k in local]

@@ -10,6 +10,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from solver.model import BoolArray, FloatArray, IntArray
+from studies.finite_element.joint.cut_faces import CutFaces
+from studies.finite_element.joint.pairing import ContactPairs
 from studies.scene_error import SceneError
 
 _LONGEST_CHAIN = 100  # displacements that depend on others that depend on others
@@ -59,31 +61,36 @@ class Constraints:
         """Forces (3 n_nodes, ...) on q."""
         return np.asarray(self.transformation.T @ vectors)
 
-    def check_free(self, nodes: IntArray, numbers: IntArray, what: str, remedy: str) -> None:
-        """Raises SceneError where one of the nodes depends on others. what: the nodes are, for the message."""
-        wrong = nodes[self.dependent[nodes].any(axis=1)]
-        if len(wrong):
-            found = f"{self.origins[self.origin[wrong[0]]]}: node {numbers[wrong[0]]} depends on others and {what}"
-            raise SceneError("model", found, remedy)
 
-    def check_straight(self, nodes: IntArray, numbers: IntArray, what: str) -> None:
-        """Raises SceneError where one of the nodes is held obliquely. what: the nodes are, for the message."""
-        wrong = nodes[self.oblique[nodes]]
+def check_followers(
+    constraints: Constraints, numbers: IntArray, cut: CutFaces | None, pairs: ContactPairs, ties: ContactPairs | None
+) -> None:
+    """Raises SceneError where a node follows others by a constraint and in another way as well."""
+    moving = [(pairs, "moves in a contact pair")] + ([] if ties is None else [(ties, "is tied")])
+    for each, what in moving:
+        _check_free(constraints, each.moving, numbers, what, "take it out of one of them, or refine the other surface")
+        wrong = each.moving[constraints.oblique[each.moving]]
         if len(wrong):
             found = f"node {numbers[wrong[0]]} is held in a direction of *TRANSFORM and {what}"
             raise SceneError("model", found, "hold it along x, y and z, or not at all, or refine the other surface")
+    if cut is None:
+        return
+    both = np.concatenate([cut.left, cut.right])
+    _check_free(constraints, both, numbers, "is on a cut face", "let other nodes depend on this one")
+    slanted = constraints.oblique[cut.left] | constraints.oblique[cut.right]
+    for one, other in zip(cut.left[slanted], cut.right[slanted], strict=True):
+        own, image = (constraints.across[3 * n : 3 * n + 3, 3 * n : 3 * n + 3].toarray() for n in (one, other))
+        if np.abs(cut.rotation @ own @ cut.rotation.T - image).max() > _ROUND_OFF:
+            found = f"nodes {numbers[one]} and {numbers[other]} of the cut faces are held in other directions"
+            raise SceneError("clamp", found, "give both *TRANSFORM, TYPE=C about the axis, and the same dofs")
 
-    def check_turned(self, left: IntArray, right: IntArray, rotation: FloatArray, numbers: IntArray) -> None:
-        """Raises SceneError where nodes and their images under a rotation (3, 3) are not held alike."""
-        for one, other in zip(left, right, strict=True):
-            if not (self.oblique[one] or self.oblique[other]):
-                continue
-            own, image = (
-                self.across[3 * node : 3 * node + 3, 3 * node : 3 * node + 3].toarray() for node in (one, other)
-            )
-            if np.abs(rotation @ own @ rotation.T - image).max() > _ROUND_OFF:
-                found = f"nodes {numbers[one]} and {numbers[other]} of the cut faces are held in other directions"
-                raise SceneError("clamp", found, "give both *TRANSFORM, TYPE=C about the axis, and the same dofs")
+
+def _check_free(constraints: Constraints, nodes: IntArray, numbers: IntArray, what: str, remedy: str) -> None:
+    """Raises SceneError where one of the nodes depends on others. what: the nodes are, for the message."""
+    wrong = nodes[constraints.dependent[nodes].any(axis=1)]
+    if len(wrong):
+        origin = constraints.origins[constraints.origin[wrong[0]]]
+        raise SceneError("model", f"{origin}: node {numbers[wrong[0]]} depends on others and {what}", remedy)
 
 
 def eliminate(

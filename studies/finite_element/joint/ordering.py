@@ -99,24 +99,6 @@ class Supports:
         return 1.0 if self.cut is None or self.keeps_cut else self.cut.phase(nodal_diameter)
 
 
-def check_followers(supports: Supports, pairs: ContactPairs, ties: ContactPairs | None) -> None:
-    """Raises SceneError where a node follows others by a constraint and in another way as well."""
-    if supports.constraints is None:
-        return
-    followers = [(pairs.moving, "moves in a contact pair", "take it out of one of them, or refine the other surface")]
-    if ties is not None:
-        followers.append((ties.moving, "is tied", "take it out of one of them"))
-    if supports.cut is not None:
-        cut = supports.cut
-        both = np.concatenate([cut.left, cut.right])
-        followers.append((both, "is on a cut face", "let other nodes depend on this one"))
-        supports.constraints.check_turned(cut.left, cut.right, cut.rotation, supports.numbers)
-    for nodes, what, remedy in followers:
-        supports.constraints.check_free(nodes, supports.numbers, what, remedy)
-    for nodes, what, _ in followers[:2] if ties is not None else followers[:1]:
-        supports.constraints.check_straight(nodes, supports.numbers, what)
-
-
 def consistent_supports(supports: Supports) -> Supports:
     """Supports whose nodes on one cut face are held as their images are.
 
