@@ -22,7 +22,7 @@ def read_transform(draft: Draft, block: Block) -> None:
     kind = chosen(block, "TYPE", ("R", "C", "S"), "R")
     if kind == "S":
         raise refused(block, "spherical directions are not read", "give rectangular or cylindrical ones")
-    nodes, scope = draft.refer(f'"{block.name("NSET")}"', block.place), draft.scope
+    nodes, scope = draft.named(block, "NSET"), draft.scope
     values = read_floats(block, 0, 6)
     points = np.array(values[:6]).reshape(2, 3)
     spans = points[1] - points[0] if kind == "C" else np.cross(points[0], points[1])
@@ -108,12 +108,12 @@ def _mpc(found: Lookup, one: Reference, other: Reference, text: str, *, turns: b
 def read_rigid_body(draft: Draft, block: Block) -> None:
     """*RIGID BODY: nodes, or those of elements, follow a reference node."""
     text = f"{block.place}: *{block.written}"
-    node_sets = [draft.refer(block.name(key), block.place) for key in _SETS_OF_NODES if key in block.parameters]
-    elements = [draft.refer(block.name("ELSET"), block.place)] if "ELSET" in block.parameters else []
+    node_sets = [draft.named(block, key) for key in _SETS_OF_NODES if key in block.parameters]
+    elements = [draft.named(block, "ELSET")] if "ELSET" in block.parameters else []
     if not node_sets and not elements:
         raise block.place.wrong(f"*{block.written} without NSET or ELSET", "give the nodes that are rigid")
-    reference = draft.refer(block.name("REFNODE"), block.place)
-    rotation = draft.refer(block.name("ROTNODE"), block.place) if "ROTNODE" in block.parameters else None
+    reference = draft.named(block, "REFNODE")
+    rotation = draft.named(block, "ROTNODE") if "ROTNODE" in block.parameters else None
 
     def motions(found: Lookup) -> list[RigidMotion]:
         nodes = [found.nodes(each)[1] for each in node_sets] + [found.nodes_of(each) for each in elements]
@@ -155,7 +155,7 @@ def read_kinematic(draft: Draft, block: Block) -> None:
         raise block.place.wrong(f"*{block.written} without *COUPLING", "write it below its *COUPLING")
     lines = [_dofs(read_fields(block, line), block.place_of(line)) for line in range(len(block.lines))]
     following = tuple(dof for dof in _ALL if not lines or any(dof in dofs for dofs in lines))
-    surface, reference = (draft.refer(head.name(key), head.place) for key in ("SURFACE", "REFNODE"))
+    surface, reference = (draft.named(head, key) for key in ("SURFACE", "REFNODE"))
     text = f"{block.place}: *{block.written}"
 
     def motions(found: Lookup) -> list[RigidMotion]:
@@ -167,7 +167,7 @@ def read_kinematic(draft: Draft, block: Block) -> None:
 
 def read_kinematic_coupling(draft: Draft, block: Block) -> None:
     """*KINEMATIC COUPLING: node or set, first and last dof that follow the reference node."""
-    reference = draft.refer(block.name("REFNODE"), block.place)
+    reference = draft.named(block, "REFNODE")
     for fields, place in draft.lines(block, 1, "node or set, first and last dof"):
         nodes, dofs = draft.refer(fields[0], place), _dofs(fields[1:], place)
         text = f"{place}: *{block.written}"

@@ -95,7 +95,7 @@ def read_clearance(draft: Draft, block: Block) -> None:
     if "VALUE" not in block.parameters:
         raise refused(block, "a clearance without VALUE", "give VALUE=..., one for both surfaces")
     value = read_float(block.parameters["VALUE"], block.place)
-    dependent, independent = (draft.refer(block.name(name), block.place) for name in ("SLAVE", "MASTER"))
+    dependent, independent = (draft.named(block, name) for name in ("SLAVE", "MASTER"))
     text = f"{block.place}: *{block.written} of {value:g}"
     draft.add("fits", _fits(dependent, independent, text, value, block.place))
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from studies.fe_models.deck.mesh import FloatArray, IntArray
+from studies.fe_models.deck.mesh import FloatArray, IntArray, Surface
 from studies.fe_models.deck.sets import Reference, SetDefinitions, read_reference
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import read_fields
@@ -36,6 +36,9 @@ class Lookup(Protocol):
 
     def surface(self, reference: Reference) -> str:
         """Name of a surface."""
+
+    def faces(self, name: str) -> Surface:
+        """Faces or nodes of a surface."""
 
     def surface_nodes(self, name: str) -> IntArray:
         """Nodes of a surface."""
@@ -152,13 +155,17 @@ class Draft:
         if step is None:
             return
         for name in list(self.fields):
-            if step.writes or (name in ("forces", "gravity") and not step.loads_count):
+            if step.writes or (name in ("forces", "pressures", "gravity") and not step.loads_count):
                 self.fields[name] = step.before.get(name, {})
 
     def skip(self, block: Block) -> None:
         """Notes a keyword that cannot change the model."""
         if len(self.skipped) < 1000:
             self.skipped.append(f"{block.place}: *{block.written}")
+
+    def named(self, block: Block, parameter: str) -> Reference:
+        """What the name in a parameter points to. Raises SceneError."""
+        return self.refer(f'"{block.name(parameter)}"', block.place)
 
     def refer(self, text: str, place: Place) -> Reference:
         """What a name or number of a data line points to. Raises SceneError."""

@@ -66,7 +66,7 @@ def read_ncopy(draft: Draft, block: Block) -> None:
     if "SHIFT" not in block.parameters:
         raise refused(block, "a copy without SHIFT", "give the nodes of copies that are mirrored or scaled")
     (change,) = _numbers([block.parameters.get("CHANGENUMBER", "")], block.place, 1, (0,))
-    old = draft.refer(block.name("OLDSET"), block.place)
+    old = draft.named(block, "OLDSET")
     shift, turn = read_placement(block)
     scope, new = draft.scope, read_name(block.parameters.get("NEWSET", ""))
 
@@ -122,7 +122,7 @@ def read_elcopy(draft: Draft, block: Block) -> None:
     """*ELCOPY: the elements of a set again, with larger numbers of elements and nodes."""
     shifts = [block.parameters.get(name, "") for name in ("ELEMENTSHIFT", "SHIFTNODES")]
     by_element, by_node = (np.array(_numbers([text], block.place, 1, (0,))) for text in shifts)
-    old = draft.refer(block.name("OLDSET"), block.place)
+    old = draft.named(block, "OLDSET")
     scope, name = draft.scope, read_name(block.parameters.get("NEWSET", ""))
 
     def generate(now: Draft) -> None:

@@ -90,7 +90,7 @@ KEYWORDS: Mapping[str, Keyword] = {
     "DASHPOT": _read(materials.read_other_section, "ELSET"),
     "DENSITY": _read(materials.read_density),
     "DLOAD": _read(steps.read_dload, _LOAD),
-    "DSLOAD": _read(steps.read_other_load, _LOAD),
+    "DSLOAD": _read(steps.read_dsload, _LOAD),
     "ELASTIC": _read(materials.read_elastic, "TYPE DEPENDENCIES", "MODULI"),
     "ELCOPY": _read(generate.read_elcopy, "ELEMENTSHIFT SHIFTNODES OLDSET NEWSET"),
     "ELEMENT": _read(mesh_keywords.read_element, "TYPE ELSET INPUT"),

@@ -49,7 +49,7 @@ def _material(draft: Draft, block: Block) -> DraftMaterial:
 
 def read_section(draft: Draft, block: Block) -> None:
     """*SOLID SECTION: a set of elements and its material."""
-    reference, material = draft.refer(f'"{block.name("ELSET")}"', block.place), block.name("MATERIAL")
+    reference, material = draft.named(block, "ELSET"), block.name("MATERIAL")
 
     def sections(found: Lookup) -> list[SolidSection]:
         name = found.elements(reference)[0]
@@ -63,7 +63,7 @@ def read_section(draft: Draft, block: Block) -> None:
 
 def read_other_section(draft: Draft, block: Block) -> None:
     """*BEAM SECTION, *MASS and others: elements that are not read carry something."""
-    reference = draft.refer(f'"{block.name("ELSET")}"', block.place)
+    reference = draft.named(block, "ELSET")
 
     def unassembled(found: Lookup) -> list[tuple[str, IntArray]]:
         elements = found.elements(reference)[1]

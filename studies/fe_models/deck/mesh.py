@@ -200,6 +200,16 @@ class NodalForce:
 
 
 @dataclass(frozen=True)
+class Pressure:
+    """A constant pressure on faces (f,) of elements (f,), positive into the body. place: in the file, for messages."""
+
+    place: str
+    elements: IntArray
+    faces: IntArray
+    value: float
+
+
+@dataclass(frozen=True)
 class Material:
     """An isotropic linear elastic material, in units of the file. None where the deck gives no such value.
 
@@ -266,7 +276,7 @@ class Deck:
         In the order of the file.
     centrifugal
         Loads of the last step that has some.
-    forces, gravity
+    forces, pressures, gravity
         Constant loads of static steps; the acceleration (3,) acts on all elements, None where there is none.
     unassembled
         What has a stiffness or a mass that only matrices of another program hold, as "deck.inp, line 7: ...".
@@ -300,6 +310,7 @@ class Deck:
     sections: tuple[SolidSection, ...] = ()
     centrifugal: tuple[CentrifugalLoad, ...] = ()
     forces: tuple[NodalForce, ...] = ()
+    pressures: tuple[Pressure, ...] = ()
     gravity: FloatArray | None = None
     unassembled: tuple[str, ...] = ()
     n_removed: int = 0

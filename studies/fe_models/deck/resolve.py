@@ -71,7 +71,7 @@ class _Resolved:
         gone = self._gone(fields)
         blocks = [_without(block, gone) for block in self.blocks if block.kind in NODES_OF_KIND]
         kept = np.setdiff1d(self.all_elements[self.solid], gone)
-        names = ("ties", "boundaries", "transforms", "equations", "rigid_motions", "sections", "forces")
+        names = ("ties", "boundaries", "transforms", "equations", "rigid_motions", "sections", "forces", "pressures")
         loads = [load for load in fields.get("centrifugal", []) if np.isin(load.elements, kept).any() or not kept.size]
         return Deck(
             path=draft.name,
@@ -130,10 +130,13 @@ class _Resolved:
             raise reference.place.wrong(found, "define it with *SURFACE")
         return self._names((scope, str(reference.target)), self.draft.surfaces)[0]
 
+    def faces(self, name: str) -> Surface:
+        """Faces or nodes of a surface."""
+        return self._surface(next(key for key in self.draft.surfaces if name in self._names(key, self.draft.surfaces)))
+
     def surface_nodes(self, name: str) -> IntArray:
         """Nodes of a surface."""
-        key = next(key for key in self.draft.surfaces if name in self._names(key, self.draft.surfaces))
-        surface = self._surface(key)
+        surface = self.faces(name)
         found = [surface.nodes]
         for block in self.blocks:
             if block.kind in NODES_OF_KIND:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from studies.fe_models.deck.draft import Draft, DraftStep, Items, refused
-from studies.fe_models.deck.mesh import Boundary, CentrifugalLoad, FloatArray, NodalForce
+from studies.fe_models.deck.draft import Draft, DraftStep, Items, Lookup, refused
+from studies.fe_models.deck.mesh import Boundary, CentrifugalLoad, FloatArray, NodalForce, Pressure
 from studies.fe_models.deck.sets import Reference
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import read_fields, read_float, read_integer
@@ -90,13 +92,21 @@ def _forces(nodes: Reference, dof: int, value: float, text: str) -> Items:
 
 
 def read_dload(draft: Draft, block: Block) -> None:
-    """*DLOAD: CENTRIF in any step, GRAV in static ones; other loads are refused there."""
+    """*DLOAD: CENTRIF in any step, P1 to P6 and GRAV in static ones; other loads are refused there."""
     step = _loaded(draft, block, "gravity")
     if _value(block, "OP") == "NEW" and step.loads_count:
         draft.clear("centrifugal")
+        draft.clear("pressures")
     fresh = True
     for fields, place in draft.lines(block, 2, "set, type and size"):
         kind = fields[1].upper()
+        if kind in ("P1", "P2", "P3", "P4", "P5", "P6"):
+            elements, value = draft.refer(fields[0], place), read_float(fields[2] if len(fields) > 2 else "", place)
+            text = f"{place}: *{block.written}"
+            draft.add(
+                "pressures", _pressures(elements, int(kind[1]), value, text), (elements.scope, elements.target, kind)
+            )
+            continue
         if kind not in ("CENTRIF", "GRAV"):
             if step.loads_count:
                 remedy = "give forces with *CLOAD, or `preload` in the study"
@@ -120,6 +130,34 @@ def read_dload(draft: Draft, block: Block) -> None:
         draft.add("centrifugal", _centrifugal(elements, values, axis))
 
 
+def _pressures(elements: Reference, face: int, value: float, text: str) -> Items:
+    def pressures(found: Lookup) -> list[Pressure]:
+        members = found.elements(elements)[1]
+        return [Pressure(text, members, np.full(members.size, face), value)]
+
+    return pressures
+
+
+def read_dsload(draft: Draft, block: Block) -> None:
+    """*DSLOAD: surface, P, pressure; it counts in static steps."""
+    step = _loaded(draft, block, "pressures")
+    for fields, place in draft.lines(block, 2, "surface, P and pressure"):
+        if fields[1].upper() == "P":
+            surface, value = draft.refer(fields[0], place), read_float(fields[2] if len(fields) > 2 else "", place)
+            key = "surface", surface.scope, surface.target
+            draft.add("pressures", partial(_on_surface, surface, value, f"{place}: *{block.written}"), key)
+        elif step.loads_count:
+            remedy = "give a pressure P, forces with *CLOAD, or `preload` in the study"
+            raise place.wrong(f"*{block.written} of type {shown(fields[1])} is not read", remedy)
+
+
+def _on_surface(surface: Reference, value: float, text: str, found: Lookup) -> list[Pressure]:
+    faces = found.faces(found.surface(surface))
+    if faces.of_nodes:
+        raise surface.place.wrong("a pressure on a surface of nodes", "give a surface of element faces")
+    return [Pressure(text, faces.elements, faces.faces, value)]
+
+
 def _gravity(elements: Reference, acceleration: FloatArray) -> Items:
     return lambda found: [(found.elements(elements)[1], acceleration, elements.place)]
 
@@ -133,14 +171,6 @@ def _unit(vector: FloatArray, found: str, what: str, place: Place) -> FloatArray
 
 def _centrifugal(elements: Reference, values: list[float], axis: FloatArray) -> Items:
     return lambda found: [CentrifugalLoad(*found.elements(elements), values[0], np.array(values[1:4]), axis)]
-
-
-def read_other_load(draft: Draft, block: Block) -> None:
-    """Loads that are not read: they are refused in static steps, and do not matter in others."""
-    step = _loaded(draft, block, "")
-    if step.loads_count:
-        raise refused(block, "this load is not read", "give forces with *CLOAD, or `preload` in the study")
-    draft.skip(block)
 
 
 def _loaded(draft: Draft, block: Block, field: str) -> DraftStep:

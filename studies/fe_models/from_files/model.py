@@ -32,6 +32,7 @@ from studies.fe_models.model_files import ModelFiles
 from studies.fe_models.nodal_matrices import NodalMatrices, order_by_nodes
 from studies.fe_models.units import Units, find_units
 from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.joint.surfaces import loops_of_faces, pressure_forces
 from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel, Retainer, SetMotion
 from studies.finite_element.reduced_joint import Progress, silent
 from studies.scene_error import SceneError
@@ -109,7 +110,9 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     supported = find_constraints(deck, numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
     n_nodes = len(supported.held)
-    preload = supported.forces if not parameters.preload else np.zeros(3 * n_nodes)
+    preload = np.zeros(3 * n_nodes)
+    if not parameters.preload:
+        preload = supported.forces + _pressed(deck, mesh, n_nodes, units)
     for each in parameters.preload:
         preload = preload + each.force * _motion(selections, each, "preload.set").row(n_nodes)
     gravity = None if deck.gravity is None else deck.gravity * units.length
@@ -147,6 +150,16 @@ def _check_there(path: Path, key: str) -> None:
 
 def _motion(selections: Selections, given: SetDirection, key: str) -> SetMotion:
     return SetMotion(selections.nodes(given.set, key), np.array(given.direction))
+
+
+def _pressed(deck: Deck, mesh: SolidMesh, n_nodes: int, units: Units) -> FloatArray:
+    """Nodal forces (3 n_nodes,), N, of the pressures of a deck."""
+    forces = np.zeros(3 * n_nodes)
+    for each in deck.pressures:
+        kept = np.isin(each.elements, np.concatenate([group.numbers for group in mesh.groups]))
+        loops = loops_of_faces(mesh, each.place, each.elements[kept], each.faces[kept])
+        forces[: 3 * mesh.n_nodes] += pressure_forces(mesh.coordinates, loops, each.value * units.stress)
+    return forces
 
 
 def _read_matrices(files: ModelFiles, parameters: Parameters, deck: Deck, progress: Progress) -> Matrices:

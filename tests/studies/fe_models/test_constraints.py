@@ -94,6 +94,14 @@ def test_forces_of_the_deck_and_gravity(tmp_path):
     weight = np.zeros((len(other.weight), 3))
     weight[:, 2] = -9.81 * other.weight
     np.testing.assert_allclose(prepared.static_load, other.static_load + weight.ravel(), atol=1e-12)
+    # a pressure of 2 MPa on 40 by 10 mm, by elements and by a surface
+    under = "*SURFACE, NAME=UNDER\nELOW, S1\n*STEP\n*STATIC\n"
+    pressed = [
+        prepared_deck(tmp_path, f"{BLOCKS}{under}{load}\n*END STEP\n")[0].static_load
+        for load in ("*DLOAD\nELOW, P1, 2.", "*DSLOAD\nUNDER, P, 2.")
+    ]
+    np.testing.assert_array_equal(*pressed)
+    np.testing.assert_allclose(pressed[0].reshape(-1, 3).sum(axis=0), [0.0, 0.0, 800.0], atol=1e-9)
     # a force on the reference node is one on those that follow
     coupling = BLOCKS + "*NODE\n900, 40., 5., 2.5\n*RIGID BODY, NSET=XE, REF NODE=900\n*STEP\n*STATIC\n*CLOAD\n"
     moved = []
@@ -134,7 +142,7 @@ def test_cylindrical_directions_on_cut_faces_as_calculix(dofs, tmp_path):
         ("*EQUATION\n2\n5,4,1.,15,1,-1.\n", r"\*EQUATION: node 5 has no dof 4"),
         ("*TRANSFORM, NSET=XM, TYPE=C\n40,0,0,40,0,1\n*BOUNDARY\nXM,1\n", r"\*TRANSFORM: node 5 is on the axis"),
         ("*BOUNDARY\nXM, 1, 1, 0.1\n", r"\*BOUNDARY moves XM by 0.1"),
-        ("*STEP\n*STATIC\n*DLOAD\nELOW, P2, 1.\n*END STEP\n", r"\*DLOAD of type P2 is not read"),
+        ("*STEP\n*STATIC\n*DLOAD\nELOW, BX, 1.\n*END STEP\n", r"\*DLOAD of type BX is not read"),
         ("*MPC\nPLANE, 5, 10, 15, 20, 30\n", r"\*MPC PLANE of 5 nodes is not read"),
         (
             "*TRANSFORM, NSET=XM, TYPE=R\n1,1,0,-1,1,0\n*BOUNDARY\nXM,1\n*RIGID BODY, NSET=XM, REF NODE=3\n",

@@ -218,7 +218,7 @@ def test_elements_that_are_not_read(tmp_path):
         ("*SURFACE INTERACTION, NAME=X\n*SURFACE BEHAVIOR, NO SEPARATION\n", r"\*SURFACE BEHAVIOR with NOSEPARATION"),
         ("*INITIAL CONDITIONS, TYPE=STRESS\n", r"\*INITIAL CONDITIONS: TYPE=STRESS is not read"),
         ("*STEP\n*STATIC\n*CLOAD, AMPLITUDE=A\n5, 1, 1.\n", r"\*CLOAD: a load with AMPLITUDE is not read"),
-        ("*STEP\n*STATIC\n*DSLOAD\nSUP, P, 1.\n", r"\*DSLOAD: this load is not read; give forces with \*CLOAD"),
+        ("*STEP\n*STATIC\n*DSLOAD\nSUP, HP, 1.\n", r"\*DSLOAD of type HP is not read; give a pressure P"),
     ],
 )
 def test_what_may_change_the_model_is_refused(text, sentence, tmp_path):
