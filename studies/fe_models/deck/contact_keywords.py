@@ -130,11 +130,17 @@ def read_model_change(draft: Draft, block: Block) -> None:
 
 
 def _removed(removed: bool, elements: Reference) -> Items:
-    return lambda found: [(removed, found.elements(elements)[1])]
+    return lambda found: [(removed, found.elements(elements)[1], _taken(elements, "elements"))]
 
 
 def _apart(removed: bool, dependent: Reference, independent: Reference) -> Items:
-    return lambda found: [(removed, (found.surface(dependent), found.surface(independent)))]
+    return lambda found: [
+        (removed, (found.surface(dependent), found.surface(independent)), _taken(dependent, "a contact pair"))
+    ]
+
+
+def _taken(reference: Reference, what: str) -> str:
+    return f"{reference.place}: *MODEL CHANGE takes {what} away."
 
 
 def read_cyclic_symmetry(draft: Draft, block: Block) -> None:

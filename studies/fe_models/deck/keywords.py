@@ -72,6 +72,7 @@ _INSTEAD = {
 """Remedies for some of the others."""
 
 _LOAD = "OP AMPLITUDE"
+_LOADS = ("CLOAD", "DSLOAD", "TEMPERATURE")  # of steps that are not static they do not matter
 
 KEYWORDS: Mapping[str, Keyword] = {
     "ASSEMBLY": _read(steps.read_nothing, "", "NAME"),
@@ -151,7 +152,11 @@ def read_keyword(draft: Draft, block: Block) -> None:
             return
         remedy = _INSTEAD.get(block.keyword, "remove it if the model is right without it")
         raise block.place.wrong(f"*{block.written} is not read, and may change the model", remedy)
-    if "*" not in known.parameters:
+    unused = draft.step is not None and not draft.step.loads_count
+    if unused and block.keyword in _LOADS:
+        draft.skip(block)
+        return
+    if "*" not in known.parameters and not (unused and block.keyword == "DLOAD"):
         for name in block.parameters:
             if name not in known.parameters and name not in known.harmless:
                 found = f"*{block.written} with {shown(name)}, which is not read and may change the model"

@@ -280,8 +280,8 @@ class Deck:
         Constant loads of static steps; the acceleration (3,) acts on all elements, None where there is none.
     unassembled
         What has a stiffness or a mass that only matrices of another program hold, as "deck.inp, line 7: ...".
-    n_removed
-        Elements that *MODEL CHANGE takes away; they are not among the others.
+    removed
+        What *MODEL CHANGE takes away, a sentence each; it is not among the rest.
     n_instances
         Of parts; where there are several, numbers are not those of the file.
     skipped
@@ -313,7 +313,7 @@ class Deck:
     pressures: tuple[Pressure, ...] = ()
     gravity: FloatArray | None = None
     unassembled: tuple[str, ...] = ()
-    n_removed: int = 0
+    removed: tuple[str, ...] = ()
     n_instances: int = 0
     skipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -324,7 +324,10 @@ class Deck:
         """Label and text of lines for the user: what was skipped, where there is something, and the notes."""
         more = len(self.skipped) - _MOST_NAMED
         skipped = "; ".join(self.skipped[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
-        return (*((("skipped", skipped),) if skipped else ()), *(("note", text) for text in self.notes))
+        return (
+            *((("skipped", skipped),) if skipped else ()),
+            *(("note", text) for text in (*self.notes, *self.removed)),
+        )
 
     def rows_of_nodes(self, numbers: IntArray) -> IntArray:
         """Places of nodes in `coordinates`, of the shape of `numbers`; all of them must exist."""

@@ -86,7 +86,9 @@ class _Resolved:
             materials={name: self._material(each, fields) for name, each in draft.materials.items()},
             centrifugal=tuple(loads),
             gravity=self._gravity(fields, kept),
-            n_removed=gone.size,
+            removed=tuple(
+                text for changes in ("removed", "apart") for taken, _, text in fields.get(changes, []) if taken
+            ),
             n_instances=len(draft.placed),
             unassembled=tuple(text for text, _ in fields.get("unassembled", [])),
             skipped=(*draft.skipped, *self._idle(fields)),
@@ -217,7 +219,7 @@ class _Resolved:
     def _gone(self, fields: Mapping[str, list[Any]]) -> IntArray:
         """Elements that *MODEL CHANGE takes away."""
         gone = np.empty(0, dtype=np.int64)
-        for removed, elements in fields.get("removed", []):
+        for removed, elements, _ in fields.get("removed", []):
             gone = np.union1d(gone, elements) if removed else np.setdiff1d(gone, elements)
         return gone
 
@@ -274,7 +276,7 @@ def _surface_without(surface: Surface, gone: IntArray) -> Surface:
 def _contact_pairs(fields: Mapping[str, list[Any]]) -> Iterator[ContactPair]:
     """Contact pairs with their clearances, without those that *MODEL CHANGE takes away."""
     apart: set[frozenset[str]] = set()
-    for removed, names in fields.get("apart", []):
+    for removed, names, _ in fields.get("apart", []):
         apart = apart | {frozenset(names)} if removed else apart - {frozenset(names)}
     pairs = fields.get("contact_pairs", [])
     known = [frozenset((pair.dependent, pair.independent)) for pair in pairs]

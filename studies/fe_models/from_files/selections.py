@@ -45,8 +45,7 @@ class Selections:
             known = (*self.deck.node_sets, *self.deck.surfaces, *self.deck.element_sets)
             raise self.unknown(name, key, "set of nodes or surface", known)
         if len(found) == 0:
-            n_removed = self.deck.n_removed
-            taken = f", as *MODEL CHANGE takes {n_removed} elements away" if n_removed else ""
+            taken = f" ({self.deck.removed[0].rstrip('.')})" if self.deck.removed else ""
             found_none = f"{name} in {self.deck.path} has no node of an element{taken}"
             raise SceneError(key, found_none, "give nodes of the mesh")
         return found

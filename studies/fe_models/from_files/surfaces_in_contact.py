@@ -56,9 +56,10 @@ def find_surfaces(selections: Selections, parameters: Parameters, units: Units) 
         found = f"{deck.contact_pairs[0].glued}: all contact pairs are glued, so that nothing wears"
         raise SceneError("contact", found, "name those that move: `contact` in the study")
     if not chosen:
+        taken = f" ({deck.removed[0].rstrip('.')})" if deck.removed else ""
         raise SceneError(
             "contact",
-            f"{deck.path} has neither CONTACT PAIR nor TIE",
+            f"{deck.path} has neither CONTACT PAIR nor TIE{taken}",
             'give pairs of surfaces, as [["BLADES", "DISKS"]]',
         )
     # a name that the deck does not have is said before a friction coefficient that is missing for it

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from studies.fe_models.from_files.model import load_model
+from studies.fe_models.from_files.model import find_files, load_model
 from studies.fe_models.from_files.parameters import Parameters
-from studies.fe_models.model_files import ModelFiles
 from studies.finite_element.reduced_joint import glued_frequencies, prepare_model
 from tests.studies.fe_models.decks import write
 from tests.studies.fe_models.solid_meshes import run_ccx
@@ -89,10 +88,10 @@ SECTORS = "\n".join(
 
 def prepared_deck(folder, text, nodal_diameter=0, **given):
     """The model of a deck, ready for its reduction."""
-    path = write(folder, text)
+    write(folder, text)
     load = {"set": "TIP", "direction": (0, 1, 0)}
     parameters = Parameters(units="mm-t-s", load=load, nodal_diameter=nodal_diameter, **given)
-    loaded = load_model(ModelFiles(path), parameters)
+    loaded = load_model(find_files(folder, "deck.inp", parameters), parameters)
     return prepare_model(loaded.model, loaded.joint), loaded
 
 
@@ -101,11 +100,16 @@ def frequencies(folder, text, nodal_diameter=0, **given):
     return glued_frequencies(prepared_deck(folder, text, nodal_diameter, **given)[0], nodal_diameter, 4)
 
 
-def of_calculix(folder, text, step="*STEP\n*FREQUENCY\n4\n*END STEP\n", every=1):
-    """Those that CalculiX finds, where contact pairs are glued. every: of how many equal ones one is taken."""
+def run_tied(folder, text, step):
+    """Runs CalculiX on a deck whose contact pairs are glued, as "job"."""
     contact = r"\*SURFACE INTERACTION.*?\n\*CONTACT PAIR[^\n]*\n([^\n]*)\n"
     tied = re.sub(contact, r"*TIE, NAME=GLUE, POSITION TOLERANCE=0.1\n\1\n", text, flags=re.DOTALL)
     run_ccx(folder, (tied + step).split("\n"), "job")
+
+
+def of_calculix(folder, text, step="*STEP\n*FREQUENCY\n4\n*END STEP\n", every=1):
+    """Those that CalculiX finds, where contact pairs are glued. every: of how many equal ones one is taken."""
+    run_tied(folder, text, step)
     number = r"(-?\d\.\d+E[+-]\d+)"
     table = (folder / "job.dat").read_text()
     rows = re.findall(rf"^ +\d+ +(?:\d+ +)?{number} +{number} +{number} +{number} *$", table, re.MULTILINE)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from studies.scene_error import SceneError
-from tests.studies.fe_models.constrained_decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck
+from tests.studies.fe_models.constrained_decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
 
 REFERENCE = "*NODE\n900, 45., 5., 0.\n"
 STATIC = "*STEP\n*STATIC\n*DLOAD\nEALL1, CENTRIF, 1e7, -100., 0., 0., 0., 0., 1.\n*END STEP\n"
@@ -43,6 +43,17 @@ def test_prestress_of_a_constrained_structure_as_calculix(tmp_path):
     text = BLOCKS + BOTH_READ["rigid line"] + STATIC
     expected = of_calculix(tmp_path, text, "*STEP, PERTURBATION\n*FREQUENCY\n4\n*END STEP\n")
     np.testing.assert_allclose(frequencies(tmp_path, text), expected, rtol=1e-6)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+@pytest.mark.parametrize("name", ["rigid end with nodes in contact", "cylindrical directions"])
+def test_constraints_on_matrices_of_calculix(name, tmp_path):
+    """They are written without constraints, which the deck still has."""
+    text = BLOCKS + BOTH_READ[name]
+    removed = "*STEP\n*BOUNDARY, OP=NEW\n*EQUATION, REMOVE ALL\n*FREQUENCY, SOLVER=MATRIXSTORAGE, CYCMPC=INACTIVE\n"
+    run_tied(tmp_path, text, f"*STEP\n*STATIC\n*END STEP\n{removed}*END STEP\n")
+    own = frequencies(tmp_path, text, matrices="job")
+    np.testing.assert_allclose(own, frequencies(tmp_path, text), rtol=1e-8)
 
 
 SAME = {

@@ -7,11 +7,25 @@ from pathlib import Path
 import pytest
 
 from studies.fe_models.deck.read import read_deck
+from studies.fe_models.from_files.model import load_model
+from studies.fe_models.from_files.parameters import Parameters
+from studies.fe_models.model_files import ModelFiles
+from studies.finite_element.reduced_joint import prepare_model
 from studies.scene_error import SceneError
+from tests.studies.fe_models.constrained_decks import BLOCKS, FULL_MODEL, SECTORS
 from tests.studies.fe_models.decks import CUBES, PART, SECTOR, write
 from tests.studies.fe_models.mutations import mutate
 
 LEAST = "*NODE\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT,TYPE=C3D4,ELSET=E\n1,1,2,3,4\n"
+
+
+CONSTRAINTS = (
+    "*EQUATION\n2\n5,3,1.,15,3,1.\n*EQUATION\n3\n15,3,1.,10,3,-.5,3,3,.25\n2\n5,2,1.,3,2,1.\n",
+    "*NODE\n900, 45., 5., 0.\n*RIGID BODY, NSET=XE, REF NODE=900\n*BOUNDARY\n900, 4, 5\n*MPC\nBEAM, 3, 8\n",
+    "*NODE\n900, 45., 5., 0.\n*COUPLING, REF NODE=900, SURFACE=SE, CONSTRAINT NAME=C\n*KINEMATIC\n1, 2\n",
+    "*TRANSFORM, NSET=XM, TYPE=C\n-20., -30., 0., -19., -30., 4.\n*BOUNDARY\nXM, 1\n*EQUATION\n2\n5,2,1.,3,1,1.\n",
+)
+HELD = "*TRANSFORM, NSET=BORE, TYPE=C\n0, 0, 0, 0, 0, 1\n*BOUNDARY\nBORE, 2, 3\n4, 1, 3\n"
 
 
 def refused(path, sentence):
@@ -143,6 +157,28 @@ def test_sets_that_grow(tmp_path, monkeypatch):
     monkeypatch.setattr("studies.fe_models.deck.resolve._MOST_FACES", 20)
     refused(write(tmp_path, LEAST + "*NSET,NSET=A\n" + "NALL\n" * 30), "the sets have more than 100 members")
     refused(write(tmp_path, LEAST + "*SURFACE,NAME=S\n" + "E,S1\n" * 30), "more than 20 faces")
+
+
+def test_damaged_decks_of_constrained_models(tmp_path):
+    """Up to the matrices: they are built, or the deck is refused in a sentence."""
+    goods = (FULL_MODEL.read_text(), *(BLOCKS + text for text in CONSTRAINTS), SECTORS + HELD)
+    n_refused = 0
+    for seed in range(200):
+        good = goods[seed % len(goods)]
+        # what is not the mesh is damaged twice as often
+        start = good.index("*SURFACE INTERACTION") if seed % 3 else 0
+        path = tmp_path / "deck.inp"
+        path.write_bytes(good[:start].encode() + mutate(good[start:].encode(), seed))
+        began = time.process_time()
+        try:
+            load = {"set": "TIP", "direction": (0, 1, 0)}
+            loaded = load_model(ModelFiles(path), Parameters(units="mm-t-s", load=load, friction_coefficient=0.3))
+            prepare_model(loaded.model, loaded.joint)
+        except SceneError as error:
+            n_refused += 1
+            assert str(error).isprintable()
+        assert time.process_time() - began < 2
+    assert 50 < n_refused < 190
 
 
 def test_damaged_decks(tmp_path):
