@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.fe_models.deck.draft import Draft, Lookup, chosen, refused
+from studies.fe_models.deck.draft import Draft, chosen, refused
 from studies.fe_models.deck.mesh import Equation, IntArray, RigidMotion, Transform
 from studies.fe_models.deck.sets import Reference
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import is_integer, read_fields, read_float, read_floats, read_integer
 from studies.fe_models.text.read_errors import Place, shown
+
+if TYPE_CHECKING:
+    from studies.fe_models.deck.resolve import Resolved
 
 _ALL = (1, 2, 3)
 
@@ -29,7 +33,7 @@ def read_transform(draft: Draft, block: Block) -> None:
     if not 0 < np.linalg.norm(spans) < np.inf:
         raise block.place_of(0).wrong(f"*{block.written} by points on one line", "give points that are apart")
 
-    def transforms(found: Lookup) -> list[Transform]:
+    def transforms(found: Resolved) -> list[Transform]:
         placed = found.placed(scope, points, vectors=kind == "R")
         return [Transform(f"{block.place}: *{block.written}", found.nodes(nodes)[1], kind == "C", placed)]
 
@@ -66,7 +70,7 @@ def read_equation(draft: Draft, block: Block) -> None:
         line += 1
 
 
-def _equations(found: Lookup, terms: list[tuple[Reference, int, float]], place: Place) -> Iterator[Equation]:
+def _equations(found: Resolved, terms: list[tuple[Reference, int, float]], place: Place) -> Iterator[Equation]:
     """One equation, or one for each node of a set; single nodes are in all of them."""
     nodes = [found.ordered(reference) for reference, _, _ in terms]
     count = max(map(len, nodes))
@@ -94,7 +98,7 @@ def read_mpc(draft: Draft, block: Block) -> None:
         draft.add("rigid_motions", partial(_mpc, one=one, other=other, text=text, turns=kind == "BEAM"))
 
 
-def _mpc(found: Lookup, one: Reference, other: Reference, text: str, *, turns: bool) -> Iterator[RigidMotion]:
+def _mpc(found: Resolved, one: Reference, other: Reference, text: str, *, turns: bool) -> Iterator[RigidMotion]:
     """A node or set that follows a node, or the nodes of a set in their order."""
     first, second = found.ordered(one), found.ordered(other)
     if len(second) not in (1, len(first)) or not len(first):
@@ -115,7 +119,7 @@ def read_rigid_body(draft: Draft, block: Block) -> None:
     reference = draft.named(block, "REFNODE")
     rotation = draft.named(block, "ROTNODE") if "ROTNODE" in block.parameters else None
 
-    def motions(found: Lookup) -> list[RigidMotion]:
+    def motions(found: Resolved) -> list[RigidMotion]:
         nodes = [found.nodes(each)[1] for each in node_sets] + [found.nodes_of(each) for each in elements]
         turned = 0 if rotation is None else found.node(rotation)
         return [_motion(text, np.unique(np.concatenate(nodes)), _ALL, found.node(reference), turned, block.place)]
@@ -158,7 +162,7 @@ def read_kinematic(draft: Draft, block: Block) -> None:
     surface, reference = (draft.named(head, key) for key in ("SURFACE", "REFNODE"))
     text = f"{block.place}: *{block.written}"
 
-    def motions(found: Lookup) -> list[RigidMotion]:
+    def motions(found: Resolved) -> list[RigidMotion]:
         nodes = found.surface_nodes(found.surface(surface))
         return [_motion(text, nodes, following, found.node(reference), 0, block.place)] if following else []
 
@@ -175,7 +179,7 @@ def read_kinematic_coupling(draft: Draft, block: Block) -> None:
 
 
 def _coupled(
-    found: Lookup, nodes: Reference, dofs: tuple[int, ...], reference: Reference, text: str
+    found: Resolved, nodes: Reference, dofs: tuple[int, ...], reference: Reference, text: str
 ) -> list[RigidMotion]:
     if not dofs:
         return []

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.fe_models.deck.draft import Draft, DraftInteraction, Items, Lookup, chosen, refused
+from studies.fe_models.deck.draft import Draft, DraftInteraction, Items, chosen, refused
 from studies.fe_models.deck.mesh import ContactPair, Tie
 from studies.fe_models.deck.sets import Reference
 from studies.fe_models.text.keyword_lines import Block, read_name
 from studies.fe_models.text.numbers import is_integer, read_float, read_floats
 from studies.fe_models.text.read_errors import Place, shown
+
+if TYPE_CHECKING:
+    from studies.fe_models.deck.resolve import Resolved
 
 _MOST_SECTORS = 100_000
 _ONE_COEFFICIENT = ("ROUGH", "TAUMAX", "EXPONENTIALDECAY", "ANISOTROPIC", "USER", "DEPENDENCIES", "PROPERTIES")
@@ -23,7 +27,7 @@ def read_tie(draft: Draft, block: Block) -> None:
     name, cyclic = read_name(block.parameters.get("NAME", "")), "CYCLICSYMMETRY" in block.parameters
     pairs = list(read_pairs(draft, block))
 
-    def ties(found: Lookup) -> Iterator[Tie]:
+    def ties(found: Resolved) -> Iterator[Tie]:
         for dependent, independent, _ in pairs:
             names = found.surface(dependent), found.surface(independent)
             yield Tie(name, *names, tolerance if tolerance > 0 else None, cyclic)
@@ -48,7 +52,7 @@ def read_contact_pair(draft: Draft, block: Block) -> None:
     glued = f"{block.place}: *{block.written}, TIED" if "TIED" in block.parameters else ""
     interactions = draft.interactions
 
-    def found_pairs(found: Lookup) -> Iterator[ContactPair]:
+    def found_pairs(found: Resolved) -> Iterator[ContactPair]:
         law = interactions.get(name, DraftInteraction())
         for dependent, independent, _ in pairs:
             names = found.surface(dependent), found.surface(independent)

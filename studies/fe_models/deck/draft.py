@@ -4,53 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.fe_models.deck.mesh import FloatArray, IntArray, Surface
+from studies.fe_models.deck.mesh import FloatArray, IntArray
 from studies.fe_models.deck.sets import Reference, SetDefinitions, read_reference
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import read_fields
 from studies.fe_models.text.read_errors import Place, shown
 from studies.scene_error import SceneError
 
-
-class Lookup(Protocol):
-    """What names and numbers stand for, once all of a deck is read. Each raises SceneError where there is none."""
-
-    def nodes(self, reference: Reference) -> tuple[str, IntArray]:
-        """Name for messages, and the nodes of a set or number."""
-
-    def elements(self, reference: Reference) -> tuple[str, IntArray]:
-        """Name for messages, and the elements of a set or number."""
-
-    def node(self, reference: Reference) -> int:
-        """A node, or the only one of a set."""
-
-    def ordered(self, reference: Reference) -> IntArray:
-        """Nodes of a set or number in the order that counts in equations."""
-
-    def nodes_of(self, reference: Reference) -> IntArray:
-        """Nodes of a set of elements."""
-
-    def surface(self, reference: Reference) -> str:
-        """Name of a surface."""
-
-    def faces(self, name: str) -> Surface:
-        """Faces or nodes of a surface."""
-
-    def surface_nodes(self, name: str) -> IntArray:
-        """Nodes of a surface."""
-
-    def other_kinds(self, elements: IntArray) -> list[str]:
-        """Kinds of those elements (m,) that are not read."""
-
-    def placed(self, scope: str, points: FloatArray, *, vectors: bool = False) -> FloatArray:
-        """Points or vectors (n, 3) of an instance where the instance stands."""
+if TYPE_CHECKING:
+    from studies.fe_models.deck.resolve import Resolved
 
 
-Items = Callable[[Lookup], Iterable[Any]]
+Items = Callable[["Resolved"], Iterable[Any]]
 """Gives entries of a field of the deck, once names can be looked up."""
 
 

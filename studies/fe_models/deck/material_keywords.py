@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from studies.fe_models.deck.draft import Draft, DraftMaterial, Items, Lookup, refused
+from typing import TYPE_CHECKING
+
+from studies.fe_models.deck.draft import Draft, DraftMaterial, Items, refused
 from studies.fe_models.deck.mesh import IntArray, SolidSection
 from studies.fe_models.deck.sets import Reference
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import read_float, read_floats
 from studies.fe_models.text.read_errors import shown
+
+if TYPE_CHECKING:
+    from studies.fe_models.deck.resolve import Resolved
 
 
 def read_material(draft: Draft, block: Block) -> None:
@@ -51,7 +56,7 @@ def read_section(draft: Draft, block: Block) -> None:
     """*SOLID SECTION: a set of elements and its material."""
     reference, material = draft.named(block, "ELSET"), block.name("MATERIAL")
 
-    def sections(found: Lookup) -> list[SolidSection]:
+    def sections(found: Resolved) -> list[SolidSection]:
         name = found.elements(reference)[0]
         if material not in draft.materials:
             raise block.place.wrong(f"there is no material {shown(material)}", "define it with *MATERIAL")
@@ -65,7 +70,7 @@ def read_other_section(draft: Draft, block: Block) -> None:
     """*BEAM SECTION, *MASS and others: elements that are not read carry something."""
     reference = draft.named(block, "ELSET")
 
-    def unassembled(found: Lookup) -> list[tuple[str, IntArray]]:
+    def unassembled(found: Resolved) -> list[tuple[str, IntArray]]:
         elements = found.elements(reference)[1]
         kinds = found.other_kinds(elements)
         text = f"{block.place}: *{block.written} of elements of type {' and '.join(kinds)}, which are not read"

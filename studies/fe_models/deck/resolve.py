@@ -37,11 +37,11 @@ def resolve(draft: Draft) -> Deck:
     """The deck of a draft. Raises SceneError where names or numbers are missing or do not fit."""
     for generate in draft.generators:
         generate(draft)
-    return _Resolved(draft).deck()
+    return Resolved(draft).deck()
 
 
-class _Resolved:
-    """What names and numbers of a draft stand for: see `draft.Lookup`."""
+class Resolved:
+    """What names and numbers of a draft stand for: the readers of keywords ask it."""
 
     def __init__(self, draft: Draft) -> None:
         self.draft = draft

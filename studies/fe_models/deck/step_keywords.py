@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from studies.fe_models.deck.draft import Draft, DraftStep, Items, Lookup, refused
+from studies.fe_models.deck.draft import Draft, DraftStep, Items, refused
 from studies.fe_models.deck.mesh import Boundary, CentrifugalLoad, FloatArray, NodalForce, Pressure
 from studies.fe_models.deck.sets import Reference
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.numbers import read_fields, read_float, read_integer
 from studies.fe_models.text.read_errors import Place, shown
+
+if TYPE_CHECKING:
+    from studies.fe_models.deck.resolve import Resolved
 
 # displacements that the words of Abaqus hold, as first and last of them
 _HELD: dict[str, tuple[tuple[int, int], ...]] = {
@@ -131,7 +135,7 @@ def read_dload(draft: Draft, block: Block) -> None:
 
 
 def _pressures(elements: Reference, face: int, value: float, text: str) -> Items:
-    def pressures(found: Lookup) -> list[Pressure]:
+    def pressures(found: Resolved) -> list[Pressure]:
         members = found.elements(elements)[1]
         return [Pressure(text, members, np.full(members.size, face), value)]
 
@@ -151,7 +155,7 @@ def read_dsload(draft: Draft, block: Block) -> None:
             raise place.wrong(f"*{block.written} of type {shown(fields[1])} is not read", remedy)
 
 
-def _on_surface(surface: Reference, value: float, text: str, found: Lookup) -> list[Pressure]:
+def _on_surface(surface: Reference, value: float, text: str, found: Resolved) -> list[Pressure]:
     faces = found.faces(found.surface(surface))
     if faces.of_nodes:
         raise surface.place.wrong("a pressure on a surface of nodes", "give a surface of element faces")

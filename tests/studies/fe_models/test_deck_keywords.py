@@ -242,6 +242,7 @@ def test_the_page_has_the_lists():
     assert lists_of_keywords() in (Path(studies.__path__[0]) / "fe_models/README.md").read_text()
 
 
+@pytest.mark.slow
 def test_remarks_of_check_and_plan(tmp_path, monkeypatch, capsys):
     """Both say what was skipped; a run does so as well, in the test of a full model."""
     monkeypatch.chdir(tmp_path)

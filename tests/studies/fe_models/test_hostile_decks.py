@@ -159,10 +159,11 @@ def test_sets_that_grow(tmp_path, monkeypatch):
     refused(write(tmp_path, LEAST + "*SURFACE,NAME=S\n" + "E,S1\n" * 30), "more than 20 faces")
 
 
+@pytest.mark.slow
 def test_damaged_decks_of_constrained_models(tmp_path):
     """Up to the matrices: they are built, or the deck is refused in a sentence."""
     goods = (FULL_MODEL.read_text(), *(BLOCKS + text for text in CONSTRAINTS), SECTORS + HELD)
-    n_refused = 0
+    said: list[str] = []
     for seed in range(200):
         good = goods[seed % len(goods)]
         # what is not the mesh is damaged twice as often
@@ -175,10 +176,10 @@ def test_damaged_decks_of_constrained_models(tmp_path):
             loaded = load_model(ModelFiles(path), Parameters(units="mm-t-s", load=load, friction_coefficient=0.3))
             prepare_model(loaded.model, loaded.joint)
         except SceneError as error:
-            n_refused += 1
-            assert str(error).isprintable()
+            said.append(str(error))
         assert time.process_time() - began < 2
-    assert 50 < n_refused < 190
+    assert 50 < len(said) < 190
+    assert all(sentence.isprintable() for sentence in said)
 
 
 def test_damaged_decks(tmp_path):
