@@ -199,7 +199,7 @@ class Resolved:
             if few.size:
                 kind = self.kinds[np.searchsorted(self.all_elements, few[0])]
                 what = f"elements of {shown(name)} have no face S{face}, as element {few[0]} ({kind})"
-                raise reference.place.wrong(what, "give another")
+                raise reference.place.wrong(what, "give another, of a solid element")
             found.append(np.stack((members, np.full(members.size, face)), axis=1))
         both = np.unique(np.concatenate(found), axis=0)
         return Surface(both[:, 0].copy(), both[:, 1].copy(), empty)
