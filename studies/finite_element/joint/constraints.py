@@ -61,6 +61,14 @@ class Constraints:
         """Forces (3 n_nodes, ...) on q."""
         return np.asarray(self.transformation.T @ vectors)
 
+    def turned(self, left: int, right: int, rotation: FloatArray) -> bool:
+        """Whether a node is held as its image is under a rotation (3, 3)."""
+        return bool(np.abs(rotation @ self.held_along(left) @ rotation.T - self.held_along(right)).max() < _ROUND_OFF)
+
+    def held_along(self, node: int) -> FloatArray:
+        """Projection (3, 3) on the directions along which an oblique node is held."""
+        return np.asarray(self.across[3 * node : 3 * node + 3, 3 * node : 3 * node + 3].toarray())
+
 
 def check_followers(
     constraints: Constraints, numbers: IntArray, cut: CutFaces | None, pairs: ContactPairs, ties: ContactPairs | None
@@ -69,18 +77,13 @@ def check_followers(
     moving = [(pairs, "moves in a contact pair")] + ([] if ties is None else [(ties, "is tied")])
     for each, what in moving:
         _check_free(constraints, each.moving, numbers, what, "take it out of one of them, or refine the other surface")
-        wrong = each.moving[constraints.oblique[each.moving]]
-        if len(wrong):
-            found = f"node {numbers[wrong[0]]} is held in a direction of *TRANSFORM and {what}"
-            raise SceneError("model", found, "hold it along x, y and z, or not at all, or refine the other surface")
     if cut is None:
         return
     both = np.concatenate([cut.left, cut.right])
     _check_free(constraints, both, numbers, "is on a cut face", "let other nodes depend on this one")
     slanted = constraints.oblique[cut.left] | constraints.oblique[cut.right]
     for one, other in zip(cut.left[slanted], cut.right[slanted], strict=True):
-        own, image = (constraints.across[3 * n : 3 * n + 3, 3 * n : 3 * n + 3].toarray() for n in (one, other))
-        if np.abs(cut.rotation @ own @ cut.rotation.T - image).max() > _ROUND_OFF:
+        if not constraints.turned(one, other, cut.rotation):
             found = f"nodes {numbers[one]} and {numbers[other]} of the cut faces are held in other directions"
             raise SceneError("clamp", found, "give both *TRANSFORM, TYPE=C about the axis, and the same dofs")
 

@@ -16,6 +16,7 @@ from studies.finite_element.condensation.dissection import Dissection, dissect
 from studies.finite_element.condensation.ordered_form import OrderedForm, order_form
 from studies.finite_element.joint.constraints import Constraints
 from studies.finite_element.joint.cut_faces import CutFaces
+from studies.finite_element.joint.held_pairs import hold_pairs
 from studies.finite_element.joint.pairing import ContactPairs
 from studies.scene_error import SceneError
 
@@ -24,7 +25,6 @@ _LARGEST_KEPT_CUT = 900  # nodes of a cut face; the dense matrix of those that a
 # Nodal diameters from which on it pays to keep the cut faces. Bundled dovetail, kept over eliminated, CPU time: one
 # nodal diameter 1.4 (mesh 2) and 2.0 (mesh 3), two 1.4 (mesh 4), six 0.8 (mesh 2).
 _FEWEST_REUSES = 4
-_SLANTED = 0.1  # sine of the angle between the normal of a pair and a plane of symmetry that round-off or facets make
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def pairs_of_sector(pairs: ContactPairs, supports: Supports) -> ContactPairs:
 
     Raises SceneError where a moving node is held along its normal, or a pair on the right cut face has no image.
     """
-    pairs = _held_frames(pairs, supports)
+    pairs = hold_pairs(pairs, supports.numbers, supports.held, supports.constraints)
     if supports.cut is None:
         return pairs
     image = np.full(supports.n_nodes, -1)
@@ -151,31 +151,6 @@ def pairs_of_sector(pairs: ContactPairs, supports: Supports) -> ContactPairs:
     area[left] += area[right]
     kept = np.setdiff1d(np.arange(pairs.n_contact), right)
     return replace(pairs, area=area).chosen(kept)
-
-
-def _held_frames(pairs: ContactPairs, supports: Supports) -> ContactPairs:
-    """Pairs whose frames have a tangent along each direction that is held, as in a plane of symmetry."""
-    held = supports.held[pairs.moving]
-    frames, present = pairs.frames.copy(), pairs.present.copy()
-    wrong = np.zeros(pairs.n_contact, dtype=np.bool_)
-    for place in np.flatnonzero(held.any(axis=1)):
-        axes, normal = np.eye(3)[held[place]], frames[place, 0]
-        wrong[place] = np.linalg.norm(axes @ normal) > _SLANTED
-        if wrong[place]:
-            continue
-        normal = normal - (axes @ normal) @ axes
-        normal /= np.linalg.norm(normal)
-        second = axes[-1]
-        frames[place] = [normal, np.cross(second, normal), second]
-        present[place, 3 - len(axes) :] = False
-    if wrong.any():
-        name, node = pairs.moving_name[pairs.surface[wrong][0]], supports.numbers[pairs.moving[wrong][0]]
-        raise SceneError(
-            "contact",
-            f"{np.count_nonzero(wrong)} nodes of {name} are clamped, as node {node}",
-            "take them out of the surface or of the clamped set",
-        )
-    return replace(pairs, frames=frames, present=present)
 
 
 def ties_of_structure(ties: ContactPairs, supports: Supports, pairs: ContactPairs) -> ContactPairs:
@@ -269,6 +244,9 @@ class OrderedStructure:
         followers = np.concatenate(moving)
         # What they follow, in all three directions, from the displacements of the nodes that are kept.
         opposite = (sparse.vstack(follow, format="csr") @ all_nodes).tocsr()
+        if supports.constraints is not None:
+            rows = (3 * followers[:, None] + np.arange(3)).ravel()
+            opposite = (opposite - supports.constraints.across[rows][:, rows] @ opposite).tocsr()
         dofs = (3 * (self.place[followers] - first)[:, None] + np.arange(3)).ravel()
         loose = (~supports.held[followers]).ravel().astype(float)
         scatter = sparse.csr_matrix((loose, (dofs, np.arange(len(dofs)))), shape=(3 * n_kept, len(dofs)))

@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 
+from studies.finite_element.reduced_joint import glued_frequencies
 from studies.scene_error import SceneError
 from tests.studies.fe_models.constrained_decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
 
@@ -135,6 +136,26 @@ def test_cylindrical_directions_on_cut_faces_as_calculix(dofs, tmp_path):
     step = "*STEP\n*FREQUENCY\n8\n*SELECT CYCLIC SYMMETRY MODES, NMIN=3, NMAX=3\n*END STEP\n"
     own = frequencies(tmp_path, text("BORE"), 3)
     np.testing.assert_allclose(own, of_calculix(tmp_path, text("INSIDE"), step, every=2), rtol=1e-6)
+
+
+def test_moving_nodes_that_are_held_obliquely(tmp_path):
+    """As in a plane of symmetry: nodes of both surfaces are held across it; whichever moves, the model is the same."""
+    turned = "*TRANSFORM, NSET=XO, TYPE=R\n1., 1., 0., -1., 1., 0.\n*BOUNDARY\nXO, 1\n"
+    held = f"*NSET, NSET=XO\n105, 110, 115, 20, 25, 30\n{turned}"
+    text = BLOCKS.replace("1, 6, 11, 16, 21, 26", "1, 6, 11, 2, 7, 12") + held
+    prepared, _ = prepared_deck(tmp_path, text)
+    assert prepared.pairs.present.sum(axis=0).tolist() == [15, 15, 12]
+    other, _ = prepared_deck(tmp_path, text.replace("\nSUP, SLOW\n", "\nSLOW, SUP\n"))
+    assert other.pairs.moving_name == ("SLOW",)
+    own, expected = (glued_frequencies(each, 0, 4) for each in (prepared, other))
+    np.testing.assert_allclose(own, expected, rtol=1e-9)
+    if shutil.which("ccx") is not None:
+        # of nodes that are tied CalculiX holds those of the other surface
+        alone = text.replace("115, 20, 25, 30", "115").replace("\nSUP, SLOW\n", "\nSLOW, SUP\n")
+        np.testing.assert_allclose(own, of_calculix(tmp_path, alone), rtol=1e-6)
+    for nodes in ("105, 110, 115", "115"):
+        with pytest.raises(SceneError, match="node 1.5 of SUP is held in a direction in which the other"):
+            prepared_deck(tmp_path, text.replace("105, 110, 115, 20, 25, 30", nodes))
 
 
 @pytest.mark.parametrize(
