@@ -148,7 +148,8 @@ def _motion(
 
 def read_coupling(draft: Draft, block: Block) -> None:
     """*COUPLING: a reference node and a surface; *KINEMATIC below it says what is coupled."""
-    block.name("REFNODE"), block.name("SURFACE")
+    for parameter in ("REFNODE", "SURFACE"):
+        block.name(parameter)
     draft.coupling = block
 
 

@@ -13,7 +13,7 @@ from studies.fe_models.deck import contact_keywords as contact
 from studies.fe_models.deck import generate, mesh_keywords
 from studies.fe_models.deck import material_keywords as materials
 from studies.fe_models.deck import step_keywords as steps
-from studies.fe_models.deck.draft import Draft
+from studies.fe_models.deck.draft import Draft, refused
 from studies.fe_models.text.keyword_lines import Block
 from studies.fe_models.text.read_errors import shown
 
@@ -145,6 +145,8 @@ KEYWORDS: Mapping[str, Keyword] = {
 
 def read_keyword(draft: Draft, block: Block) -> None:
     """Acts on a keyword, or skips it. Raises SceneError where it, or a parameter of it, may change the model."""
+    if draft.coupling is not None and block.keyword not in ("KINEMATIC", "DISTRIBUTING"):
+        raise refused(draft.coupling, "no *KINEMATIC below it", "write it there, or remove the coupling")
     known = KEYWORDS.get(block.keyword)
     if known is None:
         if block.keyword in HARMLESS:

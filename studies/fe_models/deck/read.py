@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from studies.fe_models.deck.draft import Draft
+from studies.fe_models.deck.draft import Draft, refused
 from studies.fe_models.deck.generate import read_placement
 from studies.fe_models.deck.keywords import read_keyword
 from studies.fe_models.deck.mesh import Deck
@@ -45,6 +45,8 @@ def read_deck(path: Path) -> Deck:
         reading.take(block)
     draft = reading.draft
     draft.end_step()
+    if draft.coupling is not None:
+        raise refused(draft.coupling, "no *KINEMATIC below it", "write it there, or remove the coupling")
     if draft.part or draft.scope:
         raise block.place.wrong(f"the end of {draft.part or draft.scope} is missing", "write *END PART, *END INSTANCE")
     return resolve(draft)

@@ -48,6 +48,9 @@ ALL_OF_THEM = "*ELGEN, ELSET=E\n1, 2, 1, 1, 2, 3, 2, 2, 9, 4\n"
 COPIED = "*ELGEN, ELSET=E\n1, 2, 1, 1, 2, 3, 2\n*ELCOPY, ELEMENT SHIFT=4, OLD SET=E, SHIFT NODES=9, NEW SET=E\n"
 
 
+COUPLING = "*COUPLING, REF NODE=5, SURFACE=SE, CONSTRAINT NAME=C\n"
+
+
 @pytest.mark.parametrize("made", [ALL_OF_THEM, COPIED], ids=["ELGEN", "ELCOPY"])
 def test_nodes_and_elements_of_others(made, tmp_path):
     whole, deck = (read_deck(write(tmp_path, text)) for text in (GRID + CELLS, MADE_NODES + made))
@@ -209,6 +212,8 @@ def test_elements_that_are_not_read(tmp_path):
     ("text", "sentence"),
     [
         ("*CONTACT\n", r"\*CONTACT is not read, and may change the model; give \*CONTACT PAIR for"),
+        (f"{COUPLING}*NSET, NSET=A\n1\n", r"\*COUPLING: no \*KINEMATIC below it; write it there"),
+        (COUPLING, r"\*COUPLING: no \*KINEMATIC below it; write it there"),
         (
             "*NONSENSE\n",
             r"\*NONSENSE is not read, and may change the model; remove it if the model is right without it",
