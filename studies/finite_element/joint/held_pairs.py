@@ -35,13 +35,14 @@ def hold_pairs(
     slanted = np.zeros(len(held), dtype=np.bool_) if constraints is None else constraints.oblique
     for place in np.flatnonzero((held.any(axis=1) | slanted)[pairs.moving]):
         node, name = int(pairs.moving[place]), pairs.moving_name[pairs.surface[place]]
+        by = " (*TRANSFORM)" if slanted[node] else ""
         values, vectors = np.linalg.eigh(along(node))
         axes = vectors.T[values > 0.5] if slanted[node] else np.eye(3)[held[node]]
         normal = frames[place, 0]
         if np.linalg.norm(axes @ normal) > _SLANTED:
             raise SceneError(
                 "contact",
-                f"{_count_clamped(pairs, held, int(place))} nodes of {name} are clamped, as node {numbers[node]}",
+                f"{_count_clamped(pairs, held, int(place))} nodes of {name} are clamped, as node {numbers[node]}{by}",
                 "take them out of the surface or of the clamped set",
             )
         normal = normal - (axes @ normal) @ axes
@@ -54,7 +55,7 @@ def hold_pairs(
             np.abs(along(int(other)) - along(node)).max() > _SLANTED for other in pairs.opposite.indices[start:end]
         ]
         if np.abs(pairs.opposite.data[start:end][loose]).sum() > _SLANTED:
-            found = f"node {numbers[node]} of {name} is held in a direction in which the other surface moves"
+            found = f"node {numbers[node]} of {name} is held in a direction in which the other surface moves{by}"
             raise SceneError("contact", found, "hold both surfaces there, or none")
     return replace(pairs, frames=frames, present=present)
 
