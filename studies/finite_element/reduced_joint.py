@@ -26,7 +26,7 @@ from studies.finite_element.elements.assembly import (
     spin_softening,
 )
 from studies.finite_element.elements.solid_mesh import Rotation
-from studies.finite_element.joint.constraints import check_followers
+from studies.finite_element.joint.constraints import check_followers, free_ones_first
 from studies.finite_element.joint.layers import find_couplings, find_layers
 from studies.finite_element.joint.ordering import (
     Supports,
@@ -181,7 +181,8 @@ def prepare_model(
     progress("pairing of the contact surfaces")
     pairs = joint.pairs
     if pairs is None:
-        pairs = build_contact_pairs(model.coordinates, model.numbers, joint.contacts, _along(model, joint))
+        contacts = joint.contacts if joint.constraints is None else free_ones_first(joint.constraints, joint.contacts)
+        pairs = build_contact_pairs(model.coordinates, model.numbers, contacts, _along(model, joint))
     supports = Supports(model.numbers, joint.held, joint.cut, n_reductions, joint.constraints)
     glued = None
     if joint.ties:

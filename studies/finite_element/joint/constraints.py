@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.joint.cut_faces import CutFaces
-from studies.finite_element.joint.pairing import ContactPairs
+from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces
 from studies.scene_error import SceneError
 
 _LONGEST_CHAIN = 100  # displacements that depend on others that depend on others
@@ -68,6 +68,17 @@ class Constraints:
     def held_along(self, node: int) -> FloatArray:
         """Projection (3, 3) on the directions along which an oblique node is held."""
         return np.asarray(self.across[3 * node : 3 * node + 3, 3 * node : 3 * node + 3].toarray())
+
+
+def free_ones_first(constraints: Constraints, contacts: Sequence[ContactSurfaces]) -> tuple[ContactSurfaces, ...]:
+    """Contacts whose first surface, which moves where both are alike, does not follow others if the second does not."""
+    follow = np.asarray(constraints.dependent.any(axis=1))
+    return tuple(
+        replace(each, first=each.second, second=each.first, label=each.name)
+        if follow[each.first.nodes].any() and not follow[each.second.nodes].any()
+        else each
+        for each in contacts
+    )
 
 
 def check_followers(

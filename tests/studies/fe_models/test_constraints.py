@@ -40,6 +40,18 @@ def test_as_calculix(name, tmp_path):
 
 
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+def test_rigid_body_whose_surface_would_move(tmp_path):
+    """Of meshes that are alike the nodes of the other surface move."""
+    text = BLOCKS.replace("1, 6, 11, 16, 21, 26", "1, 6, 11, 2, 7, 12")
+    text += f"{REFERENCE}*RIGID BODY, ELSET=EUP, REF NODE=900\n"
+    expected = of_calculix(tmp_path, text.replace("\nSUP, SLOW\n", "\nSLOW, SUP\n"))
+    prepared, loaded = prepared_deck(tmp_path, text)
+    assert prepared.pairs.moving_name == ("SLOW",)
+    assert loaded.joint.contacts[0].name == "SUP-SLOW"
+    np.testing.assert_allclose(glued_frequencies(prepared, 0, 4), expected, rtol=1e-6)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 def test_prestress_of_a_constrained_structure_as_calculix(tmp_path):
     text = BLOCKS + BOTH_READ["rigid line"] + STATIC
     expected = of_calculix(tmp_path, text, "*STEP, PERTURBATION\n*FREQUENCY\n4\n*END STEP\n")
@@ -170,7 +182,10 @@ def test_moving_nodes_that_are_held_obliquely(tmp_path):
             "*EQUATION\n2\n5,1,1.,15,1,-1.\n2\n15,1,1.,5,1,1.\n",
             r"\*EQUATION: displacements depend on each other in a circle",
         ),
-        ("*EQUATION\n2\n105,1,1.,15,1,-1.\n", r"\*EQUATION: node 105 depends on others and moves in a contact pair"),
+        (
+            "*EQUATION\n2\n105,1,1.,15,1,-1.\n2\n20,1,1.,15,1,-1.\n",
+            r"\*EQUATION: node 105 depends on others and moves in a contact pair",
+        ),
         ("*EQUATION\n2\n5,4,1.,15,1,-1.\n", r"\*EQUATION: node 5 has no dof 4"),
         ("*TRANSFORM, NSET=XM, TYPE=C\n40,0,0,40,0,1\n*BOUNDARY\nXM,1\n", r"\*TRANSFORM: node 5 is on the axis"),
         ("*BOUNDARY\nXM, 1, 1, 0.1\n", r"\*BOUNDARY moves XM by 0.1"),
