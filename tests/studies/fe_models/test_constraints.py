@@ -7,7 +7,16 @@ import pytest
 
 from studies.finite_element.reduced_joint import glued_frequencies
 from studies.scene_error import SceneError
-from tests.studies.fe_models.constrained_decks import BLOCKS, SECTORS, frequencies, of_calculix, prepared_deck, run_tied
+from tests.studies.fe_models.constrained_decks import (
+    BLOCKS,
+    FULL_MODEL,
+    SECTORS,
+    flat_full_model,
+    frequencies,
+    of_calculix,
+    prepared_deck,
+    run_tied,
+)
 
 REFERENCE = "*NODE\n900, 45., 5., 0.\n"
 STATIC = "*STEP\n*STATIC\n*DLOAD\nEALL1, CENTRIF, 1e7, -100., 0., 0., 0., 0., 1.\n*END STEP\n"
@@ -148,6 +157,15 @@ def test_cylindrical_directions_on_cut_faces_as_calculix(dofs, tmp_path):
     step = "*STEP\n*FREQUENCY\n8\n*SELECT CYCLIC SYMMETRY MODES, NMIN=3, NMAX=3\n*END STEP\n"
     own = frequencies(tmp_path, text("BORE"), 3)
     np.testing.assert_allclose(own, of_calculix(tmp_path, text("INSIDE"), step, every=2), rtol=1e-6)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+def test_full_model_as_calculix(tmp_path):
+    """Two instances, a coupling, equations, cylindrical directions and cyclic symmetry, with prestress."""
+    static = "*STEP, NLGEOM\n*STATIC\n*DLOAD\nEALL1, CENTRIF, 1.E6, 0., 0., 0., 0., 0., 1.\n*END STEP\n"
+    select = "*STEP, PERTURBATION\n*FREQUENCY\n12\n*SELECT CYCLIC SYMMETRY MODES, NMIN=2, NMAX=2\n*END STEP\n"
+    expected = of_calculix(tmp_path, flat_full_model(), static + select, every=2)
+    np.testing.assert_allclose(frequencies(tmp_path, FULL_MODEL.read_text(), 2), expected, rtol=2e-5)
 
 
 def test_moving_nodes_that_are_held_obliquely(tmp_path):
