@@ -178,6 +178,7 @@ def _show_plan(study: Study) -> int:
     from studyrunner.plan.plan_text import format_plan
     from studyrunner.plan.planning import build_tasks
     from studyrunner.scene.drawn_contacts import contact_changes
+    from studyrunner.scene.model_remarks import remarks_of_study
     from studyrunner.scene.planned_scenes import plan_scenes
     from studyrunner.summary.plausibility import doubts_of_study
 
@@ -188,7 +189,8 @@ def _show_plan(study: Study) -> int:
     plan = build_tasks(study, planned.n_displacements, contacts, planned.scenes)
     seconds = time.process_time() + planned.seconds_left
     lines = [format_plan(study, planned.largest, plan, built_with, seconds, planned.describe())]
-    print(*lines, *(f"note       {doubt}" for doubt in doubts_of_study(study)), sep="\n", flush=True)
+    said = *remarks_of_study(study), *(("note", doubt) for doubt in doubts_of_study(study))
+    print(*lines, *(f"{label:<10} {show_text(text)}" for label, text in said), sep="\n", flush=True)
     error = last_error(sys.stdout)
     if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
         raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")

@@ -25,6 +25,7 @@ from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.tasks import TaskPlan
 from studyrunner.scene.drawn_contacts import contact_changes
+from studyrunner.scene.model_remarks import remarks_of_study
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import PairArrays, merge_facts, pair_arrays
 from studyrunner.scene_building import Scenes
@@ -229,7 +230,13 @@ def _prepare(
     software = describe_software(PACKAGES[0])
     kind = record_type(study, facts)
     said = doubts_of_study(study)
-    for note in (*store.notes, *_older(target.path), *scenes.notes, *said):
+    for note in (
+        *store.notes,
+        *_older(target.path),
+        *scenes.notes,
+        *said,
+        *(f"{label}: {text}" for label, text in remarks_of_study(study)),
+    ):
         progress.note(note)
     remove_leftovers(target.path)
     identities = Identities([each.digest for each in scenes.facts], hash_of_kind(kind.descr))

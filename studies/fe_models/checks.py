@@ -177,14 +177,13 @@ def check_mesh_is_of_matrices(deck: Deck, matrices: Matrices) -> None:
 
 
 def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
-    """The rotation, SI, that the last step with centrifugal loads has, None where no step has any.
+    """The rotation, SI, of the centrifugal loads, None where there is none.
 
     Raises SceneError where parts of the model turn differently, or not at all.
     """
-    with_loads = [step for step in deck.steps if step.centrifugal]
-    if not with_loads:
+    loads = deck.centrifugal
+    if not loads:
         return None
-    loads = with_loads[-1].centrifugal
     for one, other in pairwise(loads):
         if not math.isclose(one.omega_squared, other.omega_squared, rel_tol=_SPEED_AGREES):
             speeds = [f"{load.name} at {math.sqrt(load.omega_squared):g} rad/s" for load in (one, other)]

@@ -28,9 +28,22 @@ class NodalMatrices:
     mass: sparse.csr_matrix
     missing: BoolArray
 
-    def model(self, rotation: Rotation | None = None, preload: FloatArray | None = None) -> MatrixModel:
-        """The model of them. preload (3 n_nodes,): constant forces beside the centrifugal ones, N."""
-        return MatrixModel(self.coordinates, self.numbers, self.stiffness, self.mass, rotation, preload)
+    def model(
+        self,
+        rotation: Rotation | None = None,
+        preload: FloatArray | None = None,
+        gravity: FloatArray | None = None,
+        extra: IntArray | None = None,
+    ) -> MatrixModel:
+        """The model of them. extra (m,): numbers of further nodes, without matrices; for the rest see MatrixModel."""
+        if extra is None or not len(extra):
+            return MatrixModel(self.coordinates, self.numbers, self.stiffness, self.mass, rotation, preload, gravity)
+        n = len(self.numbers) + len(extra)
+        forms = self.stiffness.copy(), self.mass.copy()
+        for form in forms:
+            form.resize((3 * n, 3 * n))
+        coordinates = np.vstack([self.coordinates, np.full((len(extra), 3), np.nan)])
+        return MatrixModel(coordinates, np.concatenate([self.numbers, extra]), *forms, rotation, preload, gravity)
 
 
 def order_by_nodes(

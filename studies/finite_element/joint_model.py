@@ -10,6 +10,7 @@ from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.joint.constraints import Constraints
 from studies.finite_element.joint.cut_faces import CutFaces
 from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces
 
@@ -24,25 +25,37 @@ class MeshModel:
         centrifugal load, and spin softening.
     preload (3 n_nodes,): constant forces beside the centrifugal ones, N. They are no part of the prestress: forces that
         press on gaps and flanks act otherwise on a glued structure.
+    gravity (3,): acceleration of all mass, m/s2, in the same way; None of none.
     layers (n_nodes, n_directions): place of each node in a structured grid, for the order of elimination; None to use
         the coordinates.
+    extra (m,): numbers of nodes without elements, behind those of the mesh: others follow them.
     """
 
     mesh: SolidMesh
     rotation: Rotation | None = None
     prestress: bool = True
     preload: FloatArray | None = None
+    gravity: FloatArray | None = None
     layers: IntArray | None = None
+    extra: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property
     def coordinates(self) -> FloatArray:
-        """Nodes (n_nodes, 3), m."""
-        return self.mesh.coordinates
+        """Nodes (n_nodes, 3), m; NaN for those without elements."""
+        if not len(self.extra):
+            return self.mesh.coordinates
+        return np.vstack([self.mesh.coordinates, np.full((len(self.extra), 3), np.nan)])
 
     @property
     def numbers(self) -> IntArray:
         """Numbers (n_nodes,) of the nodes in the file."""
-        return self.mesh.numbers
+        return np.concatenate([self.mesh.numbers, self.extra])
+
+    def padded(self, form: sparse.csr_matrix) -> sparse.csr_matrix:
+        """A form of the mesh with empty rows for nodes without elements."""
+        if len(self.extra):
+            form.resize((3 * len(self.numbers), 3 * len(self.numbers)))
+        return form
 
 
 @dataclass(frozen=True)
@@ -55,6 +68,7 @@ class MatrixModel:
         Prestress and spin softening of the other program stay in them.
     rotation: for the centrifugal load, which follows from the mass; None for a model at rest.
     preload (3 n_nodes,): constant forces beside the centrifugal ones, N.
+    gravity (3,): acceleration of all mass, m/s2; None of none.
     """
 
     coordinates: FloatArray
@@ -63,6 +77,7 @@ class MatrixModel:
     mass: sparse.csr_matrix
     rotation: Rotation | None = None
     preload: FloatArray | None = None
+    gravity: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -101,13 +116,14 @@ class JointDefinition:
     """What is done with a model.
 
     contacts: pairs of surfaces, at least one.
-    held (n_nodes, 3): displacements that are 0.
+    held (n_nodes, 3): displacements that are 0, or follow others by the constraints.
     load: harmonic load of 1 N.
     responses: by name.
     cut: cut faces; None where the structure is no cyclic sector.
     along (3,): direction near the first tangents. None for the axis of rotation or of the cyclic structure, else z.
     retainer: None for none.
     ties: surfaces that are always glued.
+    constraints: displacements that follow others; None where there are none.
     pairs: pairs of the contacts in another order or with other frames than `build_contact_pairs` gives them.
     """
 
@@ -119,6 +135,7 @@ class JointDefinition:
     along: FloatArray | None = None
     retainer: Retainer | None = None
     ties: tuple[ContactSurfaces, ...] = ()
+    constraints: Constraints | None = None
     pairs: ContactPairs | None = None
 
 

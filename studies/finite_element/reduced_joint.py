@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
@@ -26,7 +26,8 @@ from studies.finite_element.elements.assembly import (
     spin_softening,
 )
 from studies.finite_element.elements.solid_mesh import Rotation
-from studies.finite_element.joint.cut_faces import CutFaces
+from studies.finite_element.joint.constraints import check_followers, free_ones_first
+from studies.finite_element.joint.layers import find_couplings, find_layers
 from studies.finite_element.joint.ordering import (
     Supports,
     consistent_supports,
@@ -74,17 +75,24 @@ class PreparedModel:
     static_load (3 n_nodes,): N.
     at_rest: the reduction without prestress; None where that is the same.
     rotation: None for a model at rest.
+    weight (n_nodes,): kg of each node.
     """
 
     reduction: Reduction
     static_load: FloatArray
     at_rest: Reduction | None
     rotation: Rotation | None
+    weight: FloatArray
 
     @property
     def pairs(self) -> ContactPairs:
         """Contact pairs."""
         return self.reduction.ordered.pairs
+
+    def forces(self, vectors: FloatArray) -> FloatArray:
+        """Nodal forces (3 n_nodes,) on displacements that depend on no other."""
+        constraints = self.reduction.ordered.supports.constraints
+        return vectors if constraints is None else constraints.forces(vectors)
 
 
 def silent(_: str) -> None:
@@ -113,7 +121,8 @@ def build_fe_scene(
     wanted = needed_nodal_diameters(excited, n_sectors, n_harmonics)
     prepared = prepare_model(model, joint, progress, n_reductions=len({excited, *wanted}))
     pairs, n_nodes = prepared.pairs, len(model.numbers)
-    vectors = [prepared.static_load, joint.load.row(n_nodes), *(each.row(n_nodes) for each in joint.responses.values())]
+    motions = [prepared.forces(each.row(n_nodes)) for each in (joint.load, *joint.responses.values())]
+    vectors = [prepared.static_load, *motions]
     linear: dict[int, LinearModel] = {}
     frequencies: dict[int, FloatArray] = {}
     damping = 0.0
@@ -172,40 +181,66 @@ def prepare_model(
     progress("pairing of the contact surfaces")
     pairs = joint.pairs
     if pairs is None:
-        pairs = build_contact_pairs(model.coordinates, model.numbers, joint.contacts, _along(model, joint))
-    supports = consistent_supports(Supports(model.numbers, joint.held, joint.cut, n_reductions))
-    pairs = pairs_of_sector(pairs, supports)
-    ties = None
+        contacts = joint.contacts if joint.constraints is None else free_ones_first(joint.constraints, joint.contacts)
+        pairs = build_contact_pairs(model.coordinates, model.numbers, contacts, _along(model, joint))
+    supports = Supports(model.numbers, joint.held, joint.cut, n_reductions, joint.constraints)
+    glued = None
     if joint.ties:
         glued = build_contact_pairs(model.coordinates, model.numbers, joint.ties, _along(model, joint))
-        ties = ties_of_structure(glued, supports, pairs)
+    if joint.constraints is not None:
+        check_followers(joint.constraints, model.numbers, joint.cut, pairs, glued)
+    supports = consistent_supports(supports)
+    pairs = pairs_of_sector(pairs, supports)
+    ties = None if glued is None else ties_of_structure(glued, supports, pairs)
     if isinstance(model, MatrixModel):
-        coupled = _couplings(model.stiffness) + _couplings(model.mass)
-        ordered = order_structure(supports, pairs, ties, coupled, _layers(model.coordinates, coupled, joint.cut))
-        forms = {"stiffness": model.stiffness, "mass": model.mass}
-        places = np.nan_to_num(model.coordinates, nan=np.nan)
-        return PreparedModel(Reduction(ordered, forms), _static_load(model.mass, places, model), None, model.rotation)
+        return _prepare(model, {"stiffness": model.stiffness, "mass": model.mass}, joint, supports, pairs, ties)
     progress("assembly of stiffness and mass")
     check_elements(model.mesh)
-    elastic, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
-    coupled = _couplings(elastic)
-    layers = _layers(model.coordinates, coupled, joint.cut) if model.layers is None else model.layers.astype(float)
-    ordered = order_structure(supports, pairs, ties, coupled, layers)
-    load = _static_load(mass, model.coordinates, model)
-    still = Reduction(ordered, {"stiffness": elastic, "mass": mass})
+    elastic, mass = (model.padded(form) for form in (assemble_stiffness(model.mesh), assemble_mass(model.mesh)))
+    still = _prepare(model, {"stiffness": elastic, "mass": mass}, joint, supports, pairs, ties)
     if not model.prestress or model.rotation is None:
-        return PreparedModel(still, load, None, model.rotation)
+        return still
     progress("static state of the glued structure under the centrifugal load")
+    ordered, constraints = still.reduction.ordered, joint.constraints
     try:
         # by a reduction of its own: the factors of a large model are not to be kept beside those that follow
-        centrifugal = _centrifugal_load(mass, model.coordinates, model.rotation)
-        displacements = Reduction(ordered, still.forms).solve_static(centrifugal)
+        centrifugal = still.forces(_centrifugal_load(mass, model.coordinates, model.rotation))
+        displacements = Reduction(ordered, still.reduction.forms).solve_static(centrifugal)
     except GluedStructureError as error:
         raise _refused(error, 0, model.rotation) from error
+    if constraints is not None:
+        displacements = np.asarray(constraints.transformation @ displacements)
     progress("assembly of the prestressed stiffness")
-    stiffness = assemble_tangent_stiffness(model.mesh, displacements) + spin_softening(mass, model.rotation)
-    forms = {"stiffness": stiffness.tocsr(), "mass": mass, "elastic": elastic}
-    return PreparedModel(Reduction(ordered, forms), load, still, model.rotation)
+    stressed = assemble_tangent_stiffness(model.mesh, displacements[: 3 * model.mesh.n_nodes])
+    stiffness = (model.padded(stressed) + spin_softening(mass, model.rotation)).tocsr()
+    forms = {"stiffness": stiffness if constraints is None else constraints.apply(stiffness, stiffness=True)}
+    forms |= {"mass": still.reduction.forms["mass"], "elastic": still.reduction.forms["stiffness"]}
+    return replace(still, reduction=Reduction(ordered, forms), at_rest=still.reduction)
+
+
+def _prepare(
+    model: MeshModel | MatrixModel,
+    forms: dict[str, sparse.csr_matrix],
+    joint: JointDefinition,
+    supports: Supports,
+    pairs: ContactPairs,
+    ties: ContactPairs | None,
+) -> PreparedModel:
+    """A model with the forms as they are, without what depends on others."""
+    mass, constraints = forms["mass"], joint.constraints
+    load = _static_load(mass, model.coordinates, model)
+    along_x = np.where(np.isnan(model.coordinates), 0.0, np.array([1.0, 0.0, 0.0]))
+    weight = (mass @ along_x.ravel()).reshape(-1, 3)[:, 0] * along_x[:, 0]
+    if constraints is not None:
+        forms = {name: constraints.apply(form, stiffness=name == "stiffness") for name, form in forms.items()}
+        load = constraints.forces(load)
+    coupled = find_couplings(forms["stiffness"])
+    if isinstance(model, MatrixModel):
+        coupled = coupled + find_couplings(forms["mass"])
+    layers = None if isinstance(model, MatrixModel) else model.layers
+    places = find_layers(model.coordinates, coupled, joint.cut) if layers is None else layers.astype(float)
+    ordered = order_structure(supports, pairs, ties, coupled, places)
+    return PreparedModel(Reduction(ordered, forms), load, None, model.rotation, weight)
 
 
 def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int) -> FloatArray:
@@ -250,39 +285,10 @@ def natural_frequencies(
     return known
 
 
-def _layers(coordinates: FloatArray, coupled: sparse.csr_matrix, cut: CutFaces | None) -> FloatArray:
-    """Coordinates (n_nodes, n_directions) in which layers of a mesh are looked for, over its extent.
-
-    They are rounded, so that layers of a regular mesh are layers.
-    """
-    positions = _positions(coordinates, coupled)
-    extent = np.ptp(positions, axis=0).max()
-    directions = [positions]
-    if cut is not None:
-        directions.append(cut.axis.cylinder(positions) * [1.0, extent, 1.0])
-    return np.asarray(np.round(np.hstack(directions) / extent, 7))
-
-
-def _couplings(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
-    """Which nodes (n_nodes, n_nodes) a matrix couples."""
-    blocks = matrix.tobsr(blocksize=(3, 3))
-    ones = np.ones(len(blocks.indices), dtype=np.float32)
-    n = matrix.shape[0] // 3
-    return sparse.csr_matrix((ones, blocks.indices, blocks.indptr), shape=(n, n))
-
-
-def _positions(coordinates: FloatArray, coupled: sparse.csr_matrix) -> FloatArray:
-    """Coordinates, those of nodes without a place from their neighbours."""
-    nowhere = np.asarray(np.isnan(coordinates).any(axis=1))
-    if not nowhere.any():
-        return coordinates
-    known = np.where(nowhere[:, None], 0.0, coordinates)
-    count = np.maximum(coupled @ (~nowhere).astype(float), 1.0)
-    return np.where(nowhere[:, None], (coupled @ known) / count[:, None], coordinates)
-
-
 def _static_load(mass: sparse.csr_matrix, coordinates: FloatArray, model: MeshModel | MatrixModel) -> FloatArray:
     load = np.zeros(mass.shape[0]) if model.preload is None else model.preload
+    if model.gravity is not None:
+        load = load + mass @ ((~np.isnan(coordinates)) * model.gravity).ravel()
     return load if model.rotation is None else load + _centrifugal_load(mass, coordinates, model.rotation)
 
 
@@ -339,10 +345,7 @@ def _retained(stiffness: Matrix, pairs: ContactPairs, retainer: Retainer | None)
 def _summary(
     model: MeshModel | MatrixModel, prepared: PreparedModel, frequencies: dict[int, FloatArray]
 ) -> ModelSummary:
-    mass = prepared.reduction.forms["mass"]
-    shift = np.where(np.isnan(model.coordinates), 0.0, 1.0)
-    total = mass @ (shift * [1.0, 0.0, 0.0]).ravel()
-    weight = total.reshape(-1, 3)[:, 0] * shift[:, 0]
+    weight = prepared.weight
     return ModelSummary(
         mass=float(weight.sum()),
         centre=weight @ np.nan_to_num(model.coordinates) / weight.sum(),

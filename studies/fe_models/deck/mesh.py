@@ -21,15 +21,21 @@ NODES_OF_KIND: Mapping[str, int] = {
     "C3D8": 8,
     "C3D8I": 8,
     "C3D8R": 8,
+    "C3D8H": 8,
     "C3D10": 10,
+    "C3D10M": 10,
     "C3D15": 15,
     "C3D20": 20,
     "C3D20R": 20,
 }
 """Kinds of elements that a mesh may hold, by their names in CalculiX and Abaqus, and their numbers of nodes.
 
-Nodes stand in the order of these codes. C3D8R is read for its geometry: its matrices come from the code itself.
+Nodes stand in the order of these codes. C3D8R, C3D8H and C3D10M are read for their geometry: their matrices come from
+the code itself.
 """
+
+
+_MOST_NAMED = 20  # keywords in one line
 
 
 @dataclass(frozen=True)
@@ -88,12 +94,20 @@ class ContactPair:
     dependent, independent: names of surfaces, slave first, as in the deck.
     interaction: name of the interaction.
     friction_coefficient: of the interaction; None where the deck gives none.
+    problem: a law that is not read, as "deck.inp, line 7: *FRICTION with TAUMAX"; "" where there is none.
+    glued: where the deck says that the surfaces do not part, as "deck.inp, line 7: ..."; "" where they may.
+    fitted: where the deck gives a clearance or an interference, as "deck.inp, line 7: ..."; "" where it gives none.
+    clearance: distance of the surfaces, negative for an interference; None for the distances in the mesh.
     """
 
     dependent: str
     independent: str
     interaction: str
     friction_coefficient: float | None
+    problem: str = ""
+    glued: str = ""
+    fitted: str = ""
+    clearance: float | None = None
 
 
 @dataclass(frozen=True)
@@ -101,12 +115,12 @@ class CyclicSymmetry:
     """A sector of a cyclic structure.
 
     n_sectors: number of sectors.
-    tie: name of the tie of the cut faces, "" where the deck gives none.
+    ties: names of the ties of the cut faces; none where the deck gives none.
     axis (2, 3): two points on the axis.
     """
 
     n_sectors: int
-    tie: str
+    ties: tuple[str, ...]
     axis: FloatArray
 
 
@@ -116,8 +130,10 @@ class Boundary:
 
     name: the set, or the node number as text.
     nodes (p,): node numbers.
-    first_dof, last_dof: 1 to 3 are displacements along x, y and z; larger numbers are possible.
+    first_dof, last_dof: 1 to 3 are displacements along x, y and z, or along the directions of a `Transform`; 4 to 6
+        rotations of reference points; larger numbers are possible.
     value: displacement; 0 for held ones.
+    place: in the file, for messages.
     """
 
     name: str
@@ -125,18 +141,85 @@ class Boundary:
     first_dof: int
     last_dof: int
     value: float
+    place: str = ""
+
+
+@dataclass(frozen=True)
+class Transform:
+    """Directions of the displacements 1 to 3 of nodes.
+
+    place: in the file, for messages. nodes (p,): node numbers.
+    points (2, 3): cylindrical: on the axis; directions are radial, tangential and axial. Else one vector along the
+        first direction, and another in the plane of the first two.
+    """
+
+    place: str
+    nodes: IntArray
+    cylindrical: bool
+    points: FloatArray
+
+
+@dataclass(frozen=True)
+class Equation:
+    """`sum(coefficients * u) = 0`; the first term depends on the others.
+
+    place: in the file, for messages. nodes, dofs, coefficients (t,): dofs as in `Boundary`.
+    """
+
+    place: str
+    nodes: IntArray
+    dofs: IntArray
+    coefficients: FloatArray
+
+
+@dataclass(frozen=True)
+class RigidMotion:
+    """Nodes that follow a reference node: `u = u_reference + theta x (x - x_reference)`.
+
+    place: in the file, for messages. nodes (p,): node numbers. dofs: 1 to 3, those that follow.
+    rotation: the node whose displacements are theta; 0 where the reference node has dofs 4 to 6 of its own.
+    turns: whether there is theta.
+    """
+
+    place: str
+    nodes: IntArray
+    dofs: tuple[int, ...]
+    reference: int
+    rotation: int = 0
+    turns: bool = True
+
+
+@dataclass(frozen=True)
+class NodalForce:
+    """A constant force on each of some nodes (p,) along a dof as in `Boundary`. place: in the file, for messages."""
+
+    place: str
+    nodes: IntArray
+    dof: int
+    value: float
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """A constant pressure on faces (f,) of elements (f,), positive into the body. place: in the file, for messages."""
+
+    place: str
+    elements: IntArray
+    faces: IntArray
+    value: float
 
 
 @dataclass(frozen=True)
 class Material:
     """An isotropic linear elastic material, in units of the file. None where the deck gives no such value.
 
-    Of values at several temperatures the first ones are taken.
+    problem: what of the material is not read, as "deck.inp, line 7: *ELASTIC, TYPE=ORTHO"; "" where there is nothing.
     """
 
     young: float | None
     poisson: float | None
     density: float | None
+    problem: str = ""
 
 
 @dataclass(frozen=True)
@@ -166,36 +249,8 @@ class CentrifugalLoad:
 
 
 @dataclass(frozen=True)
-class Step:
-    """One step of a deck.
-
-    kind: "static", "frequency", or another keyword in small letters; "" where there is none.
-    perturbation: whether the step is about the state of the step before.
-    nlgeom: whether displacements are large.
-    line: first line of the step, as "sector.inp, line 7".
-    boundaries: boundary conditions that the step adds.
-    boundaries_replaced: whether the step first removes all others.
-    centrifugal: centrifugal loads.
-    equations_removed: whether `*EQUATION,REMOVE ALL` is there.
-    contact_removed: pairs of surfaces (dependent, independent) that `*MODEL CHANGE` removes.
-    parameters: of the keyword that gives the kind, by name in capitals.
-    """
-
-    kind: str
-    perturbation: bool
-    nlgeom: bool
-    line: str
-    boundaries: tuple[Boundary, ...] = ()
-    boundaries_replaced: bool = False
-    centrifugal: tuple[CentrifugalLoad, ...] = ()
-    equations_removed: bool = False
-    contact_removed: tuple[tuple[str, str], ...] = ()
-    parameters: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
 class Deck:
-    """All that is read of a model's mesh file.
+    """All that is read of a model's mesh file: the model as its steps leave it that do not write matrices.
 
     Attributes
     ----------
@@ -211,16 +266,28 @@ class Deck:
         Ascending numbers by the name of the set; all of them exist.
     surfaces, materials
         By name.
-    ties, contact_pairs, sections, steps
+    ties, contact_pairs, sections
         In the order of the file.
     cyclic
         None where the deck is none of a sector.
     boundaries
-        Those given before the first step.
+        In the order of the file.
+    transforms, equations, rigid_motions
+        In the order of the file.
+    centrifugal
+        Loads of the last step that has some.
+    forces, pressures, gravity
+        Constant loads of static steps; the acceleration (3,) acts on all elements, None where there is none.
+    unassembled
+        What has a stiffness or a mass that only matrices of another program hold, as "deck.inp, line 7: ...".
+    removed
+        What *MODEL CHANGE takes away, a sentence each; it is not among the rest.
+    n_instances
+        Of parts; where there are several, numbers are not those of the file.
     skipped
-        Keywords that were not read, each as "sector.inp, line 7: *KEYWORD", the first of every kind.
+        Keywords that cannot change the model and were not read, each as "sector.inp, line 7: *KEYWORD".
     notes
-        What was read but left out in part, a sentence each.
+        What was read in a way that may be asked for, a sentence each.
     included
         Files that the deck includes, relative to its folder.
     """
@@ -236,12 +303,31 @@ class Deck:
     contact_pairs: tuple[ContactPair, ...] = ()
     cyclic: CyclicSymmetry | None = None
     boundaries: tuple[Boundary, ...] = ()
+    transforms: tuple[Transform, ...] = ()
+    equations: tuple[Equation, ...] = ()
+    rigid_motions: tuple[RigidMotion, ...] = ()
     materials: Mapping[str, Material] = field(default_factory=dict)
     sections: tuple[SolidSection, ...] = ()
-    steps: tuple[Step, ...] = ()
+    centrifugal: tuple[CentrifugalLoad, ...] = ()
+    forces: tuple[NodalForce, ...] = ()
+    pressures: tuple[Pressure, ...] = ()
+    gravity: FloatArray | None = None
+    unassembled: tuple[str, ...] = ()
+    removed: tuple[str, ...] = ()
+    n_instances: int = 0
     skipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     included: tuple[str, ...] = ()
+
+    @property
+    def remarks(self) -> tuple[tuple[str, str], ...]:
+        """Label and text of lines for the user: what was skipped, where there is something, and the notes."""
+        more = len(self.skipped) - _MOST_NAMED
+        skipped = "; ".join(self.skipped[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+        return (
+            *((("skipped", skipped),) if skipped else ()),
+            *(("note", text) for text in (*self.notes, *self.removed)),
+        )
 
     def rows_of_nodes(self, numbers: IntArray) -> IntArray:
         """Places of nodes in `coordinates`, of the shape of `numbers`; all of them must exist."""

@@ -1,84 +1,26 @@
-"""Reads a deck of CalculiX or Abaqus: keyword by keyword into a draft, which is then looked through and frozen."""
+"""Reads a deck of CalculiX or Abaqus: keyword by keyword into a draft, whose names are then looked up."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from studies.fe_models.deck.draft import Draft
-from studies.fe_models.deck.finish import finish
+from studies.fe_models.deck.draft import Draft, refused
+from studies.fe_models.deck.generate import read_placement
+from studies.fe_models.deck.keywords import read_keyword
 from studies.fe_models.deck.mesh import Deck
-from studies.fe_models.deck.mesh_keywords import (
-    read_element,
-    read_elset,
-    read_end_of_scope,
-    read_instance,
-    read_node,
-    read_nothing,
-    read_nset,
-    read_part,
-    read_surface,
-)
-from studies.fe_models.deck.model_keywords import (
-    read_contact_pair,
-    read_cyclic_symmetry,
-    read_density,
-    read_elastic,
-    read_friction,
-    read_interaction,
-    read_material,
-    read_section,
-    read_tie,
-)
-from studies.fe_models.deck.step_keywords import (
-    PROCEDURES,
-    read_boundary,
-    read_dload,
-    read_end_step,
-    read_equation,
-    read_model_change,
-    read_procedure,
-    read_step,
-)
-from studies.fe_models.text.keyword_lines import Block, read_blocks
-
-_READERS: Mapping[str, Callable[[Draft, Block], None]] = {
-    "ASSEMBLY": read_nothing,
-    "BOUNDARY": read_boundary,
-    "CONTACTPAIR": read_contact_pair,
-    "CYCLICSYMMETRYMODEL": read_cyclic_symmetry,
-    "DENSITY": read_density,
-    "DLOAD": read_dload,
-    "ELASTIC": read_elastic,
-    "ELEMENT": read_element,
-    "ELSET": read_elset,
-    "ENDASSEMBLY": read_nothing,
-    "ENDINSTANCE": read_end_of_scope,
-    "ENDPART": read_end_of_scope,
-    "ENDSTEP": read_end_step,
-    "EQUATION": read_equation,
-    "FRICTION": read_friction,
-    "HEADING": read_nothing,
-    "INSTANCE": read_instance,
-    "MATERIAL": read_material,
-    "MODELCHANGE": read_model_change,
-    "NODE": read_node,
-    "NSET": read_nset,
-    "PART": read_part,
-    "SOLIDSECTION": read_section,
-    "STEP": read_step,
-    "SURFACE": read_surface,
-    "SURFACEINTERACTION": read_interaction,
-    "TIE": read_tie,
-    **dict.fromkeys(PROCEDURES, read_procedure),
-}
+from studies.fe_models.deck.resolve import resolve
+from studies.fe_models.text.keyword_lines import Block, read_blocks, read_name
+from studies.fe_models.text.read_errors import shown
 
 _LONG = ("NODE", "ELEMENT", "NSET", "ELSET")
 _MOST_LINES = 300_000  # of all other keywords that are read: a surface of so many faces takes seconds
+_MOST_LONG = 6_000_000  # of these, those of a part once for each of its instances
+_MOST_INSTANCES = 1000
+_OF_PARTS = ("PART", "ENDPART", "INSTANCE", "ENDINSTANCE")
 
 
 def read_deck(path: Path) -> Deck:
-    """The model of a deck of CalculiX or Abaqus, with those keywords that the project knows.
+    """The model of a deck of CalculiX or Abaqus.
 
     Parameters
     ----------
@@ -88,23 +30,80 @@ def read_deck(path: Path) -> Deck:
     Returns
     -------
     Deck
-        In units of the file. Other keywords are named in `skipped`. Numbers of nodes and elements are those of the
-        file; where the deck has a part and its instance, those of the part, at the place of the instance.
+        In units of the file. Keywords that cannot change the model are named in `skipped`. Numbers of nodes and
+        elements are those of the file. Where the deck has instances, those of the first one are those of its part;
+        of the others they are so many thousands larger as a note says.
 
     Raises
     ------
     SceneError
-        About "model": in one sentence with file and line, where the deck cannot be read or makes no sense.
+        About "model": in one sentence with file and line, where the deck cannot be read, makes no sense, or has a
+        keyword that may change the model and is not read.
     """
-    draft, left = Draft(), _MOST_LINES
-    for block in read_blocks(path, draft.included):
-        reader = _READERS.get(block.keyword)
-        if reader is None:
-            draft.skip(block)
-            continue
-        left -= 0 if block.keyword in _LONG else len(block.lines)
-        if left < 0:
-            remedy = "name what is meant by sets of nodes or elements"
-            raise block.place.wrong(f"more than {_MOST_LINES} lines below *{block.written} and others", remedy)
-        reader(draft, block)
-    return finish(draft, path.name)
+    reading = _Reading(Draft(path.name))
+    for block in read_blocks(path, reading.draft.included):
+        reading.take(block)
+    draft = reading.draft
+    draft.end_step()
+    if draft.coupling is not None:
+        raise refused(draft.coupling, "no *KINEMATIC below it", "write it there, or remove the coupling")
+    if draft.part or draft.scope:
+        raise block.place.wrong(f"the end of {draft.part or draft.scope} is missing", "write *END PART, *END INSTANCE")
+    return resolve(draft)
+
+
+class _Reading:
+    def __init__(self, draft: Draft) -> None:
+        self.draft = draft
+        self.left = {True: _MOST_LONG, False: _MOST_LINES}
+
+    def take(self, block: Block) -> None:
+        """The next keyword of the file: of a part it is put aside until there is an instance."""
+        draft = self.draft
+        if block.keyword in _OF_PARTS:
+            for name in block.parameters:
+                if name not in ("NAME", "PART", "NSET", "ELSET"):
+                    raise block.place.wrong(f"*{block.written} with {shown(name)} is not read", "leave it out")
+            getattr(self, f"_{block.keyword.lower()}")(block)
+        elif draft.part:
+            draft.parts[draft.part].append(block)
+        else:
+            self._read(block)
+
+    def _read(self, block: Block) -> None:
+        long = block.keyword in _LONG
+        self.left[long] -= len(block.lines)
+        if self.left[long] < 0:
+            most, remedy = (_MOST_LONG if long else _MOST_LINES), "name what is meant by sets of nodes or elements"
+            raise block.place.wrong(f"more than {most} lines below *{block.written} and others", remedy)
+        read_keyword(self.draft, block)
+
+    def _part(self, block: Block) -> None:
+        name = block.name("NAME")
+        if self.draft.part or self.draft.scope or name in self.draft.parts:
+            raise block.place.wrong(f"*PART {shown(name)} again, or within another", "write *END PART above it")
+        self.draft.part, self.draft.parts[name] = name, []
+
+    def _endpart(self, _block: Block) -> None:
+        self.draft.part = ""
+
+    def _instance(self, block: Block) -> None:
+        """*INSTANCE: the mesh of the part, shifted and turned."""
+        draft = self.draft
+        name, part = block.name("NAME"), block.name("PART")
+        if part not in draft.parts or draft.part or draft.scope or name in draft.placed:
+            found = f"*INSTANCE {shown(name)} of {shown(part)}, which is no part, or again"
+            raise block.place.wrong(found, "give *PART above it, and each instance once")
+        if len(draft.placed) >= _MOST_INSTANCES:
+            raise block.place.wrong(f"more than {_MOST_INSTANCES} instances", "reduce the model")
+        draft.placed[name] = read_placement(block)
+        draft.scope, draft.system = name, draft.world
+        for each in draft.parts[part]:
+            self._read(each)
+        # sets of the assembly with all of the instance
+        for parameter, sets in (("NSET", draft.node_sets), ("ELSET", draft.element_sets)):
+            if parameter in block.parameters:
+                sets.add_all("", read_name(block.parameters[parameter]), name)
+
+    def _endinstance(self, _block: Block) -> None:
+        self.draft.scope, self.draft.system = "", self.draft.world

@@ -68,7 +68,7 @@ def describe_model(
     friction = parameters.friction_coefficient
     stiff = make_compliant(scene.model, parameters.contact_stiffness)
     rows.append(("static", describe_rest(stiff, friction if isinstance(friction, float) else None)))
-    rows += [("left out", text) for text in (*deck.skipped, *deck.notes)]
+    rows += deck.remarks
     return rows
 
 

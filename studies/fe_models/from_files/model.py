@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,18 +20,20 @@ from studies.fe_models.checks import (
     omega_squared_of,
 )
 from studies.fe_models.deck.mesh import Deck
+from studies.fe_models.from_files.constraints import find_constraints
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.from_files.solid import build_solid_mesh
-from studies.fe_models.from_files.supports import find_cut, find_held, find_rotation
+from studies.fe_models.from_files.supports import find_clamped, find_cut, find_rotation
 from studies.fe_models.from_files.surfaces_in_contact import Surfaces, find_surfaces
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.fe_models.mesh_files import read_mesh_file
 from studies.fe_models.model_files import ModelFiles
-from studies.fe_models.nodal_matrices import order_by_nodes
+from studies.fe_models.nodal_matrices import NodalMatrices, order_by_nodes
 from studies.fe_models.units import Units, find_units
 from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.joint.surfaces import loops_of_faces, pressure_forces
 from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel, Retainer, SetMotion
 from studies.finite_element.reduced_joint import Progress, silent
 from studies.scene_error import SceneError
@@ -90,36 +92,40 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     selections = Selections(deck, mesh)
     if not files.matrices:
         check_units(deck, None, units)
+        for found in deck.unassembled:
+            raise SceneError("model", found, "use solid elements, or give `matrices` of another program")
     rotation = find_rotation(deck, parameters, units)
     surfaces = find_surfaces(selections, parameters, units)
-    cut, held = find_cut(selections, parameters, units), find_held(selections, parameters)
-    preloads = [(_motion(selections, each, "preload.set"), each.force) for each in parameters.preload]
-    model: MeshModel | MatrixModel = MeshModel(
-        mesh, rotation, parameters.stress_stiffening, _preload(preloads, mesh.n_nodes)
-    )
-    held_speed = None
+    cut, clamped = find_cut(selections, parameters, units), find_clamped(selections, parameters)
+    nodal, held_speed = None, None
     if files.matrices:
-        if not parameters.stress_stiffening:
-            raise SceneError("stress_stiffening", "false", "leave it out: the matrices hold it or not")
-        progress(f"reading {', '.join(path.name for path in files.matrices)}")
-        matrices = read_matrices(files.matrices[0])
-        check_mesh_is_of_matrices(deck, matrices)
+        matrices = _read_matrices(files, parameters, deck, progress)
         check_units(deck, mass_of(deck, matrices), units)
         check_mass(deck, matrices, units)
         _check_export(deck, matrices, mesh, surfaces, units)
         if rotation is not None:
             held_speed = _check_rotation(deck, matrices, rotation, parameters, units)
-        nodal = order_by_nodes(
-            sparse.csr_matrix(matrices.stiffness * units.stiffness),
-            sparse.csr_matrix(matrices.mass * units.mass),
-            matrices.node,
-            matrices.direction,
-            mesh.numbers,
-            mesh.coordinates,
-        )
-        _check_free_nodes(matrices, mesh, np.asarray(held.all(axis=1)))
-        held = np.concatenate([held, np.zeros((len(nodal.numbers) - len(held), 3), dtype=np.bool_)]) | nodal.missing
-        model = nodal.model(rotation, _preload(preloads, len(nodal.numbers)))
+        nodal = _ordered(matrices, mesh, units)
+        clamped = None if clamped is None else np.pad(clamped, ((0, len(nodal.numbers) - len(clamped)), (0, 0)))
+    numbers = mesh.numbers if nodal is None else nodal.numbers
+    on_cut = np.empty(0, dtype=np.int64) if cut is None else np.concatenate([cut.left, cut.right])
+    supported = find_constraints(deck, numbers, clamped, units, on_cut)
+    selections = replace(selections, references=supported.references)
+    n_nodes = len(supported.held)
+    preload = np.zeros(3 * n_nodes)
+    if not parameters.preload:
+        preload = supported.forces + _pressed(deck, mesh, n_nodes, units)
+    for each in parameters.preload:
+        preload = preload + each.force * _motion(selections, each, "preload.set").row(n_nodes)
+    gravity = None if deck.gravity is None else deck.gravity * units.length
+    held = supported.held
+    model: MeshModel | MatrixModel
+    if nodal is None:
+        model = MeshModel(mesh, rotation, parameters.stress_stiffening, preload, gravity, extra=supported.extra)
+    else:
+        _check_free_nodes(matrices, mesh, np.asarray(supported.own[: mesh.n_nodes].all(axis=1)))
+        held[: len(nodal.missing)] |= nodal.missing
+        model = nodal.model(rotation, preload, gravity, supported.extra)
     joint = JointDefinition(
         contacts=surfaces.contacts,
         held=held,
@@ -130,6 +136,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         cut=cut,
         retainer=_retainer(parameters, None if cut is None else cut.axis.axis, rotation),
         ties=surfaces.ties,
+        constraints=supported.constraints,
     )
     return LoadedModel(deck, units, mesh, model, joint, held_speed)
 
@@ -147,9 +154,38 @@ def _motion(selections: Selections, given: SetDirection, key: str) -> SetMotion:
     return SetMotion(selections.nodes(given.set, key), np.array(given.direction))
 
 
-def _preload(forces: list[tuple[SetMotion, float]], n_nodes: int) -> FloatArray | None:
-    """Nodal forces (3 n_nodes,), N, of forces on sets; None of none."""
-    return sum((force * motion.row(n_nodes) for motion, force in forces), np.zeros(3 * n_nodes)) if forces else None
+def _pressed(deck: Deck, mesh: SolidMesh, n_nodes: int, units: Units) -> FloatArray:
+    """Nodal forces (3 n_nodes,), N, of the pressures of a deck."""
+    forces = np.zeros(3 * n_nodes)
+    for each in deck.pressures:
+        kept = np.isin(each.elements, np.concatenate([group.numbers for group in mesh.groups]))
+        loops, _ = loops_of_faces(mesh, each.place, each.elements[kept], each.faces[kept])
+        forces[: 3 * mesh.n_nodes] += pressure_forces(mesh.coordinates, loops, each.value * units.stress)
+    return forces
+
+
+def _read_matrices(files: ModelFiles, parameters: Parameters, deck: Deck, progress: Progress) -> Matrices:
+    """The matrices of a model; its mesh is that of the deck. Raises SceneError."""
+    if not parameters.stress_stiffening:
+        raise SceneError("stress_stiffening", "false", "leave it out: the matrices hold it or not")
+    if deck.n_instances > 1:
+        found = f"{deck.path} has {deck.n_instances} instances, whose nodes have other numbers in matrices"
+        raise SceneError("matrices", found, "write a flat deck, or leave `matrices` out")
+    progress(f"reading {', '.join(path.name for path in files.matrices)}")
+    matrices = read_matrices(files.matrices[0])
+    check_mesh_is_of_matrices(deck, matrices)
+    return matrices
+
+
+def _ordered(matrices: Matrices, mesh: SolidMesh, units: Units) -> NodalMatrices:
+    return order_by_nodes(
+        sparse.csr_matrix(matrices.stiffness * units.stiffness),
+        sparse.csr_matrix(matrices.mass * units.mass),
+        matrices.node,
+        matrices.direction,
+        mesh.numbers,
+        mesh.coordinates,
+    )
 
 
 def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotation | None) -> Retainer | None:

@@ -85,7 +85,8 @@ class Parameters(Table):
     )
     preload: Annotated[tuple[Preload, ...], BeforeValidator(_as_tuple)] = Field(
         (),
-        description="constant forces beside the centrifugal one, no part of the prestress: [{set, direction, force}]",
+        description="constant forces beside the centrifugal one, no part of the prestress: [{set, direction, force}];"
+        " default: CLOAD and pressures of the deck's static steps",
     )
     nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites, -")
     loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")

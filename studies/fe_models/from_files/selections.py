@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,14 +19,20 @@ _MOST_NAMED = 6
 
 @dataclass(frozen=True)
 class Selections:
-    """What the names of a deck stand for in its mesh. Names may be written in small letters."""
+    """What the names of a deck stand for in its mesh. Names may be written in small letters.
+
+    references: rows of nodes without elements that others follow.
+    """
 
     deck: Deck
     mesh: SolidMesh
+    references: Mapping[int, int] = field(default_factory=dict)
 
     def rows(self, numbers: IntArray) -> IntArray:
-        """Rows of the nodes that are in the mesh; others, as reference points, are left out."""
+        """Rows of the nodes that are in the mesh; of other nodes alone, those that others follow."""
         inside = np.intersect1d(numbers, self.mesh.numbers)
+        if not len(inside):
+            return np.array([self.references[each] for each in numbers if each in self.references], dtype=np.int64)
         return np.searchsorted(self.mesh.numbers, inside).astype(np.int64)
 
     def nodes(self, name: str, key: str) -> IntArray:
@@ -39,7 +45,9 @@ class Selections:
             known = (*self.deck.node_sets, *self.deck.surfaces, *self.deck.element_sets)
             raise self.unknown(name, key, "set of nodes or surface", known)
         if len(found) == 0:
-            raise SceneError(key, f"{name} in {self.deck.path} has no node of an element", "give nodes of the mesh")
+            taken = f" ({self.deck.removed[0].rstrip('.')})" if self.deck.removed else ""
+            found_none = f"{name} in {self.deck.path} has no node of an element{taken}"
+            raise SceneError(key, found_none, "give nodes of the mesh")
         return found
 
     def surface(self, name: str, key: str) -> Surface:

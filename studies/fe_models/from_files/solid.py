@@ -60,6 +60,8 @@ def _materials(deck: Deck, parameters: Parameters, units: Units) -> Iterator[tup
     for section in deck.sections:
         found = deck.materials.get(section.material)
         values = None if found is None else (found.young, found.poisson, found.density)
+        if needed and found is not None and found.problem and not isinstance(given, dict):
+            raise SceneError("model", found.problem, "give one isotropic law, or `material` in the study")
         elements = deck.element_sets[section.element_set]
         if not needed:
             yield section.element_set, elements, whole

@@ -1,4 +1,4 @@
-"""Rotation, cut faces and clamps of a deck."""
+"""Rotation, cut faces and clamps of a study or deck."""
 
 from __future__ import annotations
 
@@ -6,15 +6,13 @@ import numpy as np
 
 from solver.model import BoolArray, FloatArray
 from studies.fe_models.checks import rotation_of_deck
-from studies.fe_models.deck.mesh import Boundary, Deck
+from studies.fe_models.deck.mesh import Deck
 from studies.fe_models.from_files.parameters import AxisTable, Parameters
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.units import Units
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.finite_element.joint.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
 from studies.scene_error import SceneError
-
-_LAST_DISPLACEMENT = 3  # further degrees of freedom of a boundary condition are rotations and temperatures
 
 
 def find_rotation(deck: Deck, parameters: Parameters, units: Units) -> Rotation | None:
@@ -56,32 +54,24 @@ def find_cut(selections: Selections, parameters: Parameters, units: Units) -> Cu
         found = rotation.point, rotation.axis
     axis = CyclicAxis(n_sectors, *found)
     places = mesh.coordinates, mesh.numbers, mesh.bodies
-    names = parameters.cut_faces or _cut_names(deck)
-    if names is None:
+    names = _cut_names(deck) if parameters.cut_faces is None else [parameters.cut_faces]
+    if not names:
         return find_cut_faces(*places, axis)
-    first, second = (selections.nodes(name, "cut_faces") for name in names)
+    sides = ([selections.nodes(pair[side], "cut_faces") for pair in names] for side in (0, 1))
+    first, second = (np.unique(np.concatenate(each)) for each in sides)
     return match_cut_faces(*places, axis, first, second)
 
 
-def find_held(selections: Selections, parameters: Parameters) -> BoolArray:
-    """Displacements (n_nodes, 3) that are 0: all of the nodes that the study clamps, else those of BOUNDARY.
+def find_clamped(selections: Selections, parameters: Parameters) -> BoolArray | None:
+    """Displacements (n_nodes, 3) of the nodes that the study clamps; None where the deck says what is held.
 
-    Raises SceneError where the deck moves nodes.
+    Raises SceneError where a set does not exist.
     """
+    if parameters.clamp is None:
+        return None
     held = np.zeros((selections.mesh.n_nodes, 3), dtype=np.bool_)
-    if parameters.clamp is not None:
-        for name in parameters.clamp:
-            held[selections.nodes(name, "clamp")] = True
-        return held
-    for boundary in _boundaries(selections.deck):
-        first, last = max(boundary.first_dof, 1), min(boundary.last_dof, _LAST_DISPLACEMENT)
-        if first <= last and boundary.value != 0.0:
-            raise SceneError(
-                "clamp",
-                f"{selections.deck.path} moves {boundary.name} by {boundary.value:g}",
-                "hold it, or give `clamp`",
-            )
-        held[selections.rows(boundary.nodes), first - 1 : last] = True
+    for name in parameters.clamp:
+        held[selections.nodes(name, "clamp")] = True
     return held
 
 
@@ -97,19 +87,6 @@ def _axis(deck: Deck, parameters: Parameters, units: Units) -> tuple[FloatArray,
     return start, (end - start) / np.linalg.norm(end - start)
 
 
-def _cut_names(deck: Deck) -> tuple[str, str] | None:
-    named = "" if deck.cyclic is None else deck.cyclic.tie
-    for tie in deck.ties:
-        if tie.cyclic and named in ("", tie.name):
-            return tie.dependent, tie.independent
-    return None
-
-
-def _boundaries(deck: Deck) -> tuple[Boundary, ...]:
-    """Boundary conditions up to the step that writes matrices, which has none."""
-    found = deck.boundaries
-    for step in deck.steps:
-        if step.equations_removed or step.parameters.get("SOLVER", "").upper() == "MATRIXSTORAGE":
-            break
-        found = step.boundaries if step.boundaries_replaced else (*found, *step.boundaries)
-    return found
+def _cut_names(deck: Deck) -> list[tuple[str, str]]:
+    named = () if deck.cyclic is None else deck.cyclic.ties
+    return [(tie.dependent, tie.independent) for tie in deck.ties if tie.cyclic and (not named or tie.name in named)]

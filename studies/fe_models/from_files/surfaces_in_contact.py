@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from studies.fe_models.deck.mesh import Deck
+from studies.fe_models.deck.mesh import ContactPair, Deck
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.units import Units
@@ -15,11 +15,11 @@ from studies.scene_error import SceneError
 
 @dataclass(frozen=True)
 class _Definition:
-    """Two surfaces of the deck. tolerance: units of the file. friction_coefficient: None where there is none."""
+    """Two surfaces of the deck. tolerance: units of the file. pair: None where the deck has no such contact pair."""
 
     names: tuple[str, str]
     tolerance: float | None = None
-    friction_coefficient: float | None = None
+    pair: ContactPair | None = None
 
     def joins(self, names: tuple[str, str]) -> bool:
         return set(self.names) == set(names)
@@ -36,6 +36,8 @@ class Surfaces:
 def find_surfaces(selections: Selections, parameters: Parameters, units: Units) -> Surfaces:
     """Pairs of surfaces that the study names, else those of CONTACT PAIR, else those of TIE; other ties stay glued.
 
+    So do contact pairs that the deck glues and the study does not name.
+
     Raises
     ------
     SceneError
@@ -43,24 +45,28 @@ def find_surfaces(selections: Selections, parameters: Parameters, units: Units) 
     """
     deck = selections.deck
     ties = [_Definition((tie.dependent, tie.independent), tie.tolerance) for tie in deck.ties if not tie.cyclic]
-    touching = [
-        _Definition((pair.dependent, pair.independent), None, pair.friction_coefficient) for pair in deck.contact_pairs
-    ]
+    pairs = [_Definition((pair.dependent, pair.independent), None, pair) for pair in deck.contact_pairs]
+    touching = [each for each in pairs if each.pair is not None and not each.pair.glued]
+    glued_pairs = [each for each in pairs if each not in touching]
     if parameters.contact is not None:
-        chosen = [_known(_capital(names), [*touching, *ties]) for names in parameters.contact]
+        chosen = [_known(_capital(names), [*pairs, *ties]) for names in parameters.contact]
     else:
         chosen = touching or ties
+    if not chosen and glued_pairs:
+        found = f"{deck.contact_pairs[0].glued}: all contact pairs are glued, so that nothing wears"
+        raise SceneError("contact", found, "name those that move: `contact` in the study")
     if not chosen:
+        taken = f" ({deck.removed[0].rstrip('.')})" if deck.removed else ""
         raise SceneError(
             "contact",
-            f"{deck.path} has neither CONTACT PAIR nor TIE",
+            f"{deck.path} has neither CONTACT PAIR nor TIE{taken}",
             'give pairs of surfaces, as [["BLADES", "DISKS"]]',
         )
     # a name that the deck does not have is said before a friction coefficient that is missing for it
     named = [_surfaces(selections, each, parameters, units, "contact") for each in chosen]
     friction = _friction(chosen, parameters, deck)
     contacts = [replace(each, friction_coefficient=value) for each, value in zip(named, friction, strict=True)]
-    glued = [tie for tie in ties if not any(tie.joins(each.names) for each in chosen)]
+    glued = [tie for tie in (*ties, *glued_pairs) if not any(tie.joins(each.names) for each in chosen)]
     return Surfaces(tuple(contacts), tuple(_surfaces(selections, tie, parameters, units, "model") for tie in glued))
 
 
@@ -84,7 +90,13 @@ def _surfaces(
     tolerance = parameters.tolerance
     if tolerance is None and definition.tolerance is not None:
         tolerance = definition.tolerance * units.length
-    return ContactSurfaces(first, second, tolerance, None, with_gaps=parameters.gaps)
+    pair = definition.pair
+    if pair is None or not pair.fitted:
+        return ContactSurfaces(first, second, tolerance, None, with_gaps=parameters.gaps)
+    if not parameters.gaps:
+        raise SceneError("gaps", f"{pair.fitted}, and the study lets the surfaces touch", "give gaps = true")
+    clearance = None if pair.clearance is None else pair.clearance * units.length
+    return ContactSurfaces(first, second, tolerance, None, with_gaps=True, clearance=clearance)
 
 
 def _friction(chosen: list[_Definition], parameters: Parameters, deck: Deck) -> Iterator[float | None]:
@@ -102,7 +114,11 @@ def _friction(chosen: list[_Definition], parameters: Parameters, deck: Deck) -> 
             raise SceneError(f"friction_coefficient.{name}", f"{value}", "give 0 or more")
     for each in chosen:
         own = [named[label] for label in _labels(each) if label in named]
-        value_or_none = own[-1] if own else each.friction_coefficient
+        pair = each.pair
+        value_or_none = own[-1] if own else None if pair is None else pair.friction_coefficient
+        if value_or_none is None and pair is not None and pair.problem:
+            remedy = "give one coefficient, there or by friction_coefficient in the study"
+            raise SceneError("friction_coefficient", pair.problem, remedy)
         if value_or_none is None:
             raise SceneError(
                 "friction_coefficient",

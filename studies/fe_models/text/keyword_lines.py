@@ -38,7 +38,7 @@ class Block:
 
     def place_of(self, line: int) -> Place:
         """Place of a data line, counted from 0."""
-        return Place(*self.places[line])
+        return Place(*self.places[line], self.written)
 
     def name(self, parameter: str) -> str:
         """The value of a parameter that is a name, in capitals. Raises SceneError where it is missing."""
@@ -183,4 +183,5 @@ def _cut_keyword(text: str, place: Place) -> Block:
             raise place.wrong(f"{shown(rest[at:])!r} is no parameter of *{shown(written)}", "write NAME=value")
         parameters["".join(match[1].split()).upper()] = (match[2] or "").strip()
         at = match.end()
-    return Block(keyword, shown(" ".join(written.split()).upper()), parameters, place)
+    name = shown(" ".join(written.split()).upper())
+    return Block(keyword, name, parameters, Place(place.file, place.line, name))

@@ -13,16 +13,19 @@ LARGEST_DECK = 2**28
 
 @dataclass(frozen=True)
 class Place:
-    """A line of a file, counted from 1; as a text "sector.inp, line 12"."""
+    """A line of a file, counted from 1; as a text "sector.inp, line 12". keyword: of this line, or the one above it."""
 
     file: str
     line: int
+    keyword: str = ""
 
     def __str__(self) -> str:
         return f"{self.file}, line {self.line}"
 
     def wrong(self, found: str, remedy: str) -> SceneError:
         """The error about this place: what stands there, and what would be right (a clause without a full stop)."""
+        if self.keyword and f"*{self.keyword}" not in found:
+            found = f"{found}, at *{self.keyword}"
         return SceneError("model", f"{self}: {found}", remedy)
 
 

@@ -83,9 +83,11 @@ ELEMENT_KINDS: dict[str, ElementKind] = {
     "C3D6": ElementKind(WEDGE_6, WEDGE_2_POINTS, _WEDGE_FACES),
     "C3D8": ElementKind(HEX_8, HEX_8_POINTS, _HEX_FACES),
     "C3D8I": ElementKind(HEX_8, HEX_8_POINTS, _HEX_FACES, incompatible_modes=True),
-    # its one point needs an hourglass control, which is each code's own
+    # hourglass control, pressures as unknowns and modified shape functions are each code's own
     "C3D8R": ElementKind(HEX_8, HEX_8_POINTS, _HEX_FACES, assembled=False),
+    "C3D8H": ElementKind(HEX_8, HEX_8_POINTS, _HEX_FACES, assembled=False),
     "C3D10": ElementKind(TET_10, TET_4_POINTS, _TET_FACES),
+    "C3D10M": ElementKind(TET_10, TET_4_POINTS, _TET_FACES, assembled=False),
     "C3D15": ElementKind(WEDGE_15, WEDGE_9_POINTS, _WEDGE_FACES),
     "C3D20": ElementKind(HEX_20, HEX_27_POINTS, _HEX_FACES),
     "C3D20R": ElementKind(HEX_20, HEX_8_POINTS, _HEX_FACES),

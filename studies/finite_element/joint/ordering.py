@@ -14,7 +14,9 @@ from scipy import sparse
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.condensation.dissection import Dissection, dissect
 from studies.finite_element.condensation.ordered_form import OrderedForm, order_form
+from studies.finite_element.joint.constraints import Constraints
 from studies.finite_element.joint.cut_faces import CutFaces
+from studies.finite_element.joint.held_pairs import hold_pairs
 from studies.finite_element.joint.pairing import ContactPairs
 from studies.scene_error import SceneError
 
@@ -23,7 +25,6 @@ _LARGEST_KEPT_CUT = 900  # nodes of a cut face; the dense matrix of those that a
 # Nodal diameters from which on it pays to keep the cut faces. Bundled dovetail, kept over eliminated, CPU time: one
 # nodal diameter 1.4 (mesh 2) and 2.0 (mesh 3), two 1.4 (mesh 4), six 0.8 (mesh 2).
 _FEWEST_REUSES = 4
-_SLANTED = 0.1  # sine of the angle between the normal of a pair and a plane of symmetry that round-off or facets make
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,14 @@ class Supports:
     held (n_nodes, 3): displacements that are 0.
     cut: cut faces; None where the structure is no cyclic sector.
     n_reductions: number of nodal diameters at which the structure will be reduced. More are possible and take longer.
+    constraints: displacements that follow others, which are held as well; None where there are none.
     """
 
     numbers: IntArray
     held: BoolArray
     cut: CutFaces | None
     n_reductions: int = 1
+    constraints: Constraints | None = None
 
     @property
     def keeps_cut(self) -> bool:
@@ -86,6 +89,11 @@ class Supports:
         master[held[master] | held] = -1
         return master
 
+    def opposite(self, pairs: ContactPairs) -> sparse.csr_matrix:
+        """Displacements (3 n_contact, 3 n_nodes) of the opposite points from those that depend on no other."""
+        points = sparse.kron(pairs.opposite, np.eye(3), format="csr")
+        return points if self.constraints is None else (points @ self.constraints.transformation).tocsr()
+
     def phase(self, nodal_diameter: int) -> complex | float:
         """Phase in the elimination: `exp(i phi)` of a nodal diameter, or 1.0."""
         return 1.0 if self.cut is None or self.keeps_cut else self.cut.phase(nodal_diameter)
@@ -120,7 +128,7 @@ def pairs_of_sector(pairs: ContactPairs, supports: Supports) -> ContactPairs:
 
     Raises SceneError where a moving node is held along its normal, or a pair on the right cut face has no image.
     """
-    pairs = _held_frames(pairs, supports)
+    pairs = hold_pairs(pairs, supports.numbers, supports.held, supports.constraints)
     if supports.cut is None:
         return pairs
     image = np.full(supports.n_nodes, -1)
@@ -143,31 +151,6 @@ def pairs_of_sector(pairs: ContactPairs, supports: Supports) -> ContactPairs:
     area[left] += area[right]
     kept = np.setdiff1d(np.arange(pairs.n_contact), right)
     return replace(pairs, area=area).chosen(kept)
-
-
-def _held_frames(pairs: ContactPairs, supports: Supports) -> ContactPairs:
-    """Pairs whose frames have a tangent along each direction that is held, as in a plane of symmetry."""
-    held = supports.held[pairs.moving]
-    frames, present = pairs.frames.copy(), pairs.present.copy()
-    wrong = np.zeros(pairs.n_contact, dtype=np.bool_)
-    for place in np.flatnonzero(held.any(axis=1)):
-        axes, normal = np.eye(3)[held[place]], frames[place, 0]
-        wrong[place] = np.linalg.norm(axes @ normal) > _SLANTED
-        if wrong[place]:
-            continue
-        normal = normal - (axes @ normal) @ axes
-        normal /= np.linalg.norm(normal)
-        second = axes[-1]
-        frames[place] = [normal, np.cross(second, normal), second]
-        present[place, 3 - len(axes) :] = False
-    if wrong.any():
-        name, node = pairs.moving_name[pairs.surface[wrong][0]], supports.numbers[pairs.moving[wrong][0]]
-        raise SceneError(
-            "contact",
-            f"{np.count_nonzero(wrong)} nodes of {name} are clamped, as node {node}",
-            "take them out of the surface or of the clamped set",
-        )
-    return replace(pairs, frames=frames, present=present)
 
 
 def ties_of_structure(ties: ContactPairs, supports: Supports, pairs: ContactPairs) -> ContactPairs:
@@ -250,10 +233,10 @@ class OrderedStructure:
         pairs, supports, first = self.pairs, self.supports, self.dissection.n_eliminated
         n_kept, n_contact = len(self.free) - first, pairs.n_contact
         all_nodes = self.followers(nodal_diameter)[:, 3 * first :]
-        moving, follow = [pairs.moving], [sparse.kron(pairs.opposite, np.eye(3), format="csr")]
+        moving, follow = [pairs.moving], [supports.opposite(pairs)]
         if self.ties is not None:
             moving.append(self.ties.moving)
-            follow.append(sparse.kron(self.ties.opposite, np.eye(3), format="csr"))
+            follow.append(supports.opposite(self.ties))
         if supports.cut is not None and supports.keeps_cut:
             loose_cut = self.place[supports.cut.right] >= 0
             moving.append(supports.cut.right[loose_cut])
@@ -261,6 +244,9 @@ class OrderedStructure:
         followers = np.concatenate(moving)
         # What they follow, in all three directions, from the displacements of the nodes that are kept.
         opposite = (sparse.vstack(follow, format="csr") @ all_nodes).tocsr()
+        if supports.constraints is not None:
+            rows = (3 * followers[:, None] + np.arange(3)).ravel()
+            opposite = (opposite - supports.constraints.across[rows][:, rows] @ opposite).tocsr()
         dofs = (3 * (self.place[followers] - first)[:, None] + np.arange(3)).ravel()
         loose = (~supports.held[followers]).ravel().astype(float)
         scatter = sparse.csr_matrix((loose, (dofs, np.arange(len(dofs)))), shape=(3 * n_kept, len(dofs)))
@@ -315,7 +301,7 @@ def order_structure(
     ones = np.ones(np.count_nonzero(both), dtype=np.int8)
     couplings = sparse.csr_matrix((ones, (rows[both], columns[both])), shape=(len(free), len(free)))
     bound = [pairs] if ties is None else [pairs, ties]
-    nodes = [part for each in bound for part in (each.moving, each.opposite.indices)]
+    nodes = [part for each in bound for part in (each.moving, supports.opposite(each).indices // 3)]
     if supports.cut is not None and supports.keeps_cut:
         nodes += [supports.cut.left, supports.cut.right]
     involved = master[np.concatenate(nodes)]

@@ -32,6 +32,7 @@ class ContactSurfaces:
     friction_coefficient: of these surfaces; None where all pairs have the same.
     with_gaps: whether distances in the mesh are gaps of the joint. Otherwise they are errors of flat facets on curved
         surfaces, and the pairs touch.
+    clearance: gap of all pairs in place of the distances, m, negative for an interference; None for the distances.
     label: of the pairs; the names of both surfaces if empty.
     """
 
@@ -40,6 +41,7 @@ class ContactSurfaces:
     tolerance: float | None = None
     friction_coefficient: float | None = None
     with_gaps: bool = False
+    clearance: float | None = None
     label: str = ""
 
     @property
@@ -230,6 +232,13 @@ def _check_match(match: _Match, numbers: IntArray, facet: float) -> None:
         raise SceneError("contact", found, "leave them out of the surface")
 
 
+def _gaps(contact: ContactSurfaces, distance: FloatArray) -> FloatArray:
+    """Initial gaps (n,), m: the clearance that the model states, the distances of the mesh (n,), or none."""
+    if contact.clearance is not None:
+        return np.full_like(distance, contact.clearance)
+    return distance if contact.with_gaps else np.zeros_like(distance)
+
+
 def _pair(
     coordinates: FloatArray, numbers: IntArray, contact: ContactSurfaces, place: int, along: FloatArray
 ) -> ContactPairs:
@@ -269,7 +278,7 @@ def _pair(
         area=match.area,
         position=coordinates[nodes],
         distance=match.distance,
-        gap=match.distance if contact.with_gaps else np.zeros(n),
+        gap=_gaps(contact, match.distance),
         surface=np.full(n, place),
         moving_name=(match.moving.name,),
         opposite_name=(match.opposite.name,),

@@ -64,6 +64,15 @@ FACE_SHAPES = {
 """Element faces by their number of nodes."""
 
 _QUAD_POINTS = CORNERS[:4, :2] / np.sqrt(3.0)
+_GAUSS = np.polynomial.legendre.leggauss(3)
+_QUAD_RULE = np.stack(np.meshgrid(_GAUSS[0], _GAUSS[0]), axis=-1).reshape(-1, 2), np.outer(_GAUSS[1], _GAUSS[1]).ravel()
+# of the square, its side eta = 1 drawn together to a corner: exact to the fourth degree
+_TRIANGLE_RULE = (
+    np.stack(
+        [(1.0 + _QUAD_RULE[0][:, 0]) * (1.0 - _QUAD_RULE[0][:, 1]) / 4.0, (1.0 + _QUAD_RULE[0][:, 1]) / 2.0], axis=1
+    ),
+    _QUAD_RULE[1] * (1.0 - _QUAD_RULE[0][:, 1]) / 8.0,
+)
 _THIRDS = np.full(3, 1.0 / 3.0)
 
 
@@ -143,9 +152,17 @@ class OuterFaces:
 
 
 def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray) -> Surface:
-    """Surface of faces of elements.
+    """Surface of faces of elements, as `loops_of_faces` has them."""
+    return _surface(mesh, name, *loops_of_faces(mesh, name, elements, faces))
 
-    elements (n_faces,): element numbers. faces (n_faces,): 1 to 6, the faces S1 to S6 of CalculiX and Abaqus.
+
+def loops_of_faces(
+    mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray
+) -> tuple[list[IntArray], list[IntArray]]:
+    """Nodes of faces, corners anticlockwise from outside, then mid-side nodes; and all nodes of their elements.
+
+    name: for messages. elements (n_faces,): element numbers. faces (n_faces,): 1 to 6, the faces S1 to S6 of CalculiX
+    and Abaqus.
 
     Raises SceneError where there is no such element or face.
     """
@@ -170,7 +187,19 @@ def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntA
     if left.any():
         number = elements[left][0]
         raise SceneError("contact", f"surface {name} names element {number}", "there is no such element")
-    return _surface(mesh, name, loops, behind)
+    return loops, behind
+
+
+def pressure_forces(coordinates: FloatArray, loops: list[IntArray], pressure: float) -> FloatArray:
+    """Consistent nodal forces (3 n_nodes,), N, of a pressure, Pa, into the body; faces as `loops_of_faces` has them."""
+    forces = np.zeros(coordinates.shape)
+    for size, shape in FACE_SHAPES.items():
+        own = np.array([loop for loop in loops if len(loop) == size], dtype=np.int64).reshape(-1, size)
+        points, weights = _TRIANGLE_RULE if size in (3, 6) else _QUAD_RULE
+        tangents = np.einsum("pna,fnj->fapj", shape.derivatives(points), coordinates[own])
+        outward = np.cross(tangents[:, 0], tangents[:, 1])
+        np.add.at(forces, own, -pressure * np.einsum("p,pn,fpj->fnj", weights, shape.values(points), outward))
+    return forces.ravel()
 
 
 def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:

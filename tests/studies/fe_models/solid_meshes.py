@@ -33,7 +33,7 @@ def block(kind, divisions, shape=lambda points: points, material=STEEL, part="",
     `shape` maps points (n, 3) of the unit cube into space; straight: mid-side nodes in the middle of straight edges.
     """
     reference, hexes = corner_grid(divisions)
-    if kind in ("C3D4", "C3D10"):
+    if kind in ("C3D4", "C3D10", "C3D10M"):
         elements = hexes[:, _TETS].reshape(-1, 4)
     elif kind in ("C3D6", "C3D15"):
         elements = hexes[:, _WEDGES].reshape(-1, 6)

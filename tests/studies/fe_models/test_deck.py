@@ -64,34 +64,29 @@ def test_steps(cubes):
         ("TOP", [15, 16, 17, 18], 1, 1, 0.0),
         ("TOP", [15, 16, 17, 18], 5, 6, 0.0),
     ]
-    static, frequency = cubes.steps
-    assert (static.kind, static.nlgeom, static.perturbation, static.contact_removed) == ("static", True, False, ())
-    (load,) = static.centrifugal
+    (load,) = cubes.centrifugal
     assert (load.name, load.elements.tolist(), load.omega_squared) == ("ALL", [1, 2], 1e4)
     assert load.axis.tolist() == [0, 0, 1]
-    assert (frequency.kind, frequency.perturbation, frequency.boundaries_replaced) == ("frequency", True, True)
-    assert frequency.equations_removed
-    assert frequency.contact_removed == (("ABOVE", "UNDER"),)
-    assert frequency.parameters == {"SOLVER": "MATRIXSTORAGE"}
-    assert static.line == f"deck.inp, line {line_of('*STEP, NLGEOM')}"
+    assert cubes.gravity.tolist() == [0, 0, -9810]
+    (force,) = cubes.forces
+    assert (force.nodes.tolist(), force.dof, force.value) == ([15, 16, 17, 18], 3, -5.0)
 
 
-def test_what_is_not_read_is_said(cubes):
-    behavior = line_of("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD")
-    assert cubes.skipped == (
-        f"deck.inp, line {behavior}: *SURFACE BEHAVIOR",
-        f"deck.inp, line {line_of('*DLOAD')}: *DLOAD of type P1",
-    )
+def test_what_was_skipped_is_said(cubes):
+    text = f"deck.inp, line {line_of('*NODE PRINT, NSET=TOP')}: *NODE PRINT"
+    assert cubes.skipped == (text,)
+    assert cubes.remarks == (("skipped", text),)
 
 
 def test_part_and_instance(tmp_path):
     deck = read_deck(write(tmp_path, PART))
     # shifted by 10 along x, then turned by 90 degrees about the line x = 10, y = 0
     expected = [[10, 0, 0], [10, 1, 0], [9, 0, 0], [10, 0, 1], [9, 1, 1]]
-    np.testing.assert_allclose(deck.coordinates, expected, atol=1e-12)
+    np.testing.assert_allclose(deck.coordinates, [*expected, [5, 5, 5]], atol=1e-12)
     assert deck.node_sets["SET-1"].tolist() == [1, 3]
     assert deck.node_sets["BLOCK-1.SET-1"].tolist() == [1, 2, 3, 4, 5]
-    assert deck.node_sets["REFERENCE"].size == 0  # a point of the assembly, not node 1 of the part
+    assert deck.node_sets["REFERENCE"].tolist() == [11]  # a point of the assembly, not node 1 of the part
+    assert deck.notes == ("Node 1 of the assembly is node 11.",)
     assert deck.sections == (SolidSection("SET-1", "GREY IRON"),)
     assert deck.surfaces["FACE"].elements.tolist() == [1]
     assert deck.surfaces["OTHER"].elements.tolist() == [2]
@@ -120,8 +115,8 @@ def test_included_files(tmp_path):
         np.testing.assert_array_equal(deck.coordinates, whole.coordinates)
         assert [held(item) for item in deck.boundaries] == [held(item) for item in whole.boundaries]
         assert deck.node_sets["NALL"].tolist() == whole.node_sets["NALL"].tolist()
-        line = line_of("*STEP, NLGEOM") - line_of("*Element, type=C3D8I, elset=Lower") + 1
-        assert deck.steps[0].line == f"rest.inp, line {line}"
+        line = line_of("*NODE PRINT, NSET=TOP") - line_of("*Element, type=C3D8I, elset=Lower") + 1
+        assert deck.skipped == (f"rest.inp, line {line}: *NODE PRINT",)
 
 
 @pytest.mark.parametrize(
@@ -140,4 +135,4 @@ def test_case_line_ends_and_blanks_do_not_matter(tmp_path, cubes, text):
     np.testing.assert_array_equal(deck.coordinates, cubes.coordinates)
     assert deck.node_sets.keys() == cubes.node_sets.keys()
     assert deck.contact_pairs == cubes.contact_pairs
-    assert [step.kind for step in deck.steps] == ["static", "frequency"]
+    assert len(deck.centrifugal) == len(deck.skipped) == 1

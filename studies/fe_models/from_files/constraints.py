@@ -1,0 +1,272 @@
+"""Held displacements and linear constraints of a deck, SI: boundary conditions, equations and rigid motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from solver.model import BoolArray, FloatArray, IntArray
+from studies.fe_models.deck.mesh import Deck, Equation, RigidMotion, Transform
+from studies.fe_models.units import Units
+from studies.finite_element.joint.constraints import Constraints, Dependence, eliminate
+from studies.scene_error import SceneError
+
+_ROUND_OFF = 1e-9  # of a direction
+
+
+@dataclass(frozen=True)
+class Supported:
+    """What holds and joins the nodes.
+
+    held (n, 3): displacements that are 0 or follow others; nodes of the model, then those without elements.
+    extra (m,): numbers of these. constraints: None where no displacement follows others.
+    own (n, 3): displacements that are 0 by a boundary condition. references: rows of nodes without elements.
+    forces (3 n,): constant nodal forces, N.
+    """
+
+    held: BoolArray
+    extra: IntArray
+    constraints: Constraints | None
+    own: BoolArray
+    forces: FloatArray
+    references: Mapping[int, int]
+
+
+def find_constraints(
+    deck: Deck, numbers: IntArray, clamped: BoolArray | None, units: Units, cut: IntArray
+) -> Supported:
+    """Held displacements, constraints and nodal forces of a deck.
+
+    Parameters
+    ----------
+    deck
+        In units of the file.
+    numbers
+        (n_nodes,): nodes of the model, in any order.
+    clamped
+        (n_nodes, 3): displacements that the study holds in place of the deck's boundary conditions; None of none.
+    units
+        Of the file.
+    cut
+        Rows of nodes on cut faces.
+
+    Raises
+    ------
+    SceneError
+        Where a displacement depends on others and is held, depends twice, or nodes are missing.
+    """
+    return _Builder(deck, numbers, units, set(cut.tolist())).build(clamped)
+
+
+@dataclass
+class _Builder:
+    """Nodes of the model and those beside it: reference nodes, their rotations, and nodes in their own directions."""
+
+    deck: Deck
+    numbers: IntArray
+    units: Units
+    cut: set[int]
+    oblique: dict[int, FloatArray] = field(default_factory=dict)
+    extra: list[int] = field(default_factory=list)
+    rows: dict[tuple[str, int], int] = field(default_factory=dict)
+    entries: list[tuple[IntArray, IntArray, IntArray, FloatArray, str]] = field(default_factory=list)
+
+    def build(self, clamped: BoolArray | None) -> Supported:
+        deck = self.deck
+        self.order = np.argsort(self.numbers)
+        self.first_terms = {int(equation.nodes[0]) for equation in deck.equations}
+        self.frames = {int(node): each for each in deck.transforms for node in each.nodes}
+        for motion in deck.rigid_motions:
+            self._rigid(motion)
+        for equation in deck.equations:
+            for node in equation.nodes:
+                self._row(int(node), equation.place)
+        held: set[int] = set()
+        if clamped is not None:
+            held = set(np.flatnonzero(clamped.ravel()).tolist())
+        else:
+            self._hold(held)
+        for equation in deck.equations:
+            self._equation(equation)
+        forces = np.zeros(3 * (len(self.numbers) + len(self.extra)))
+        for dof, value in self._forces():
+            forces[dof] += value
+        own: BoolArray = np.isin(np.arange(len(forces)), list(held)).reshape(-1, 3)
+        extra = np.array(self.extra, dtype=np.int64)
+        references = {number: row for (kind, number), row in self.rows.items() if kind == "node"}
+        if not self.entries and not self.oblique:
+            return Supported(own, extra, None, own.copy(), forces, references)
+        everything = np.concatenate([self.numbers, extra])
+        constraints, fixed = eliminate(self._dependence(), own, self.oblique, everything, len(self.numbers))
+        return Supported(fixed, extra, constraints, own, forces, references)
+
+    def _dependence(self) -> Dependence:
+        if not self.entries:
+            nothing = np.empty(0, dtype=np.int64)
+            return Dependence(nothing, nothing, nothing, np.empty(0), nothing, ())
+        counts = [len(dependent) for dependent, *_ in self.entries]
+        starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
+        return Dependence(
+            dependent=np.concatenate([each[0] for each in self.entries]),
+            row=np.concatenate([start + each[1] for start, each in zip(starts, self.entries, strict=True)]),
+            column=np.concatenate([each[2] for each in self.entries]),
+            value=np.concatenate([each[3] for each in self.entries]),
+            origin=np.repeat(np.arange(len(counts)), counts),
+            origins=[each[4] for each in self.entries],
+        )
+
+    def _row(self, number: int, place: str) -> int:
+        """Row of a node; one without elements is added. Raises SceneError where it does not exist."""
+        at = min(int(np.searchsorted(self.numbers, number, sorter=self.order)), len(self.numbers) - 1)
+        if self.numbers[self.order[at]] == number:
+            return int(self.order[at])
+        if not np.isin(number, self.deck.node_numbers):
+            raise SceneError("model", f"{place}: there is no node {number}", "define it with *NODE")
+        return self._added("node", number)
+
+    def _added(self, kind: str, number: int) -> int:
+        if (kind, number) not in self.rows:
+            self.rows[kind, number] = len(self.numbers) + len(self.extra)
+            self.extra.append(number)
+        return self.rows[kind, number]
+
+    def _turn(self, motion: RigidMotion) -> int:
+        """Row of the rotations of a reference node."""
+        if motion.rotation:
+            return self._row(motion.rotation, motion.place)
+        return self._added("turn", motion.reference)
+
+    def _rigid(self, motion: RigidMotion) -> None:
+        """`u = u_reference + theta x arm` for each node."""
+        nodes = np.array([self._row(int(node), motion.place) for node in motion.nodes])
+        partly = [node for node in motion.nodes if int(node) in self.frames] if len(motion.dofs) < 3 else []
+        if partly:
+            found = f"{motion.place}: some dofs of node {partly[0]}, which has *TRANSFORM, follow"
+            raise SceneError("model", found, "let all of its dofs follow, or leave *TRANSFORM out")
+        reference = self._row(motion.reference, motion.place)
+        directions = np.array(motion.dofs) - 1
+        dependent = (3 * nodes[:, None] + directions).ravel()
+        rows = np.arange(len(dependent))
+        parts = [(rows, 3 * reference + np.tile(directions, len(nodes)), np.ones(len(rows)))]
+        if motion.turns:
+            turn = self._turn(motion)
+            deck = self.deck
+            places = deck.coordinates[deck.rows_of_nodes(np.append(motion.nodes, motion.reference))]
+            arms = (places[:-1] - places[-1]) * self.units.length
+            for k in range(3):  # theta_k e_k x arm
+                parts.append(
+                    (rows, np.full(len(rows), 3 * turn + k), np.cross(np.eye(3)[k], arms)[:, directions].ravel())
+                )
+        row, column, value = (np.concatenate(each) for each in zip(*parts, strict=True))
+        self.entries.append((dependent, row, column, value, motion.place))
+
+    def _hold(self, held: set[int]) -> None:
+        """Boundary conditions, those of nodes with directions of their own in these. Raises SceneError."""
+        wanted: dict[int, set[int]] = {}
+        for boundary in self.deck.boundaries:
+            first, last = max(boundary.first_dof, 1), min(boundary.last_dof, 6)
+            if first <= min(last, 3) and boundary.value != 0.0:
+                found = f"{boundary.place or self.deck.path}: *BOUNDARY moves {boundary.name} by {boundary.value:g}"
+                raise SceneError("clamp", found, "hold it, or give `clamp`")
+            for node in boundary.nodes:
+                wanted.setdefault(int(node), set()).update(range(first, last + 1))
+        turns = {motion.reference: self._turn(motion) for motion in self.deck.rigid_motions if motion.turns}
+        inside = set(self.numbers.tolist()) | {number for kind, number in self.rows if kind == "node"}
+        for node, dofs in wanted.items():
+            if node in inside:
+                held.update(self._held(node, sorted(dof - 1 for dof in dofs if dof <= 3)))
+            if node in turns:
+                held.update(3 * turns[node] + dof - 4 for dof in dofs if dof > 3)
+
+    def _held(self, node: int, local: list[int]) -> list[int]:
+        """Displacements that are 0 where those along some directions of a node are."""
+        row = self._row(node, "")
+        if node not in self.frames:
+            return [3 * row + k for k in local]
+        frame = self._frame(node)
+        across = frame[local].T @ frame[local]
+        straight = np.abs(across - np.diag(np.round(np.diag(across)))).max() < _ROUND_OFF
+        if straight and not (row in self.cut and 0 < len(local) < 3):
+            return [3 * row + int(k) for k in np.flatnonzero(np.round(np.diag(across)))]
+        if node in self.first_terms:
+            return [3 * self._localised(node) + k for k in local]
+        self.oblique[row] = across
+        return []
+
+    def _localised(self, node: int) -> int:
+        """Row of a node in its own directions, on which the node of the model depends."""
+        new = ("local", node) not in self.rows
+        row, own = self._added("local", node), self._row(node, "")
+        if new:
+            frame = self._frame(node)
+            rows, columns = np.divmod(np.arange(9), 3)
+            place = self.frames[node].place
+            self.entries.append((3 * own + np.arange(3), rows, 3 * row + columns, frame.T.ravel(), place))
+        return row
+
+    def _frame(self, node: int) -> FloatArray:
+        """Directions (3, 3) of the dofs 1 to 3 of a node, one a row."""
+        transform = self.frames.get(node)
+        if transform is None:
+            return np.eye(3)
+        place = self.deck.coordinates[self.deck.rows_of_nodes(np.array([node]))][0]
+        return _directions(transform, place, node)
+
+    def _equation(self, equation: Equation) -> None:
+        """The first term from the others."""
+        terms: list[tuple[int, float]] = []
+        for at, (node, dof, value) in enumerate(zip(equation.nodes, equation.dofs, equation.coefficients, strict=True)):
+            row, number = self._row(int(node), equation.place), int(node)
+            if dof > 3:
+                row = self.rows.get(("turn", number), -1)
+                if row < 0 or dof > 6:
+                    found = f"{equation.place}: node {number} has no dof {dof}"
+                    raise SceneError("model", found, "give displacements 1 to 3, or the rotation of a reference node")
+                terms.append((3 * row + int(dof) - 4, value * self.units.length))
+                continue
+            direction = self._frame(number)[dof - 1]
+            axis = int(np.argmax(np.abs(direction)))
+            if abs(direction[axis]) > 1.0 - _ROUND_OFF and ("local", number) not in self.rows:
+                terms.append((3 * row + axis, value * float(np.sign(direction[axis]))))
+            elif at == 0 or ("local", number) in self.rows:
+                terms.append((3 * self._localised(number) + int(dof) - 1, float(value)))
+            else:
+                terms += [(3 * row + k, float(value * direction[k])) for k in range(3)]
+        (dependent, first), others = terms[0], terms[1:]
+        columns = np.array([dof for dof, _ in others], dtype=np.int64)
+        values = np.array([-value / first for _, value in others])
+        rows = np.zeros(len(others), dtype=np.int64)
+        self.entries.append((np.array([dependent]), rows, columns, values, equation.place))
+
+    def _forces(self) -> Iterator[tuple[int, float]]:
+        """Displacement and force, N, of each component; the unit of force has that of mass times length."""
+        newton = self.units.mass * self.units.length
+        inside = set(self.numbers.tolist()) | {number for kind, number in self.rows if kind == "node"}
+        for force in self.deck.forces:
+            for node in force.nodes:
+                if int(node) not in inside or force.dof > 3:
+                    if force.value == 0.0:
+                        continue
+                    found = f"{force.place}: node {node} has no dof {force.dof}"
+                    raise SceneError("model", found, "give forces on nodes of elements, or of reference nodes")
+                for k, share in enumerate(self._frame(int(node))[force.dof - 1]):
+                    if share:
+                        yield 3 * self._row(int(node), force.place) + k, newton * force.value * float(share)
+
+
+def _directions(transform: Transform, place: FloatArray, node: int) -> FloatArray:
+    """Unit vectors (3, 3), one a row, of the displacements 1 to 3 of a node at a place (3,)."""
+    start, end = transform.points
+    if not transform.cylindrical:
+        third = np.cross(start, end)
+        frame = np.stack([start, np.cross(third, start), third])
+    else:
+        axis = (end - start) / np.linalg.norm(end - start)
+        radial = place - start - ((place - start) @ axis) * axis
+        if not np.linalg.norm(radial) > _ROUND_OFF * np.linalg.norm(end - start):
+            found = f"{transform.place}: node {node} is on the axis"
+            raise SceneError("model", found, "take it out of the set: it has no radial direction")
+        frame = np.stack([radial, np.cross(axis, radial), axis])
+    return np.asarray(frame / np.linalg.norm(frame, axis=1, keepdims=True))

@@ -1,0 +1,144 @@
+"""Decks of two blocks in contact with what tests add to them, their glued frequencies, and those of CalculiX."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from studies.fe_models.deck.read import read_deck
+from studies.fe_models.from_files.model import find_files, load_model
+from studies.fe_models.from_files.parameters import Parameters
+from studies.finite_element.reduced_joint import glued_frequencies, prepare_model
+from tests.studies.fe_models.decks import write
+from tests.studies.fe_models.solid_meshes import run_ccx
+
+FULL_MODEL = Path(__file__).parent / "full_model.inp"
+"""A deck of two parts in one sector of twelve, with a coupling, equations and cylindrical directions."""
+
+
+def _block(first, height, x_0=0.0):
+    """Nodes and elements of 4 by 2 by 1 hexahedra, 40 mm long and 10 mm wide, at a height."""
+    grid = [(x, y, z) for z in range(2) for y in range(3) for x in range(5)]
+    number = {place: first + n for n, place in enumerate(grid)}
+    nodes = [f"{number[x, y, z]}, {x_0 + 10 * x}, {5 * y}, {height + 5 * z}" for x, y, z in grid]
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    cells = [(x, y) for y in range(2) for x in range(4)]
+    elements = [
+        f"{first + n}, " + ", ".join(str(number[x + a, y + b, c]) for a, b, c in corners)
+        for n, (x, y) in enumerate(cells)
+    ]
+    return nodes, elements
+
+
+_LOWER, _UPPER = _block(1, 0), _block(101, 5)
+
+BLOCKS = "\n".join(
+    [
+        *("*NODE, NSET=ALLN", *_LOWER[0], *_UPPER[0]),
+        *("*ELEMENT, TYPE=C3D8, ELSET=ELOW", *_LOWER[1], "*ELEMENT, TYPE=C3D8, ELSET=EUP", *_UPPER[1]),
+        *("*ELSET, ELSET=EALL1", "ELOW, EUP", "*NSET, NSET=XF", "1, 6, 11, 16, 21, 26", "*NSET, NSET=XM", "5, 10, 15"),
+        *("*NSET, NSET=XE", "5, 10, 15, 20, 25, 30", "*NSET, NSET=TIP", "119, 124, 129"),
+        *("*MATERIAL, NAME=STEEL", "*ELASTIC", "210000., 0.3", "*DENSITY", "7.85E-9"),
+        *("*SOLID SECTION, ELSET=EALL1, MATERIAL=STEEL", "*SURFACE, NAME=SLOW", "ELOW, S2", "*SURFACE, NAME=SUP"),
+        *("EUP, S1", "*SURFACE, NAME=SE", "4, S4", "8, S4", "*SURFACE INTERACTION, NAME=SI", "*FRICTION", "0.4"),
+        *("*CONTACT PAIR, INTERACTION=SI", "SUP, SLOW", "*BOUNDARY", "XF, 1, 3", ""),
+    ]
+)
+"""Two blocks of 40 by 10 by 5 mm on each other, the lower one held at its left end."""
+
+
+def _ring(first, inner, outer):
+    """Nodes and elements of a sector of 30 degrees, 10 mm high, between two radii."""
+    angles, grid = np.radians([-15, -5, 5, 15]), [(r, j, k) for k in range(3) for j in range(4) for r in range(2)]
+    number = {place: first + n for n, place in enumerate(grid)}
+    nodes = []
+    for r, j, k in grid:
+        x, y = (outer if r else inner) * np.array([np.cos(angles[j]), np.sin(angles[j])])
+        nodes.append(f"{number[r, j, k]}, {x:.12g}, {y:.12g}, {5 * k}")
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    cells = [(j, k) for k in range(2) for j in range(3)]
+    elements = [
+        f"{first + n}, " + ", ".join(str(number[a, j + b, k + c]) for a, b, c in corners)
+        for n, (j, k) in enumerate(cells)
+    ]
+    return nodes, elements
+
+
+_DISK, _RIM = _ring(1, 20, 25), _ring(101, 25, 30)
+
+SECTORS = "\n".join(
+    [
+        *("*NODE", *_DISK[0], *_RIM[0], "*ELEMENT, TYPE=C3D8, ELSET=EI", *_DISK[1], "*ELEMENT, TYPE=C3D8, ELSET=EO"),
+        *(*_RIM[1], "*ELSET, ELSET=EALL1", "EI, EO", "*NSET, NSET=TIP", "102, 104, 106, 108, 110, 112, 114, 116"),
+        *("*NSET, NSET=BORE, GENERATE", "1, 23, 2", "*NSET, NSET=INSIDE", "3, 5, 7, 11, 13, 15, 19, 21, 23"),
+        *("*MATERIAL, NAME=STEEL", "*ELASTIC", "210000., 0.3", "*DENSITY", "7.85E-9"),
+        *("*SOLID SECTION, ELSET=EALL1, MATERIAL=STEEL", "*SURFACE, NAME=SIN", "EI, S4", "*SURFACE, NAME=SOUT"),
+        *("EO, S6", "*SURFACE, NAME=LI, TYPE=NODE", "1,", "2,", "9,", "10,", "17,", "18,"),
+        *("*SURFACE, NAME=RI, TYPE=NODE", "7,", "8,", "15,", "16,", "23,", "24,"),
+        *("*SURFACE, NAME=LO, TYPE=NODE", "101,", "102,", "109,", "110,", "117,", "118,"),
+        *("*SURFACE, NAME=RO, TYPE=NODE", "107,", "108,", "115,", "116,", "123,", "124,"),
+        *("*TIE, CYCLIC SYMMETRY, NAME=CI, POSITION TOLERANCE=0.1", "LI, RI"),
+        *("*TIE, CYCLIC SYMMETRY, NAME=CO, POSITION TOLERANCE=0.1", "LO, RO"),
+        *("*CYCLIC SYMMETRY MODEL, N=12, TIE=CI, NGRAPH=1", "0., 0., 0., 0., 0., 1."),
+        *("*CYCLIC SYMMETRY MODEL, N=12, TIE=CO, NGRAPH=1", "0., 0., 0., 0., 0., 1."),
+        *("*SURFACE INTERACTION, NAME=SI", "*FRICTION", "0.3", "*CONTACT PAIR, INTERACTION=SI", "SOUT, SIN", ""),
+    ]
+)
+"""A disk and a rim on it, each a sector of twelve with cut faces of its own; nothing is held."""
+
+
+def prepared_deck(folder, text, nodal_diameter=0, **given):
+    """The model of a deck, ready for its reduction."""
+    write(folder, text)
+    load = {"set": "TIP", "direction": (0, 1, 0)}
+    parameters = Parameters(units="mm-t-s", load=load, nodal_diameter=nodal_diameter, **given)
+    loaded = load_model(find_files(folder, "deck.inp", parameters), parameters)
+    return prepare_model(loaded.model, loaded.joint), loaded
+
+
+def frequencies(folder, text, nodal_diameter=0, **given):
+    """The four lowest glued frequencies of a deck, Hz."""
+    return glued_frequencies(prepared_deck(folder, text, nodal_diameter, **given)[0], nodal_diameter, 4)
+
+
+def run_tied(folder, text, step):
+    """Runs CalculiX on a deck whose contact pairs are glued, as "job"."""
+    contact = r"\*SURFACE INTERACTION.*?\n\*CONTACT PAIR[^\n]*\n([^\n]*)\n"
+    tied = re.sub(contact, r"*TIE, NAME=GLUE, POSITION TOLERANCE=0.1\n\1\n", text, flags=re.DOTALL)
+    run_ccx(folder, (tied + step).split("\n"), "job")
+
+
+def of_calculix(folder, text, step="*STEP\n*FREQUENCY\n4\n*END STEP\n", every=1):
+    """Those that CalculiX finds, where contact pairs are glued. every: of how many equal ones one is taken."""
+    run_tied(folder, text, step)
+    number = r"(-?\d\.\d+E[+-]\d+)"
+    table = (folder / "job.dat").read_text()
+    rows = re.findall(rf"^ +\d+ +(?:\d+ +)?{number} +{number} +{number} +{number} *$", table, re.MULTILINE)
+    return np.array([float(row[2]) for row in rows])[: 4 * every : every]
+
+
+def flat_full_model():
+    """FULL_MODEL without instances, for CalculiX: it holds no node that follows its image."""
+    deck = read_deck(FULL_MODEL)
+    places = zip(deck.node_numbers, deck.coordinates, strict=True)
+    lines = ["*NODE", *(f"{n}, {x:.14g}, {y:.14g}, {z:.14g}" for n, (x, y, z) in places)]
+    lines.append("*ELEMENT, TYPE=C3D8, ELSET=EALL1")
+    for block in deck.blocks:
+        rows = zip(block.numbers, block.nodes.tolist(), strict=True)
+        lines += [f"{n}, {', '.join(map(str, nodes))}" for n, nodes in rows]
+    for name, of_deck in (("SUP", "B.INSIDE"), ("SLOW", "D.OUTSIDE"), ("SE", "TIPFACE")):
+        faces = deck.surfaces[of_deck]
+        lines += [f"*SURFACE, NAME={name}", *(f"{e}, S{f}" for e, f in zip(faces.elements, faces.faces, strict=True))]
+    for name in ("LOWS", "HIGHS"):
+        lines += [f"*SURFACE, NAME={name}, TYPE=NODE", *(f"{n}," for n in deck.surfaces[name].nodes)]
+    alone = np.setdiff1d(deck.node_sets["BORE"], deck.surfaces["LOWS"].nodes)
+    lines += ["*NSET, NSET=BORE", *(f"{n}," for n in alone), "*TIE, NAME=G, POSITION TOLERANCE=0.1", "SUP, SLOW"]
+    lines += ["*TIE, CYCLIC SYMMETRY, NAME=CUT, POSITION TOLERANCE=0.1", "LOWS, HIGHS"]
+    lines += ["*CYCLIC SYMMETRY MODEL, N=12, TIE=CUT, NGRAPH=1", "0, 0, 0, 0, 0, 1"]
+    lines += [f"*COUPLING, CONSTRAINT NAME=C, REF NODE={deck.node_sets['TIP'][0]}, SURFACE=SE", "*KINEMATIC", "1, 3"]
+    for each in deck.equations:
+        terms = zip(each.nodes, each.dofs, each.coefficients, strict=True)
+        lines += ["*EQUATION", str(len(each.nodes)), ", ".join(f"{n}, {dof}, {value:g}" for n, dof, value in terms)]
+    lines += ["*TRANSFORM, NSET=BORE, TYPE=C", "0, 0, 0, 0, 0, 1", "*BOUNDARY", "BORE, 2, 3", "*MATERIAL, NAME=S"]
+    lines += ["*ELASTIC", "210000., 0.3", "*DENSITY", "7.85E-9", "*SOLID SECTION, ELSET=EALL1, MATERIAL=S", ""]
+    return "\n".join(lines)

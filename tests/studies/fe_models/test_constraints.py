@@ -1,0 +1,221 @@
+"""Linear constraints and directions of a deck: against CalculiX, and against other ways to say the same."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from studies.finite_element.reduced_joint import glued_frequencies
+from studies.scene_error import SceneError
+from tests.studies.fe_models.constrained_decks import (
+    BLOCKS,
+    FULL_MODEL,
+    SECTORS,
+    flat_full_model,
+    frequencies,
+    of_calculix,
+    prepared_deck,
+    run_tied,
+)
+
+REFERENCE = "*NODE\n900, 45., 5., 0.\n"
+STATIC = "*STEP\n*STATIC\n*DLOAD\nEALL1, CENTRIF, 1e7, -100., 0., 0., 0., 0., 1.\n*END STEP\n"
+BOTH_READ = {
+    "equations that depend on each other": "*EQUATION\n2\n5,3,1.,15,3,1.\n*EQUATION\n3\n15,3,1.,10,3,-.5,3,3,.25\n"
+    "2\n5,2,1.,3,2,1.\n",
+    "rigid line": f"{REFERENCE}*RIGID BODY, NSET=XM, REF NODE=900\n",
+    "rigid end with nodes in contact": f"{REFERENCE}*RIGID BODY, NSET=XE, REF NODE=900\n",
+    "rigid elements": f"{REFERENCE}*ELSET, ELSET=RB\n4\n*RIGID BODY, ELSET=RB, REF NODE=900\n",
+    "rigid body that cannot turn about two axes": f"{REFERENCE}901, 45, 5, 0\n"
+    "*RIGID BODY, NSET=XE, REF NODE=900, ROT NODE=901\n*BOUNDARY\n901, 1, 2\n900, 3\n",
+    "two rigid lines in one equation": f"{REFERENCE}901, 3, 5, 9\n*NSET, NSET=X2\n116, 121, 126\n"
+    "*RIGID BODY, NSET=XM, REF NODE=900\n*RIGID BODY, NSET=X2, REF NODE=901\n*EQUATION\n2\n900,3,1.,901,3,-1.\n",
+    "coupling": f"{REFERENCE}*COUPLING, REF NODE=900, SURFACE=SE, CONSTRAINT NAME=C\n*KINEMATIC\n1, 3\n",
+    "coupling of some dofs": f"{REFERENCE}*COUPLING, REF NODE=900, SURFACE=SE, CONSTRAINT NAME=C\n*KINEMATIC\n1\n3\n",
+    "rectangular directions": "*TRANSFORM, NSET=XM, TYPE=R\n1., 1., 0.3, -1., 1., 0.\n*BOUNDARY\nXM, 1\n",
+    "cylindrical directions": "*TRANSFORM, NSET=XM, TYPE=C\n-20., -30., 0., -19., -30., 4.\n*BOUNDARY\nXM, 1, 2\n",
+    "directions of nodes in contact": "*NSET, NSET=XO\n20, 25, 30\n*TRANSFORM, NSET=XO, TYPE=C\n"
+    "-20., -30., 0., -20., -30., 1.\n*BOUNDARY\nXO, 1\n",
+    "equations along such directions": "*TRANSFORM, NSET=XM, TYPE=C\n-20., -30., 0., -20., -30., 1.\n"
+    "*EQUATION\n2\n5,1,1.,10,1,-1.\n3\n15,2,1.,10,2,-1.,3,1,0.5\n",
+}
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+@pytest.mark.parametrize("name", BOTH_READ)
+def test_as_calculix(name, tmp_path):
+    text = BLOCKS + BOTH_READ[name]
+    np.testing.assert_allclose(frequencies(tmp_path, text), of_calculix(tmp_path, text), rtol=1e-6)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+def test_rigid_body_whose_surface_would_move(tmp_path):
+    """Of meshes that are alike the nodes of the other surface move."""
+    text = BLOCKS.replace("1, 6, 11, 16, 21, 26", "1, 6, 11, 2, 7, 12")
+    text += f"{REFERENCE}*RIGID BODY, ELSET=EUP, REF NODE=900\n"
+    expected = of_calculix(tmp_path, text.replace("\nSUP, SLOW\n", "\nSLOW, SUP\n"))
+    prepared, loaded = prepared_deck(tmp_path, text)
+    assert prepared.pairs.moving_name == ("SLOW",)
+    assert loaded.joint.contacts[0].name == "SUP-SLOW"
+    np.testing.assert_allclose(glued_frequencies(prepared, 0, 4), expected, rtol=1e-6)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+def test_prestress_of_a_constrained_structure_as_calculix(tmp_path):
+    text = BLOCKS + BOTH_READ["rigid line"] + STATIC
+    expected = of_calculix(tmp_path, text, "*STEP, PERTURBATION\n*FREQUENCY\n4\n*END STEP\n")
+    np.testing.assert_allclose(frequencies(tmp_path, text), expected, rtol=1e-6)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+@pytest.mark.parametrize("name", ["rigid end with nodes in contact", "cylindrical directions"])
+def test_constraints_on_matrices_of_calculix(name, tmp_path):
+    """They are written without constraints, which the deck still has."""
+    text = BLOCKS + BOTH_READ[name]
+    removed = "*STEP\n*BOUNDARY, OP=NEW\n*EQUATION, REMOVE ALL\n*FREQUENCY, SOLVER=MATRIXSTORAGE, CYCMPC=INACTIVE\n"
+    run_tied(tmp_path, text, f"*STEP\n*STATIC\n*END STEP\n{removed}*END STEP\n")
+    own = frequencies(tmp_path, text, matrices="job")
+    np.testing.assert_allclose(own, frequencies(tmp_path, text), rtol=1e-8)
+
+
+SAME = {
+    "PIN": (
+        "*MPC\nPIN, 5, 15\nTIE, 10, 3\n",
+        "".join(f"*EQUATION\n2\n{a},{k},1.,{b},{k},-1.\n" for a, b in ((5, 15), (10, 3)) for k in (1, 2, 3)),
+    ),
+    "BEAM keeps a distance": ("*MPC\nBEAM, 5, 18\n", "*EQUATION\n4\n5,1,20.,5,3,-5.,18,1,-20.,18,3,5.\n"),
+    "BEAM of a set": ("*MPC\nBEAM, XM, 3\n", "*RIGID BODY, NSET=XM, REF NODE=3\n"),
+    "sets in an equation": (
+        "*NSET, NSET=P\n4, 5\n*NSET, NSET=Q\n14, 15\n*EQUATION\n2\nP,1,1.,Q,1,-1.\n",
+        "*EQUATION\n2\n4,1,1.,14,1,-1.\n2\n5,1,1.,15,1,-1.\n",
+    ),
+    "KINEMATIC COUPLING": (
+        f"{REFERENCE}*KINEMATIC COUPLING, REF NODE=900\nXM, 1, 6\n",
+        f"{REFERENCE}*RIGID BODY, NSET=XM, REF NODE=900\n",
+    ),
+    "rotations of the reference node": (
+        f"{REFERENCE}*RIGID BODY, NSET=XE, REF NODE=900\n*BOUNDARY\n900, 4, 5\n",
+        f"{REFERENCE}901, 9, 9, 9\n*RIGID BODY, NSET=XE, REF NODE=900, ROT NODE=901\n*BOUNDARY\n901, 1, 2\n",
+    ),
+    "a reference node that is held": (
+        f"{REFERENCE}*RIGID BODY, NSET=XE, REF NODE=900\n*BOUNDARY\n900, 1, 6\n",
+        "*BOUNDARY\nXE, 1, 3\n",
+    ),
+    "axes that are turned": (
+        "*TRANSFORM, NSET=XE, TYPE=R\n0, 1, 0, -1, 0, 0\n*BOUNDARY\nXE, 1\n",
+        "*BOUNDARY\nXE, 2\n",
+    ),
+    "all directions": (
+        "*TRANSFORM, NSET=XE, TYPE=C\n-20, -30, 0, 0, 0, 1\n*BOUNDARY\nXE, 1, 3\n",
+        "*BOUNDARY\nXE, 1, 3\n",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SAME)
+def test_two_ways_to_say_the_same(name, tmp_path):
+    one, other = (frequencies(tmp_path, BLOCKS + text) for text in SAME[name])
+    np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
+def test_forces_of_the_deck_and_gravity(tmp_path):
+    """Along directions of the nodes, on a reference node, and of all mass: equal to forces that are given otherwise."""
+    turned = "*TRANSFORM, NSET=XM, TYPE=R\n0, 1, 0, -1, 0, 0\n"
+    step = "*STEP\n*STATIC\n*CLOAD\nXM, 1, 5.\n*DLOAD\nEALL1, GRAV, 9810., 0., 0., -1.\n*END STEP\n"
+    prepared, _ = prepared_deck(tmp_path, BLOCKS + turned + step)
+    other, _ = prepared_deck(tmp_path, BLOCKS, preload=({"set": "XM", "direction": (0, 1, 0), "force": 15.0},))
+    weight = np.zeros((len(other.weight), 3))
+    weight[:, 2] = -9.81 * other.weight
+    np.testing.assert_allclose(prepared.static_load, other.static_load + weight.ravel(), atol=1e-12)
+    # a pressure of 2 MPa on 40 by 10 mm, by elements and by a surface
+    under = "*SURFACE, NAME=UNDER\nELOW, S1\n*STEP\n*STATIC\n"
+    pressed = [
+        prepared_deck(tmp_path, f"{BLOCKS}{under}{load}\n*END STEP\n")[0].static_load
+        for load in ("*DLOAD\nELOW, P1, 2.", "*DSLOAD\nUNDER, P, 2.")
+    ]
+    np.testing.assert_array_equal(*pressed)
+    np.testing.assert_allclose(pressed[0].reshape(-1, 3).sum(axis=0), [0.0, 0.0, 800.0], atol=1e-9)
+    # a force on the reference node is one on those that follow
+    coupling = BLOCKS + "*NODE\n900, 40., 5., 2.5\n*RIGID BODY, NSET=XE, REF NODE=900\n*STEP\n*STATIC\n*CLOAD\n"
+    moved = []
+    for force in ("900, 1, 6.", "XE, 1, 1."):
+        pulled, _ = prepared_deck(tmp_path, f"{coupling}{force}\n*END STEP\n")
+        moved.append(pulled.reduction.solve_static(pulled.static_load))
+    np.testing.assert_allclose(moved[0], moved[1], atol=1e-9 * abs(moved[0]).max())
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+@pytest.mark.parametrize("dofs", ["2, 3", "1"])
+def test_cylindrical_directions_on_cut_faces_as_calculix(dofs, tmp_path):
+    """The bore slides along its radius, or about the axis, in a sector at nodal diameter 3."""
+
+    def text(bore):
+        held = f"*BOUNDARY\n{bore}, {dofs}\n*BOUNDARY\n4, 1, 3\n"
+        return f"{SECTORS}*TRANSFORM, NSET={bore}, TYPE=C\n0., 0., 0., 0., 0., 1.\n{held}"
+
+    # CalculiX holds no node that follows its image, and has one cyclic symmetry
+    step = "*STEP\n*FREQUENCY\n8\n*SELECT CYCLIC SYMMETRY MODES, NMIN=3, NMAX=3\n*END STEP\n"
+    own = frequencies(tmp_path, text("BORE"), 3)
+    np.testing.assert_allclose(own, of_calculix(tmp_path, text("INSIDE"), step, every=2), rtol=1e-6)
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+def test_full_model_as_calculix(tmp_path):
+    """Two instances, a coupling, equations, cylindrical directions and cyclic symmetry, with prestress."""
+    static = "*STEP, NLGEOM\n*STATIC\n*DLOAD\nEALL1, CENTRIF, 1.E6, 0., 0., 0., 0., 0., 1.\n*END STEP\n"
+    select = "*STEP, PERTURBATION\n*FREQUENCY\n12\n*SELECT CYCLIC SYMMETRY MODES, NMIN=2, NMAX=2\n*END STEP\n"
+    expected = of_calculix(tmp_path, flat_full_model(), static + select, every=2)
+    np.testing.assert_allclose(frequencies(tmp_path, FULL_MODEL.read_text(), 2), expected, rtol=2e-5)
+
+
+def test_moving_nodes_that_are_held_obliquely(tmp_path):
+    """As in a plane of symmetry: nodes of both surfaces are held across it; whichever moves, the model is the same."""
+    turned = "*TRANSFORM, NSET=XO, TYPE=R\n1., 1., 0., -1., 1., 0.\n*BOUNDARY\nXO, 1\n"
+    held = f"*NSET, NSET=XO\n105, 110, 115, 20, 25, 30\n{turned}"
+    text = BLOCKS.replace("1, 6, 11, 16, 21, 26", "1, 6, 11, 2, 7, 12") + held
+    prepared, _ = prepared_deck(tmp_path, text)
+    assert prepared.pairs.present.sum(axis=0).tolist() == [15, 15, 12]
+    other, _ = prepared_deck(tmp_path, text.replace("\nSUP, SLOW\n", "\nSLOW, SUP\n"))
+    assert other.pairs.moving_name == ("SLOW",)
+    own, expected = (glued_frequencies(each, 0, 4) for each in (prepared, other))
+    np.testing.assert_allclose(own, expected, rtol=1e-9)
+    if shutil.which("ccx") is not None:
+        # of nodes that are tied CalculiX holds those of the other surface
+        alone = text.replace("115, 20, 25, 30", "115").replace("\nSUP, SLOW\n", "\nSLOW, SUP\n")
+        np.testing.assert_allclose(own, of_calculix(tmp_path, alone), rtol=1e-6)
+    for nodes in ("105, 110, 115", "115"):
+        with pytest.raises(SceneError, match=r"node 1\d5 of SUP is held in a direction in which the other"):
+            prepared_deck(tmp_path, text.replace("105, 110, 115, 20, 25, 30", nodes))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (
+            "*EQUATION\n2\n5,1,1.,15,1,-1.\n2\n5,1,1.,10,1,-1.\n",
+            r"\*EQUATION: displacement 1 of node 5 depends on others by",
+        ),
+        ("*EQUATION\n2\n1,1,1.,15,1,-1.\n", r"\*EQUATION: displacement 1 of node 1 depends on others and is held"),
+        (
+            "*EQUATION\n2\n5,1,1.,15,1,-1.\n2\n15,1,1.,5,1,1.\n",
+            r"\*EQUATION: displacements depend on each other in a circle",
+        ),
+        (
+            "*EQUATION\n2\n105,1,1.,15,1,-1.\n2\n20,1,1.,15,1,-1.\n",
+            r"\*EQUATION: node 105 depends on others and moves in a contact pair",
+        ),
+        ("*EQUATION\n2\n5,4,1.,15,1,-1.\n", r"\*EQUATION: node 5 has no dof 4"),
+        ("*TRANSFORM, NSET=XM, TYPE=C\n40,0,0,40,0,1\n*BOUNDARY\nXM,1\n", r"\*TRANSFORM: node 5 is on the axis"),
+        ("*BOUNDARY\nXM, 1, 1, 0.1\n", r"\*BOUNDARY moves XM by 0.1"),
+        ("*STEP\n*STATIC\n*DLOAD\nELOW, BX, 1.\n*END STEP\n", r"\*DLOAD of type BX is not read"),
+        ("*MPC\nPLANE, 5, 10, 15, 20, 30\n", r"\*MPC PLANE of 5 nodes is not read"),
+        (
+            "*TRANSFORM, NSET=XM, TYPE=R\n1,1,0,-1,1,0\n*BOUNDARY\nXM,1\n*RIGID BODY, NSET=XM, REF NODE=3\n",
+            r"\*RIGID BODY: displacement 1 of node 5 depends on others and is held",
+        ),
+    ],
+)
+def test_conflicts_are_refused(text, sentence, tmp_path):
+    with pytest.raises(SceneError, match=sentence) as wrong:
+        prepared_deck(tmp_path, BLOCKS + text)
+    assert "deck.inp, line " in str(wrong.value)
