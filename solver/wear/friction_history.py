@@ -3,8 +3,8 @@
 A pair that does not wear may slide all the same: the wear of other pairs changes its force, and at its friction limit
 it slides a little in each cycle. The place to which it comes depends on the way. A balance alone marches the law from
 the history before the step straight to the last period of the step: one slide for the whole way, in the direction of
-its end. This is an error of first order in the step that the local error of the depths does not show (dovetail, 16
-pairs, 212.6 Hz, `rtol` 1e-2: 1.8 % of the worn volume, with the way in parts 0.4 %).
+its end. This is an error of first order in the step that the local error of the depths does not show
+(dovetail, 16 pairs, 212.6 Hz, `rtol` 1e-2: 1.8 % of the worn volume, with the way in parts 0.4 %).
 
 Here the predicted force goes along a straight line from the state before the step to the extrapolated state, and the
 law is marched at each part of the line until the period repeats. This costs little beside a balance, which still slides
