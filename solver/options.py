@@ -25,10 +25,6 @@ class CommonOptions:
     times the value nonlinear modes are equal to 1e-9 and take up to 15 % longer."""
 
     # controlled steps of sweeps, on the slow time scale and over missions
-    step_error_fraction: float = 0.25
-    """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of
-    rtol. Dovetail, 16 pairs, 212.42 to 213 Hz, `rtol` 1e-2: errors of the worn volume up to 0.23 %, with 0.5 up to
-    0.5 % for a fifth less iterations."""
     step_safety: float = 0.85
     """Length of a step over the length with the allowed error, and the largest factor on a step that was refused."""
     largest_step_ratio: float = 2.0

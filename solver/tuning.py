@@ -17,16 +17,17 @@ from solver.accuracy.options import ACCURACY
 from solver.continuation.options import CONTINUATION
 from solver.loading_history.options import LOADING
 from solver.newton.options import NEWTON
-from solver.options import COMMON
 from solver.wear.options import WEAR
 
 _NAMES: tuple[tuple[Any, tuple[str, ...]], ...] = (
-    (COMMON, ("step_error_fraction",)),
     (NEWTON, ("iterations", "forcing", "most_directions")),
     (CONTINUATION, ("near_iterations", "search_iterations", "arc_correctors", "load_steps")),
     (ACCURACY, ("penetration_limit", "violation_limit", "refinement_work", "most_samples", "most_unknowns")),
     (LOADING, ("change_limits", "shortest_sweep_step", "sweep_iterations")),
-    (WEAR, ("history_iterations", "fold_resolution", "largest_moved_load", "steps_to_the_end")),
+    (
+        WEAR,
+        ("step_error_fraction", "history_iterations", "fold_resolution", "largest_moved_load", "steps_to_the_end"),
+    ),
 )
 TUNABLE: dict[str, Any] = {name: options for options, names in _NAMES for name in names}
 """For each constant that may be changed, the options to which it belongs."""

@@ -147,12 +147,16 @@ def _of_blocks(
     weighted = np.where(volumes > 0.0, errors * np.fmax(volumes, 1e-300), 0.0).sum(axis=1)
     whole, worn = volumes.sum(axis=1), growth.sum(axis=2)
     share = np.divide(worn[:, chosen].sum(axis=1), worn.sum(axis=1), out=np.ones(n), where=worn.sum(axis=1) > 0.0)
+    rate_error = np.divide(weighted, whole, out=np.zeros_like(whole), where=whole > 0.0)
+    depth = growth[:, chosen].sum(axis=1)
+    # the local errors hold those of all blocks; `history_error` adds that of the first mission to them
+    first = rate_error[0] if np.isfinite(rate_error[0]) else 0.0
     return {
-        "wear_depth": growth[:, chosen].sum(axis=1),
+        "wear_depth": depth,
         "depth_rate": rates.sum(axis=1),
         "wear_rate": rates.sum(axis=1) @ area,
-        "wear_rate_error": np.divide(weighted, whole, out=np.zeros_like(whole), where=whole > 0.0),
-        "local": share * (values["local"] @ area),
+        "wear_rate_error": rate_error,
+        "local": np.fmax(share * (values["local"] @ area) - first * (depth @ area), 0.0),
         "response": np.concatenate([values[name][:, chosen].reshape(n, -1) for name in RESPONSES[:2]], axis=1),
         "response_peak": np.concatenate([values[name][:, chosen].reshape(n, -1) for name in RESPONSES[2:]], axis=1),
         "response_error": np.fmax.reduce(values["response_error"][:, chosen], axis=1),

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 class MissionOptions:
     """Lengths and limits: for each its meaning, its unit (none: a ratio) and the evidence for its value."""
 
+    step_error_fraction: float = 0.5
+    """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of
+    rtol. Missions of a slider: told over true error at least 1.7; with 0.25 a tenth more missions are flown."""
     step_iterations: int = 6
     """Most missions flown for a step, whose depth is found by Newton's method. Sliders and roots need 1 to 3."""
     depth_tolerance: float = 0.1

@@ -14,6 +14,7 @@ from solver.clock import computing_time
 from solver.missions.block_run import BlockCase, BlockRun, not_flown, run_block
 from solver.missions.blocks import Mission, Passage
 from solver.missions.course import MissionCourse, MissionNode, growth_within
+from solver.missions.options import MISSIONS
 from solver.missions.passage import run_passage
 from solver.missions.step import Fly, Step, take_step
 from solver.model import FloatArray
@@ -98,7 +99,7 @@ class MissionSolutions:
                 break
             longest = min(last - flown, self.mission.largest_step or last, last if len(course.nodes) > 2 else 1)
             length = min(self.progress.length, longest)
-            allowed = partial(allowed_error, rtol)
+            allowed = partial(allowed_error, MISSIONS.step_error_fraction * rtol)
             step = take_step(self.mission, course.nodes, length, self._fly(fine, flown + length), allowed)
             self.progress = self._after(step, length, allowed)
         return self.progress.course

@@ -107,7 +107,7 @@ class AdaptiveSteps:
             if tried is not None:
                 size = float(np.abs(tried.error) @ work.area)
                 before, after = (float(at @ work.area) for at in (state.depth, tried.end.point.evaluation.wear_depth))
-                ratio = size / allowed_error(self.rtol, before, after, state.cycle, length)
+                ratio = size / allowed_error(WEAR.step_error_fraction * self.rtol, before, after, state.cycle, length)
                 # at the shortest step: a corner of the wear rate, or the end of the branch if the vibration changes
                 if ratio <= 1.0 or (length <= shortest and is_smooth(state, tried)):
                     ahead = length * next_ratio(ratio, accepted=True)
@@ -151,14 +151,15 @@ def is_smooth(state: WearState, tried: Attempt) -> bool:
     return change < CONTINUATION.smooth_change
 
 
-def allowed_error(rtol: float, before: float, after: float, count: float, length: float) -> float:
+def allowed_error(share: float, before: float, after: float, count: float, length: float) -> float:
     """Allowed error of an adaptive step, m3.
 
+    share: of the wear of the step, or of its wear at the mean rate so far if this is more.
     before, after: worn volumes at its start and end, m3.
     count, length: count at its start, and its length, in cycles or in missions.
     """
     at_mean_rate = after * length / (count + length)
-    return max(COMMON.step_error_fraction * rtol * max(after - before, at_mean_rate), 1e-300)
+    return max(share * max(after - before, at_mean_rate), 1e-300)
 
 
 def next_ratio(error: float, *, accepted: bool) -> float:

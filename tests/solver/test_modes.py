@@ -262,7 +262,7 @@ def test_a_mode_that_is_lost_says_where_and_keeps_its_other_points():
 def test_wrong_arguments_are_named():
     for wrong, said in (
         ({"amplitude": 0.0}, "amplitude: give values above 0"),
-        ({"direction": "left"}, "direction: give one of up, down"),
+        ({"sweep": "left"}, "sweep: give one of up, down"),
         ({"mode": 0}, "mode: give a whole number"),
         ({"wear_depth": [1e-6, 1e-6]}, "wear_depth: give a depth, m, for each of 1 pairs, not 2"),
         ({"wear_depth": -1e-6}, "wear_depth: give values of at least 0"),

@@ -89,7 +89,7 @@ def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     lengths = np.array([step.length for step in steps])
     for place, step in enumerate(steps):
         at_mean_rate = worn[place + 1] * step.length / at[place + 1]
-        allowed = COMMON.step_error_fraction * rtol * max(worn[place + 1] - worn[place], at_mean_rate)
+        allowed = OPTIONS.step_error_fraction * rtol * max(worn[place + 1] - worn[place], at_mean_rate)
         assert step.error <= allowed
     assert (lengths[1:] <= COMMON.largest_step_ratio * lengths[:-1] * (1.0 + 1e-12)).all()
     assert (steps_of(AdaptiveSteps(1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
@@ -144,7 +144,7 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
 
 def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
     # no error is refused, so that steps grow as they may
-    monkeypatch.setattr(control, "COMMON", replace(COMMON, step_error_fraction=1e9))
+    monkeypatch.setattr(control, "WEAR", replace(OPTIONS, step_error_fraction=1e9))
     states, steps = steps_of(AdaptiveSteps(1e-2), 3)
     depth, rate, h = depths(states), rates(states), [step.length for step in steps]
     assert depth[1] == pytest.approx(h[0] * rate[1], rel=1e-9)

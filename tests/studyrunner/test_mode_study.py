@@ -61,7 +61,7 @@ def test_the_result_has_its_axes_and_the_values_of_the_solver(result):
     model = build_scene("sdof_slider")
     for sample, cycle, depth in ((0, 1, 0.0), (1, 0, 1e-6)):
         friction = result.sample_friction_coefficient.values[sample]
-        direct = backbone(model, result.modal_amplitude, friction, direction="down", wear_depth=depth)
+        direct = backbone(model, result.modal_amplitude, friction, sweep="down", wear_depth=depth)
         at = result.isel(mode=0, sweep=0, sample=sample, cycle=cycle)
         for name, values in {
             "natural_frequency": direct.frequency,
