@@ -6,9 +6,12 @@ the history before the step straight to the last period of the step: one slide f
 its end. This is an error of first order in the step that the local error of the depths does not show
 (dovetail, 16 pairs, 212.6 Hz, `rtol` 1e-2: 1.8 % of the worn volume, with the way in parts 0.4 %).
 
-Here the predicted force goes along a straight line from the state before the step to the extrapolated state, and the
-law is marched at each part of the line until the period repeats. This costs little beside a balance, which still slides
-from the extrapolated to its own state.
+Here the predicted force goes along a straight line from the state before the step to the state at its end, and the
+law is marched at each part of the line until the period repeats; the last part is left to the balance. At first the end
+is the extrapolated state. Where this goes too far, pairs keep the history of a way that the joint did not go. So the
+history is taken once more along the line to the state that was found, and where both histories differ the step is
+solved again. Dovetail, worn volumes in mm3 with the extrapolated end alone, with the end that was found, and by time
+integration: 2.031, 1.904, 1.900 with 16 pairs at 212.5 Hz; 1.667 (another branch), 2.262, 2.261 with 48 pairs at 211.5 Hz.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ from solver.wear.options import WEAR
 
 
 def history_along(joint: Joint, before: Marched, history: FloatArray, ahead: Marched) -> FloatArray:
-    """Tangential history (n_contact, 2), m, at the end of a step, for the balance there.
+    """Tangential history (n_contact, 2), m, for the balance at the end of a step.
 
     Parameters
     ----------
@@ -37,7 +40,7 @@ def history_along(joint: Joint, before: Marched, history: FloatArray, ahead: Mar
     history
         (n_contact, 2), that this state leaves, m.
     ahead
-        Extrapolated state at the end of the step, marched from this history.
+        State at the end of the step, extrapolated or found.
     """
     # a pair that sticks with one history at both ends sticks everywhere between: its force lies on a straight line
     sticks = (before.status_t == STICK).all(axis=1) & (ahead.status_t == STICK).all(axis=1) & (ahead.periods == 1)
@@ -48,9 +51,19 @@ def history_along(joint: Joint, before: Marched, history: FloatArray, ahead: Mar
         friction, stiffness = joint.friction_coefficient[moving], joint.state_stiffness[moving, None]
         largest = float(friction_limit(friction, last[:, 0].max(axis=1)).max())
         state = history[moving] * stiffness
-        for part in np.linspace(0.0, 1.0, WEAR.parts_of_step + 1)[1:]:
+        for part in np.linspace(0.0, 1.0, WEAR.parts_of_step + 1)[1:-1]:
             between = first + part * (last - first)
             state_t = march_period(between, friction, state, COMMON.round_off * largest, CONTACT.most_periods)[1]
             state = state_t[:, :, -1]
         found[moving] = state / stiffness
     return found
+
+
+def differ(joint: Joint, one: FloatArray, other: FloatArray, at: Marched) -> bool:
+    """Whether two tangential histories (n_contact, 2), m, differ so much that a step is to be solved again.
+
+    at: state at the end of the step, for the friction limits.
+    """
+    largest = float(friction_limit(joint.friction_coefficient, at.predicted_t[:, 0].max(axis=1)).max(initial=0.0))
+    force = np.abs(one - other) * joint.state_stiffness[:, None]
+    return float(force.max(initial=0.0)) > WEAR.history_change * largest
