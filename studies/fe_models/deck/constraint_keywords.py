@@ -191,4 +191,6 @@ def _dofs(fields: list[str], place: Place) -> tuple[int, ...]:
     """Displacements from the first to the last dof of a line; all of them without. Raises SceneError."""
     if len(fields) > 2 or not all(is_integer(text) and 1 <= int(text) <= 6 for text in fields):
         raise place.wrong("no first and last dof", "give numbers from 1 to 6")
+    if fields and int(fields[-1]) < int(fields[0]):
+        raise place.wrong(f"dofs from {fields[0]} to {fields[-1]}", "give the smaller one first")
     return tuple(dof for dof in _ALL if not fields or int(fields[0]) <= dof <= int(fields[-1]))

@@ -50,13 +50,16 @@ def read_contact_pair(draft: Draft, block: Block) -> None:
     name = read_name(block.parameters.get("INTERACTION", ""))
     pairs = list(read_pairs(draft, block))
     glued = f"{block.place}: *{block.written}, TIED" if "TIED" in block.parameters else ""
+    adjusted = f"{block.place}: *{block.written}, ADJUST moves nodes" if "ADJUST" in block.parameters else ""
     interactions = draft.interactions
 
     def found_pairs(found: Resolved) -> Iterator[ContactPair]:
         law = interactions.get(name, DraftInteraction())
         for dependent, independent, _ in pairs:
             names = found.surface(dependent), found.surface(independent)
-            yield ContactPair(*names, name, law.friction, law.problem, glued or law.glued)
+            if name and name not in interactions:
+                raise block.place.wrong(f"there is no interaction {shown(name)}", "define it with *SURFACE INTERACTION")
+            yield ContactPair(*names, name, law.friction, law.problem, glued or law.glued, adjusted=adjusted)
 
     draft.add("contact_pairs", found_pairs)
 

@@ -83,8 +83,8 @@ KEYWORDS: Mapping[str, Keyword] = {
     "CONTACTINTERFERENCE": _read(contact.read_interference, "SHRINK TYPE AMPLITUDE", "OP"),
     "CONTACTPAIR": _read(
         contact.read_contact_pair,
-        "INTERACTION TIED",
-        "TYPE ADJUST SMALLSLIDING EXTENSIONZONE HCRIT SMOOTH TRACKING CPSET MINIMUMDISTANCE WEIGHT",
+        "INTERACTION TIED ADJUST",
+        "TYPE SMALLSLIDING EXTENSIONZONE HCRIT SMOOTH TRACKING CPSET MINIMUMDISTANCE WEIGHT",
     ),
     "COUPLING": _read(constraints.read_coupling, "REFNODE SURFACE", "CONSTRAINTNAME"),
     "CYCLICSYMMETRYMODEL": _read(contact.read_cyclic_symmetry, "N TIE", "NGRAPH ELSET CHECK"),
@@ -131,7 +131,7 @@ KEYWORDS: Mapping[str, Keyword] = {
     "SURFACEBEHAVIOR": _read(
         contact.read_behavior, "PRESSURE-OVERCLOSURE", "PENALTY AUGMENTEDLAGRANGE DIRECT STIFFNESS"
     ),
-    "SURFACEINTERACTION": _read(contact.read_interaction, "NAME", "PADTHICKNESS"),
+    "SURFACEINTERACTION": _read(contact.read_interaction, "NAME"),
     "SYSTEM": _read(mesh_keywords.read_system),
     "TEMPERATURE": _read(materials.read_thermal, "", "OP AMPLITUDE FILE BSTEP BINC ESTEP EINC INTERPOLATE USER"),
     "TIE": _read(

@@ -23,6 +23,7 @@ def read_material(draft: Draft, block: Block) -> None:
 def read_elastic(draft: Draft, block: Block) -> None:
     """*ELASTIC: Young's modulus, Poisson's ratio, temperature; a law that is not isotropic matters where it is used."""
     material = _material(draft, block)
+    _refuse_again(material, "ELASTIC", block)
     material.places["ELASTIC"], material.problem = block.place, ""
     law = block.parameters.get("TYPE", "ISO").upper()
     if law not in ("ISO", "ISOTROPIC") or block.parameters.get("DEPENDENCIES", "0") != "0":
@@ -39,11 +40,19 @@ def read_elastic(draft: Draft, block: Block) -> None:
 def read_density(draft: Draft, block: Block) -> None:
     """*DENSITY: density, temperature."""
     material = _material(draft, block)
+    _refuse_again(material, "DENSITY", block)
     material.places["DENSITY"] = block.place
     material.density = [read_floats(block, line, 1) for line in range(max(len(block.lines), 1))]
     for line, (density, *_) in enumerate(material.density):
         if not density > 0:
             raise block.place_of(line).wrong(f"a density of {density:g}", "give a positive one")
+
+
+def _refuse_again(material: DraftMaterial, keyword: str, block: Block) -> None:
+    """A material is given once: programs differ in which of two they take. The same lines serve several instances."""
+    if material.places.get(keyword, block.place) != block.place:
+        found = f"*{block.written} of one material again (before: {material.places[keyword]})"
+        raise block.place.wrong(found, "give each material once")
 
 
 def _material(draft: Draft, block: Block) -> DraftMaterial:

@@ -98,6 +98,7 @@ class ContactPair:
     glued: where the deck says that the surfaces do not part, as "deck.inp, line 7: ..."; "" where they may.
     fitted: where the deck gives a clearance or an interference, as "deck.inp, line 7: ..."; "" where it gives none.
     clearance: distance of the surfaces, negative for an interference; None for the distances in the mesh.
+    adjusted: where the deck moves nodes onto the other surface, as "deck.inp, line 7: ..."; "" where it does not.
     """
 
     dependent: str
@@ -108,6 +109,7 @@ class ContactPair:
     glued: str = ""
     fitted: str = ""
     clearance: float | None = None
+    adjusted: str = ""
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,8 @@ def read_boundary(draft: Draft, block: Block) -> None:
         elif word not in ("0", "11"):  # a temperature or a mass flow
             first = read_integer(word, place, "the first dof")
             last = read_integer(fields[2], place, "the last dof") if len(fields) > 2 and fields[2] else first
+            if last < first:
+                raise place.wrong(f"dofs from {first} to {last}", "give the smaller one first")
             value = read_float(fields[3], place) if len(fields) > 3 and "FIXED" not in block.parameters else 0.0
             draft.add("boundaries", _boundary(nodes, first, last, value))
 

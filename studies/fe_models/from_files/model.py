@@ -93,7 +93,8 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     if not files.matrices:
         check_units(deck, None, units)
         for found in deck.unassembled:
-            raise SceneError("model", found, "use solid elements, or give `matrices` of another program")
+            remedy = "use solid elements, of one material in a .cdb, or give `matrices` of another program"
+            raise SceneError("model", found, remedy)
     rotation = find_rotation(deck, parameters, units)
     surfaces = find_surfaces(selections, parameters, units)
     cut, clamped = find_cut(selections, parameters, units), find_clamped(selections, parameters)

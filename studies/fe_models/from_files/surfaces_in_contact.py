@@ -91,6 +91,9 @@ def _surfaces(
     if tolerance is None and definition.tolerance is not None:
         tolerance = definition.tolerance * units.length
     pair = definition.pair
+    if pair is not None and pair.adjusted and pair.clearance is None and parameters.gaps:
+        remedy = "leave ADJUST out where the distances of the mesh count, else leave gaps out"
+        raise SceneError("gaps", f"{pair.adjusted} onto the other surface, so that there are no gaps", remedy)
     if pair is None or not pair.fitted:
         return ContactSurfaces(first, second, tolerance, None, with_gaps=parameters.gaps)
     if not parameters.gaps:

@@ -51,6 +51,7 @@ def _deck(path: Path, archive: Any, commands: CdbCommands) -> Deck:
         raise SceneError("model", found, "write it with NROTAT to the global one: its directions are x, y and z")
     rows: dict[str, list[tuple[int, IntArray]]] = {}
     passed: set[int] = set()
+    materials: set[int] = set()
     for element in archive.elem:
         number = int(element[1])
         kind = commands.kinds.get(number)
@@ -73,6 +74,8 @@ def _deck(path: Path, archive: Any, commands: CdbCommands) -> Deck:
             remedy = "mesh with whole hexahedra, wedges and tetrahedra, with all their midside nodes or none"
             raise SceneError("model", f"{path.name}: element {int(element[8])} has an unusual shape", remedy)
         rows.setdefault(name, []).append((int(element[8]), chosen))
+        materials.add(int(element[0]))
+    several = f"{path.name} has materials {' and '.join(map(str, sorted(materials)))}, of which the study gives one"
     return build_deck(
         path.name,
         (np.asarray(archive.nnum, dtype=np.int64), np.asarray(archive.nodes, dtype=np.float64)[:, :3]),
@@ -81,6 +84,7 @@ def _deck(path: Path, archive: Any, commands: CdbCommands) -> Deck:
         {name: np.asarray(members, dtype=np.int64) for name, members in archive.element_components.items()},
         commands.boundaries,
         tuple(f"Elements of type {kind} are passed over." for kind in sorted(passed)),
+        (several,) if len(materials) > 1 else (),
     )
 
 

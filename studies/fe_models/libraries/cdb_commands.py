@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
@@ -31,7 +30,7 @@ WITHOUT_INFLUENCE = _short(
     "MAT TYPE REAL SECNUM TSHAP R RMORE RLBLOCK SECTYPE SECDATA SECOFFSET SECCONTROL SECCONTROLS SECBLOCK SECMODIF "
     "MP MPTEMP MPDATA MPDE UIMP TREF "
     # how an analysis is run and what it writes; the damping is that of the study
-    "ANTYPE MODOPT MODCONTROL QRDOPT MXPAND EQSLV LUMPM NLGEOM NROPT KBC TIME TIMINT NSUBST DELTIM AUTOTS NCNV NEQIT "
+    "ANTYPE MODOPT MODCONTROL QRDOPT MXPAND EQSLV NLGEOM NROPT KBC TIME TIMINT NSUBST DELTIM AUTOTS NCNV NEQIT "
     "CNVTOL CUTCONTROL "
     "OUTRES OUTPR ERESX RESCONTROL RATE CRPLIM LNSRCH PRED KUSE IRLF LSCLEAR EXTOPT SOLCONTROL WRFULL HBMAT HROPT "
     "HROUT HARFRQ TRNOPT BUCOPT SUBOPT RIGID THOPT CGLOC ALPHAD BETAD DMPRAT DMPSTR MDAMP"
@@ -41,9 +40,12 @@ WITHOUT_INFLUENCE = _short(
 _WHERE_ZERO = _short("OMEGA DOMEGA CGOMGA DCGOMG ACEL CMOMEGA CMDOMEGA CMACEL BFUNIF TUNIF")
 """Loads that CDWRITE writes in any case."""
 
+_WITH_LABEL = _short("CMOMEGA CMDOMEGA CMACEL BFUNIF")
+"""Those whose first field is no number."""
+
 _PLAIN_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _DIRECTIONS = {"UX": (1, 1), "UY": (2, 2), "UZ": (3, 3), "ALL": (1, 3)}
-_LAYERED = 3  # number of the key option
+_INTEGRATED, _LAYERED = 2, 3  # numbers of key options
 _FREE = "export without constraint equations: CEDELE,ALL and CPDELE,ALL"
 _LOADS = "delete it, and give `preload` in the study"
 _REMEDIES = {
@@ -52,6 +54,7 @@ _REMEDIES = {
     **dict.fromkeys(_short("PSTRES SSTIF INISTATE ISFILE"), "delete it, and give `rotation_speed`, or `matrices`"),
     **dict.fromkeys(_short("F SF SFE SFA BF BFE BFUNIF TUNIF ACEL CMACEL"), _LOADS),
     **dict.fromkeys(_short("N EN E EMORE"), "write nodes and elements in blocks: CDWRITE,DB,file,cdb"),
+    "LUMP": "delete it: the mass is consistent",
     "CYCL": "delete it, and give `n_sectors` and `axis` in the study",
     "TB": "delete it, and give `material` in the study: isotropic and elastic",
 }
@@ -90,8 +93,9 @@ def read_commands(path: Path) -> CdbCommands:
         if command == "ET":
             _add_type(fields[1:], kinds, places, place, fields[3:])
         elif command == "KEYO":
-            if fields[2:4] == [str(_LAYERED), "1"]:
-                _refuse_layers(place)
+            kind = kinds.get(int(fields[1])) if fields[1:] and fields[1].isdigit() else None
+            if fields[3:4] == ["1"]:
+                _refuse_option(kind, fields[2], place)
         elif command == "D":
             label, value, node = _displacement(fields, place)
             held.setdefault((label, value), []).append(node)
@@ -112,27 +116,31 @@ def _lines(path: Path) -> Iterator[tuple[list[str], Place]]:
     in_types = False
     with path.open(encoding="latin-1") as file:
         for number, text in enumerate(file, 1):
-            if text[0] in " \t-0123456789(\r\n!":
-                if in_types:
+            start = text.lstrip()[:1]
+            if start in "-.0123456789(!":
+                if in_types and start not in "(!":
                     yield ["", *text.split()], Place(path.name, number)
                 continue
-            fields = [field.strip().upper() for field in text.split("!")[0].split(",")]
-            fields[0] = fields[0].split()[0] if fields[0] else ""
-            in_types = fields[0][:_LETTERS] == "ETBL"
-            if fields[0]:
-                yield fields, Place(path.name, number)
+            for each in [text] if start == "/" else text.split("!")[0].split("$"):  # titles may have a $
+                fields = [field.strip().upper() for field in each.split("!")[0].split(",")]
+                fields[0] = fields[0].split()[0] if fields[0] else ""
+                in_types = fields[0][:_LETTERS] == "ETBL"
+                if fields[0]:
+                    yield fields, Place(path.name, number)
 
 
 def _is_skipped(command: str, fields: list[str]) -> bool:
     if command in WITHOUT_INFLUENCE or command in ("ETBL", "NBLO", "EBLO", "CMBL") or "=" in fields[0]:
         return True
-    if command in ("PSTR", "SSTI"):
+    if command in ("PSTR", "SSTI", "LUMP"):
         return fields[1:2] in (["OFF"], ["0"])
     if command in ("N", "EN"):  # the end of a block
         return fields[-1 if fields[-1] else -2] == "-1"
     # _TINY is the number that stands for no temperature
-    values = [field for field in fields[1:] if _PLAIN_NUMBER.fullmatch(field)]
-    return command in _WHERE_ZERO and not any(float(value.replace("D", "E")) for value in values)
+    values = [field for field in fields[2 if command in _WITH_LABEL else 1 :] if field not in ("", "_TINY")]
+    return command in _WHERE_ZERO and all(
+        _PLAIN_NUMBER.fullmatch(value) and not float(value.replace("D", "E")) for value in values
+    )
 
 
 def _add_type(
@@ -143,12 +151,17 @@ def _add_type(
     if name is None or not fields[0].isdigit():
         raise place.wrong("a type of elements that is no number", "write the file with CDWRITE,DB,file,cdb")
     kinds[int(fields[0])], places[int(fields[0])] = int(name[0]), place
-    if options[_LAYERED - 1 : _LAYERED] == ["1"] and int(name[0]) in (185, 186, 190):
-        _refuse_layers(place)
+    for option in (_INTEGRATED, _LAYERED):
+        if options[option - 1 : option] == ["1"]:
+            _refuse_option(int(name[0]), str(option), place)
 
 
-def _refuse_layers(place: Place) -> NoReturn:
-    raise place.wrong("elements of layers (key option 3)", "use homogeneous solid elements")
+def _refuse_option(kind: int | None, option: str, place: Place) -> None:
+    """Raises SceneError where a key option of 1 makes other elements of a kind than those that are read."""
+    if option == str(_LAYERED) and kind in (185, 186, 190):
+        raise place.wrong("elements of layers (key option 3)", "use homogeneous solid elements")
+    if option == str(_INTEGRATED) and kind in (45, 185):
+        raise place.wrong("elements of reduced integration (key option 2)", "use full integration, or enhanced strains")
 
 
 def _displacement(fields: list[str], place: Place) -> tuple[str, float, int]:

@@ -40,6 +40,7 @@ def build_deck(
     element_sets: Mapping[str, IntArray],
     boundaries: tuple[Boundary, ...] = (),
     notes: tuple[str, ...] = (),
+    unassembled: tuple[str, ...] = (),
 ) -> Deck:
     """A deck of node numbers (n,) with coordinates (n, 3), and numbers and nodes of elements by kind.
 
@@ -76,4 +77,5 @@ def build_deck(
         element_sets={key.strip().upper(): np.intersect1d(members, elements) for key, members in element_sets.items()},
         boundaries=boundaries,
         notes=notes,
+        unassembled=unassembled,
     )

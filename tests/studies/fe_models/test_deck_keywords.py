@@ -166,6 +166,18 @@ def test_clearance_and_interference_are_gaps(text, gap, tmp_path):
         prepared_deck(tmp_path, moved + text)
 
 
+def test_nodes_that_are_moved_onto_the_surface_have_no_gaps(tmp_path):
+    text = BLOCKS.replace("*CONTACT PAIR", "*CONTACT PAIR, ADJUST=0.1")
+    assert text != BLOCKS
+    prepared, _ = prepared_deck(tmp_path, text)
+    assert not prepared.pairs.gap.any()
+    with pytest.raises(
+        SceneError, match=r"gaps: deck.inp, line \d+: \*CONTACT PAIR, ADJUST moves nodes .*; leave ADJUST"
+    ):
+        prepared_deck(tmp_path, text, gaps=True)
+    prepared_deck(tmp_path, f"{text}*CLEARANCE, MASTER=SLOW, SLAVE=SUP, VALUE=0.01\n", gaps=True)
+
+
 def test_removed_elements_and_pairs(tmp_path):
     """What a static step takes away is no part of the model; what one takes away that writes matrices is."""
     gone = "*ELSET, ELSET=GONE\n104, 108\n*STEP\n*STATIC\n*MODEL CHANGE, TYPE=ELEMENT, REMOVE\nGONE\n*END STEP\n"
@@ -221,6 +233,12 @@ def test_elements_that_are_not_read(tmp_path):
         ("*SURFACE, NAME=X, COMBINE=UNION\nSUP\n", r"\*SURFACE with COMBINE, which is not read and may change"),
         ("*TIE, NAME=T, TIED NSET=X\nSUP, SLOW\n", r"\*TIE with TIEDNSET, which is not read and may change"),
         ("*SURFACE INTERACTION, NAME=X\n*SURFACE BEHAVIOR, NO SEPARATION\n", r"\*SURFACE BEHAVIOR with NOSEPARATION"),
+        ("*SURFACE INTERACTION, NAME=X, PAD THICKNESS=0.1\n", r"\*SURFACE INTERACTION with PADTHICKNESS"),
+        ("*CONTACT PAIR, INTERACTION=NONE\nSUP, SLOW\n", "there is no interaction NONE"),
+        ("*BOUNDARY\n1, 3, 1\n", "dofs from 3 to 1"),
+        (COUPLING + "*KINEMATIC\n3, 1\n", "dofs from 3 to 1"),
+        ("*MATERIAL, NAME=STEEL\n*ELASTIC\n7e4, 0.3\n", r"\*ELASTIC of one material again \(before: deck.inp"),
+        ("*MATERIAL, NAME=STEEL\n*DENSITY\n2.7e-9\n", r"\*DENSITY of one material again"),
         ("*INITIAL CONDITIONS, TYPE=STRESS\n", r"\*INITIAL CONDITIONS: TYPE=STRESS is not read"),
         ("*STEP\n*STATIC\n*CLOAD, AMPLITUDE=A\n5, 1, 1.\n", r"\*CLOAD: a load with AMPLITUDE is not read"),
         ("*STEP\n*STATIC\n*DSLOAD\nSUP, HP, 1.\n", r"\*DSLOAD of type HP is not read; give a pressure P"),

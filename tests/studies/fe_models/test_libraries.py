@@ -146,6 +146,12 @@ def test_cdb(tmp_path, types):
     [
         ("CE,R5.0,DEFI, 2, 1", "", r"line 33: CE may change the model.*; export without constraint equations: CEDELE"),
         ("cp,R5.0,DEFI,1,2,UX", "", "line 33: CP may change the model"),
+        ("  CE,1,0,1,UX,1,2,UX,-1", "", "line 33: CE may change the model"),
+        ("CSYS,0 $ CP,1,UX,1,2", "", "line 33: CP may change the model"),
+        ("SPEED=300\nOMEGA,0,0,SPEED", "", "line 34: OMEGA may change the model"),
+        ("ACEL,0,0,2*9.81", "", "line 33: ACEL may change the model.*`preload`"),
+        ("LUMPM,ON", "", "LUMPM may change the model.*consistent"),
+        ("KEYOPT,1,2,1", "", "elements of reduced integration"),
         ("PSTRES,ON", "", "PSTRES may change the model.*; delete it, and give `rotation_speed`"),
         ("OMEGA,0,0,300.", "", "OMEGA may change the model.*`rotation_speed` and `axis`"),
         ("BFUNIF,TEMP,300", "", "BFUNIF may change the model.*`preload`"),
@@ -164,6 +170,16 @@ def test_cdb(tmp_path, types):
 def test_commands_that_change_the_model(tmp_path, commands, types, sentence):
     with pytest.raises(SceneError, match=sentence):
         read_library_mesh(write_cdb(tmp_path, commands, types or ETBLOCK))
+
+
+@needs_ansys
+def test_cdb_of_two_materials(tmp_path):
+    path = write_cdb(tmp_path, "LUMPM,0\nOMEGA,,,0.0")
+    text = path.read_text()
+    (element,) = (line for line in text.splitlines() if len(line) == 19 * 9)
+    other = f"{2:9d}" + element[9:].replace(f"{8:9d}{0:9d}{5:9d}", f"{8:9d}{0:9d}{6:9d}")
+    path.write_text(text.replace(element, element + "\n" + other).replace("1,        1\n(19i9)", "2,        2\n(19i9)"))
+    assert read_library_mesh(path).unassembled == ("mesh.cdb has materials 1 and 2, of which the study gives one",)
 
 
 def test_meshes_by_their_ending(tmp_path):
