@@ -11,7 +11,8 @@ law is marched at each part of the line until the period repeats; the last part 
 is the extrapolated state. Where this goes too far, pairs keep the history of a way that the joint did not go. So the
 history is taken once more along the line to the state that was found, and where both histories differ the step is
 solved again. Dovetail, worn volumes in mm3 with the extrapolated end alone, with the end that was found, and by time
-integration: 2.031, 1.904, 1.900 with 16 pairs at 212.5 Hz; 1.667 (another branch), 2.262, 2.261 with 48 pairs at 211.5 Hz.
+integration: 2.031, 1.904, 1.900 with 16 pairs at 212.5 Hz; 1.667 (another branch), 2.262, 2.261 with 48 pairs at
+211.5 Hz.
 """
 
 from __future__ import annotations
