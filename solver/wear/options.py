@@ -26,10 +26,6 @@ class WearOptions:
     local errors of these steps are 0.1 to 2.7 times the allowed ones."""
 
     # friction on the slow time scale
-    history_change: float = 0.01
-    """Change of the tangential history over the largest friction force, above which a step is solved again. Dovetail,
-    212.5 and 212.6 Hz with 16 pairs, 211.5 Hz with 48: with 0.001 the worn volumes change by up to 0.15 %, for up to
-    15 % more iterations."""
     parts_of_step: int = 32
     """Parts of a step in each of which the pairs slide at their friction limit. Dovetail, 16 pairs, 212.6 Hz, 1e5
     cycles, `rtol` 1e-2: 1.786, 1.810, 1.812, 1.813, 1.813 mm3 with 1, 8, 32, 128, 512 parts to the extrapolated end.

@@ -21,7 +21,7 @@ from solver.results.history import PeriodicState
 from solver.settings import FollowedFrequency, Resolution
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.followed import end_at_resonance, lost_resonance
-from solver.wear.friction_history import differ, history_along
+from solver.wear.friction_history import history_along
 from solver.wear.rates import WearRates
 from solver.wear.state import Choice, Failure, Reached, WearState
 from solver.wear.step_limit import explicit_step_limit
@@ -169,19 +169,8 @@ class WearingJoint:
         found = solve_balance(balance, start, self.solver, settings.tolerance, self.budget, most)
         if not found.converged:
             return None
-        balance, at = self._along(state, balance, found.evaluation)
-        return Reached(PathPoint(0.0, at, final_history(balance, at)), state.omega, state.lag, state.half_width)
-
-    def _along(self, state: WearState, balance: Balance, at: Evaluation) -> tuple[Balance, Evaluation]:
-        """The balance with the history along the way to its end `at`, and its end, solved again where this matters."""
-        history = history_along(balance.joint, state.point.evaluation, state.point.history, at)
-        if not differ(balance.joint, history, balance.history, at):
-            return balance, at
-        corrected, tolerance = replace(balance, history=history), self.case.settings.tolerance
-        found = solve_balance(
-            corrected, at.predicted_h, self.solver, tolerance, self.budget, CONTINUATION.near_iterations
-        )
-        return (corrected, found.evaluation) if found.converged else (balance, at)
+        point = PathPoint(0.0, found.evaluation, final_history(balance, found.evaluation))
+        return Reached(point, state.omega, state.lag, state.half_width)
 
     def tuned(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depths and its tangential history."""

@@ -65,11 +65,11 @@ def test_sticking_pairs_slide_along_the_way_of_a_step(dovetail_start, monkeypatc
 @pytest.mark.slow
 @pytest.mark.parametrize(("mesh", "frequency", "volume"), [(1, 212.6, 1.810), (2, 211.5, 2.261)])
 def test_where_pairs_slide_or_stick_again_the_history_is_that_of_a_time_integration(mesh, frequency, volume):
-    """At 211.5 Hz the history along the way to the extrapolated end alone leads to another branch, 1.667 mm3."""
+    """At 211.5 Hz the history of the whole way to the extrapolated end leads to another branch, 1.667 mm3."""
     counts = np.array([0.0, 1e5])
     history = march_wear(scene("dovetail_sector", mesh=mesh), frequency, 0.5, 0.5, WEAR, counts)
     apart = abs(1e9 * history.worn_volume[-1] / volume - 1.0)
-    assert apart < min(0.01, history.error_estimate)
+    assert apart < history.error_estimate < 0.03
 
 
 @pytest.mark.slow
