@@ -11,7 +11,8 @@ class MissionOptions:
 
     step_error_fraction: float = 0.5
     """Allowed error of a step over its wear, or over its wear at the mean rate so far if larger, as a fraction of
-    rtol. Missions of a slider: told over true error at least 1.7; with 0.25 a tenth more missions are flown."""
+    rtol. Missions of a slider: estimated over true error at least 1.7. With 0.25 two cases of the tests compute 21.5
+    and 33 of 2000 missions, with 0.5 fewer than 20 and 30."""
     step_iterations: int = 6
     """Most missions flown for a step, whose depth is found by Newton's method. Sliders and roots need 1 to 3."""
     depth_tolerance: float = 0.1
