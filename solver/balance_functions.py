@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from solver.forced_response import check_case, check_number, worn_model
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import Sweep
+from solver.loading_history.sweep_start import Direction
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState
@@ -80,7 +80,7 @@ def balance_of(
     excitation_amplitude: float,
     friction_coefficient: ArrayLike | None,
     *,
-    sweep: Sweep = "up",
+    sweep: Direction = "up",
     settings: SolverSettings | None = None,
     wear_depth: ArrayLike | None = None,
 ) -> HarmonicBalance:
@@ -135,7 +135,7 @@ def start_of(
     friction: float | FloatArray | None,
     load: float,
     frequency: float,
-    sweep: Sweep,
+    sweep: Direction,
     settings: SolverSettings,
 ) -> tuple[StartState, Case]:
     """State to which a sweep comes at a frequency, Hz, and the case with the harmonics and samples of the state."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import Sweep
+from solver.loading_history.sweep_start import Direction
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
@@ -54,7 +54,7 @@ def frequency_response(
     excitation_amplitude: float,
     friction_coefficient: ArrayLike | None,
     *,
-    sweep: Sweep = "up",
+    sweep: Direction = "up",
     settings: SolverSettings | None = None,
     wear_depth: ArrayLike | None = None,
 ) -> FrequencyResponse:
@@ -112,13 +112,13 @@ def check_case(
     model: ReducedModel,
     excitation_amplitude: float,
     friction_coefficient: ArrayLike | None,
-    sweep: Sweep,
+    sweep: Direction,
     settings: SolverSettings,
 ) -> tuple[float, float | FloatArray | None]:
     """Checked excitation amplitude and friction coefficient. Raises ValueError where an argument is not allowed."""
     load = check_number("excitation_amplitude", excitation_amplitude, least=0.0)
     friction = check_friction(model, friction_coefficient)
-    check_word("sweep", sweep, get_args(Sweep))
+    check_word("sweep", sweep, get_args(Direction))
     check_settings(model, settings)
     return load, friction
 

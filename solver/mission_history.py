@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.forced_response import check_case, check_number, check_numbers, check_word
-from solver.loading_history.sweep_start import Sweep
+from solver.loading_history.sweep_start import Direction
 from solver.missions.blocks import Begin, Block, Mission, Passage
 from solver.missions.history import integrate_missions
 from solver.missions.result import MissionHistory
@@ -27,7 +27,7 @@ def integrate_mission(
     settings: SolverSettings | None = None,
     law: WearLaw = ARCHARD,
     until: WearTarget | None = None,
-    sweep: Sweep = "up",
+    sweep: Direction = "up",
     largest_step: int | None = None,
 ) -> MissionHistory:
     """Mission history of a joint from its unworn state on: blocks of vibration in order, flown many times.
@@ -63,7 +63,7 @@ def integrate_mission(
         or law does not fit, see `solver.march_wear`.
     """
     settings = SolverSettings() if settings is None else settings
-    check_word("sweep", sweep, get_args(Sweep))
+    check_word("sweep", sweep, get_args(Direction))
     if not blocks:
         raise ValueError("blocks: give at least one block")
     checked = tuple(_checked(block, place, settings, law) for place, block in enumerate(blocks))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.forced_response import check_case, check_number, check_numbers, check_word, worn_model
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import Sweep
+from solver.loading_history.sweep_start import Direction
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import (
@@ -40,7 +40,7 @@ def march_wear(
     *,
     scheme: Scheme | Literal["final"] = "adaptive",
     step: float | None = None,
-    sweep: Sweep = "up",
+    sweep: Direction = "up",
     settings: SolverSettings | None = None,
     law: WearLaw = ARCHARD,
     until: WearTarget | None = None,
@@ -144,7 +144,7 @@ def march_wear(
 
 
 def _check_frequency(
-    frequency: float | Followed, between: tuple[float, float] | None, sweep: Sweep, scheme: str
+    frequency: float | Followed, between: tuple[float, float] | None, sweep: Direction, scheme: str
 ) -> tuple[float, FollowedFrequency | None]:
     """The given frequency, Hz, or NaN and what the frequency follows. Raises ValueError."""
     if not isinstance(frequency, str):

@@ -14,13 +14,12 @@ from solver.continuation.arc_length import Arc
 from solver.continuation.options import CONTINUATION
 from solver.continuation.whole_curve import Branch, follow_branch_whole
 from solver.forced_response import check_case, check_number, check_numbers, worn_model
-from solver.harmonic_balance.converged import BalanceAt, PathPoint
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.response_peak import largest_responses
-from solver.loading_history.sweep_start import Sweep
+from solver.harmonic_balance.state import BalanceAt, State
+from solver.loading_history.sweep_start import Direction
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.stability.hill import is_stable
@@ -123,7 +122,7 @@ def response_curve(
     if first == last:
         raise ValueError("frequency, excitation_amplitude: give two different numbers as first and last value")
     most = int(check_number("most_points", most_points, least=2.0))
-    sweep: Sweep = ("up" if first < last else "down") if over_frequency else "ramp"
+    sweep: Direction = ("up" if first < last else "down") if over_frequency else "ramp"
     load, friction = check_case(model, loads[0], friction_coefficient, sweep, settings)
     worn = worn_model(model, wear_depth)
     start, case = start_of(worn, friction, load, float(omegas[0]) / (2.0 * np.pi), sweep, settings)
@@ -135,11 +134,11 @@ def response_curve(
 
     if at is None or not start.outcome.complete:
         return _reported(case, Branch((), ()), balance_at, over_frequency, errors, (start.outcome, start.message))
-    begin = PathPoint(float(first), at, balance.history)
+    begin = State(at, balance.history, float(first))
     # a branch may turn back behind its start before it comes to the last value
     back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
     span = abs(last - first) / (CONTINUATION.smooth_change * _FEWEST_STEPS)
-    arc = Arc(balance_at, begin, span, JacobianSolver(), settings.tolerance, Budget())
+    arc = Arc(balance_at, begin, span, Run(settings.tolerance))
     branch = follow_branch_whole(arc, last, back, most)
     return _reported(case, branch, balance_at, over_frequency, errors, _end(branch, most, over_frequency))
 
@@ -158,9 +157,9 @@ def _end(branch: Branch, most: int, over_frequency: bool) -> tuple[Outcome, str]
     return Outcome.BRANCH_LOST, f"the curve was followed up to {value:.6g} {unit}: more harmonics or samples may help"
 
 
-def _error(case: Case, joint: Joint, point: PathPoint, budget: Budget) -> float:
+def _error(case: Case, joint: Joint, point: State, run: Run) -> float:
     """Estimated relative error of the response of a point; inf where no state with other harmonics is found."""
-    found = refine(case, joint.omega, joint.excitation_amplitude, point, budget).estimate.response
+    found = refine(case, joint.omega, joint.excitation_amplitude, point, run).estimate.response
     return found if np.isfinite(found) else np.inf
 
 
@@ -176,12 +175,12 @@ def _reported(
     balances: list[HarmonicBalance] = []
     for index, point in enumerate(branch.points):
         balance, at = balance_at(point.parameter, point.history), point.evaluation
-        joint, budget = balance.joint, Budget()
+        joint, run = balance.joint, Run(case.settings.tolerance)
         response[index] = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
         peak[index] = largest_responses(joint, at)
-        error[index] = _error(case, joint, point, budget) if errors else np.nan
-        found.append(find_multipliers(case, joint, at, budget))
-        stability.append(found[-1].stability(odd=not is_stable(balance.linearise(at), JacobianSolver())))
+        error[index] = _error(case, joint, point, run) if errors else np.nan
+        found.append(find_multipliers(case, joint, at, run))
+        stability.append(found[-1].stability(odd=not is_stable(balance, at, run.fresh())))
         balances.append(functions_of(balance, at.predicted_h, Outcome.CONVERGED, ""))
     is_fold = np.zeros(n_points, bool)
     is_fold[list(branch.folds)] = True

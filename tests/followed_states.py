@@ -11,12 +11,11 @@ import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
 from solver.continuation.phase_lag import excitation_product
-from solver.harmonic_balance.converged import final_history
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import Failure, final_history
 from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, ReducedModel
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.newton.run import Run
 from solver.settings import FollowedFrequency, SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
@@ -24,7 +23,7 @@ from solver.wear.check import Checked, FullCheck
 from solver.wear.control import GivenSteps
 from solver.wear.integrate import Integration, Progress
 from solver.wear.output import DenseOutput
-from solver.wear.state import Failure, WearState
+from solver.wear.state import WearState
 from solver.wear.stop import AtCount
 from solver.wear.wearing_joint import WearingJoint
 
@@ -93,7 +92,7 @@ def responses_around(work: WearingJoint, state: WearState, width: float, n: int)
             frequency = state.omega / (2.0 * np.pi) + sign * (place + step)
             joint = work.joint(state.resolution, state.hold, 2.0 * np.pi * frequency)
             balance = Balance.frozen(joint, history, state.depth)
-            end = solve_balance(balance, predicted, JacobianSolver(), work.case.settings.tolerance, Budget())
+            end = Run(work.case.settings.tolerance).solve(balance, predicted)
             if not end.converged:
                 step *= 0.5
                 if step < 0.1 * width / n:

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import linprog
 
-from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.state import State
 from solver.model import FloatArray, ReducedModel
 from solver.structure.joint import Joint
 from studies.finite_element.elements.solid_mesh import Material
@@ -175,7 +175,7 @@ def equilibrium_possible(stiffness: FloatArray, force: FloatArray, friction: flo
     return None if balanced(1.02 * friction, 0.0) else False
 
 
-def law_errors(joint: Joint, point: PathPoint) -> dict[str, float]:
+def law_errors(joint: Joint, point: State) -> dict[str, float]:
     """How far a static state is off each law, from its displacements, forces and history alone, relative.
 
     Lengths are relative to the largest displacement or gap, forces to the largest force.

@@ -24,9 +24,9 @@ from solver.accuracy.harmonic_levels import room_for, shifted
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
 from solver.accuracy.resolved_state import ResolvedState
-from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.state import State
 from solver.newton.options import NEWTON
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import Case, Joint
 
@@ -43,7 +43,7 @@ class Refined:
     """
 
     case: Case
-    point: PathPoint
+    point: State
     estimate: Estimate
     accurate: bool
 
@@ -52,8 +52,8 @@ def refine(
     case: Case,
     omega: float,
     excitation_amplitude: float,
-    point: PathPoint,
-    budget: Budget,
+    point: State,
+    run: Run,
     most: float | None = None,
     usual_work: float = 0.0,
 ) -> Refined:
@@ -67,8 +67,8 @@ def refine(
         rad/s, N.
     point
         The state.
-    budget
-        Counts the Newton iterations.
+    run
+        Tolerance and limits.
     most
         Most unknowns of a joint of 48 pairs with more harmonics (`room_for`), by default `most_unknowns`.
     usual_work
@@ -82,12 +82,10 @@ def refine(
     Raises
     ------
     OutOfTimeError
-        Behind the deadline of the budget.
+        The time is over.
     """
-    search = _Search(case.settings, budget, budget.iterations, most or ACCURACY.most_unknowns)
-    return search.refined(
-        ResolvedState(case, case.joint(omega, excitation_amplitude), point, usual_work).at_rest(budget)
-    )
+    search = _Search(case.settings, run, run.budget.iterations, most or ACCURACY.most_unknowns)
+    return search.refined(ResolvedState(case, case.joint(omega, excitation_amplitude), point, usual_work).at_rest(run))
 
 
 @dataclass
@@ -95,14 +93,14 @@ class _Search:
     """The search for the harmonics and samples that a state needs.
 
     settings: automatic harmonics and samples, and rtol.
-    budget: counts the Newton iterations.
+    run: tolerance and limits.
     begun: Newton iterations at the start of the search.
     most: as in `refine`.
     faint: whether slip only shows with more samples than those of the given state.
     """
 
     settings: SolverSettings
-    budget: Budget
+    run: Run
     begun: int
     most: float
     faint: bool = False
@@ -118,8 +116,8 @@ class _Search:
                 here, self.faint = linear, True
                 continue
             if self.settings.harmonics == "auto":
-                here = here.without_even(self.budget) or here.with_even(self.budget) or here
-            by_samples, finer = here.samples_error(self.budget)
+                here = here.without_even(self.run) or here.with_even(self.run) or here
+            by_samples, finer = here.samples_error(self.run)
             by_harmonics, richer = self._harmonics_error(here, richer)
             estimate = by_samples + by_harmonics
             if not self.settings.automatic:
@@ -127,7 +125,7 @@ class _Search:
                 return Refined(here.case, here.point, known, True)
             holds = here.holds()
             if holds and estimate.largest <= self.settings.rtol:
-                here, estimate = here.relaxed(estimate, self.budget)
+                here, estimate = here.relaxed(estimate, self.run)
                 return Refined(here.case, here.point, estimate, True)
             wanted = self._wanted(here, by_samples.largest, by_harmonics.largest, holds=holds)
             following = self._next(here, wanted, finer, richer)
@@ -140,8 +138,8 @@ class _Search:
     def _linear(self, here: ResolvedState) -> Refined | ResolvedState:
         """Result for a state in which nothing slips or opens, or the state with more samples that show some slip."""
         if self.settings.harmonics == "auto" and here.case.resolution.orders != (1,):
-            here = here.solve_at(Resolution((1,), here.case.resolution.samples), self.budget) or here
-        missed = here.missed_event(self.budget)
+            here = here.solve_at(Resolution((1,), here.case.resolution.samples), self.run) or here
+        missed = here.missed_event(self.run)
         if missed is None:
             return Refined(here.case, here.point, NOTHING, True)
         if self.settings.samples == "auto":
@@ -154,12 +152,12 @@ class _Search:
         self, here: ResolvedState, known: ResolvedState | None
     ) -> tuple[Estimate, ResolvedState | None]:
         """Error by missing harmonics, and the state with more harmonics that gave it."""
-        error, richer = here.harmonics_error(self.budget, known)
+        error, richer = here.harmonics_error(self.run, known)
         above = shifted(here.case.resolution, 1)
         cheap = here.unknowns(above) <= NEWTON.dear_unknowns and self._allowed(here, above)
         if richer is None and self.settings.harmonics == "auto" and cheap:
             # impacts: Newton's method diverges from a warm start with more harmonics, although the state exists
-            richer = here.by_homotopy(above, self.budget)
+            richer = here.by_homotopy(above, self.run)
             error = error if richer is None else here.difference(richer).times(ACCURACY.one_level_safety)
         return error, richer
 
@@ -182,15 +180,15 @@ class _Search:
         finer, richer: known states with more samples and with more harmonics.
         """
         limit = self.begun + ACCURACY.refinement_work / here.unknowns(shifted(here.case.resolution, 2))
-        if wanted == here.case.resolution or not self._allowed(here, wanted) or self.budget.iterations >= limit:
+        if wanted == here.case.resolution or not self._allowed(here, wanted) or self.run.budget.iterations >= limit:
             return None
         for known in (finer, richer):
             if known is not None and known.case.resolution == wanted:
                 return known
-        found = here.solve_at(wanted, self.budget)
+        found = here.solve_at(wanted, self.run)
         if found is None and richer is not None and richer.case.resolution.highest > wanted.highest:
             # from a state with more harmonics instead of fewer
-            found = richer.solve_at(wanted, self.budget)
+            found = richer.solve_at(wanted, self.run)
         if found is None and richer is not None and self.settings.harmonics == self.settings.samples == "auto":
             found = richer if self._allowed(here, richer.case.resolution) else None
         return found
@@ -216,6 +214,6 @@ class _Search:
         return resolution.samples <= ACCURACY.most_samples and in_levels and here.unknowns(resolution) <= most
 
 
-def state_difference(case: Case, joint: Joint, one: PathPoint, other: PathPoint) -> Estimate:
+def state_difference(case: Case, joint: Joint, one: State, other: State) -> Estimate:
     """Relative differences of response and wear rate of two states of one joint."""
     return ResolvedState(case, joint, one).difference(ResolvedState(case, joint, other))

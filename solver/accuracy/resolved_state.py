@@ -17,14 +17,13 @@ from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import half_wave_symmetric, lacks_even, nothing_happens, shortest_contact
 from solver.continuation.homotopy import add_harmonics, start_with_tail
 from solver.continuation.ratcheting import ratchets, shake_down
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.response_peak import largest_responses
+from solver.harmonic_balance.state import State
 from solver.model import ComplexArray, FloatArray
-from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.newton.run import Run
 from solver.options import COMMON
 from solver.settings import RESOLUTION, Resolution, all_orders
 from solver.structure.fourier import to_complex
@@ -40,12 +39,12 @@ class ResolvedState:
 
     case: Case
     joint: Joint
-    point: PathPoint
+    point: State
     usual_work: float = 0.0
 
-    def solve_at(self, resolution: Resolution, budget: Budget) -> ResolvedState | None:
+    def solve_at(self, resolution: Resolution, run: Run) -> ResolvedState | None:
         """The state with other harmonics and samples; None where it is not found."""
-        return self._transferred(self.case, self.point.evaluation, resolution, budget)
+        return self._transferred(self.case, self.point.evaluation, resolution, run)
 
     def unknowns(self, resolution: Resolution) -> int:
         """Number of unknowns of the balance with other harmonics."""
@@ -55,20 +54,20 @@ class ResolvedState:
         """Whether the scene has matrices for so many harmonics, and their balance at most `most` unknowns."""
         return self.unknowns(resolution) <= most and self.case.model.holds(resolution.highest)
 
-    def by_homotopy(self, resolution: Resolution, budget: Budget) -> ResolvedState | None:
+    def by_homotopy(self, resolution: Resolution, run: Run) -> ResolvedState | None:
         """The same state with more harmonics, these raised from nothing; None where the homotopy ends.
 
         Where the homotopy of all of them at once ends, half of them are raised first.
         """
-        found = self._in_one_homotopy(resolution, budget)
+        found = self._in_one_homotopy(resolution, run)
         middle = (self.case.resolution.highest + resolution.highest) // 2
         orders = tuple(order for order in resolution.orders if order <= middle)
         if found is not None or orders in (self.case.resolution.orders, resolution.orders):
             return found
-        half = self._in_one_homotopy(Resolution(orders, resolution.samples), budget)
-        return None if half is None else half.solve_at(resolution, budget) or half._in_one_homotopy(resolution, budget)
+        half = self._in_one_homotopy(Resolution(orders, resolution.samples), run)
+        return None if half is None else half.solve_at(resolution, run) or half._in_one_homotopy(resolution, run)
 
-    def _in_one_homotopy(self, resolution: Resolution, budget: Budget) -> ResolvedState | None:
+    def _in_one_homotopy(self, resolution: Resolution, run: Run) -> ResolvedState | None:
         if 2 * resolution.highest < self.case.resolution.samples:
             case = self.case.at(resolution)
             joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
@@ -76,42 +75,35 @@ class ResolvedState:
                 case,
                 joint,
                 *start_with_tail(joint, self.point.evaluation, self.case.resolution.orders, self.case.penalty.inertial),
-                budget,
+                run,
             )
             if level is not None:
                 return level
-        led = add_harmonics(self.case, self.joint, self.point.evaluation, resolution, budget)
+        led = add_harmonics(self.case, self.joint, self.point.evaluation, resolution, run)
         if led is None:
             return None
-        return self._transferred(replace(self.case, resolution=resolution), led, resolution, budget)
+        return self._transferred(replace(self.case, resolution=resolution), led, resolution, run)
 
-    def _transferred(
-        self, old: Case, evaluation: Evaluation, resolution: Resolution, budget: Budget
-    ) -> ResolvedState | None:
+    def _transferred(self, old: Case, evaluation: Evaluation, resolution: Resolution, run: Run) -> ResolvedState | None:
         """State solved from a state with other harmonics or with another penalty."""
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
         return self._solved(
-            case, joint, *transfer(case, joint, evaluation, old.resolution.orders, old.penalty.inertial), budget
+            case, joint, *transfer(case, joint, evaluation, old.resolution.orders, old.penalty.inertial), run
         )
 
-    def _solved(
-        self, case: Case, joint: Joint, balance: Balance, start: FloatArray, budget: Budget
-    ) -> ResolvedState | None:
-        result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, budget)
-        if not result.converged:
-            return None
-        point = PathPoint(self.point.parameter, result.evaluation, final_history(balance, result.evaluation))
+    def _solved(self, case: Case, joint: Joint, balance: Balance, start: FloatArray, run: Run) -> ResolvedState | None:
+        point = run.fresh().state(balance, start, self.point.parameter)
         # the mean position of a mass depends a little on the harmonics
-        return replace(self, case=case, joint=joint, point=point).at_rest(budget)
+        return None if point is None else replace(self, case=case, joint=joint, point=point).at_rest(run)
 
-    def at_rest(self, budget: Budget) -> ResolvedState:
+    def at_rest(self, run: Run) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
         settings = self.case.settings
         fraction = ACCURACY.negligible * settings.rtol
         if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
-        rested = shake_down(self.joint, self.point, fraction, settings.tolerance, budget)
+        rested = shake_down(self.joint, self.point, fraction, run)
         return replace(self, point=rested)
 
     def least_work(self) -> float:
@@ -122,36 +114,36 @@ class ResolvedState:
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
         return max(ACCURACY.small_work * abs(self.joint.structure.input_work(motion)), self.usual_work)
 
-    def without_even(self, budget: Budget) -> ResolvedState | None:
+    def without_even(self, run: Run) -> ResolvedState | None:
         """The state solved with odd harmonics only; None where it needs even harmonics or holds none already."""
         orders = self.case.resolution.orders
         odd = tuple(order for order in orders if order % 2)
         if odd == orders or not half_wave_symmetric(self.point.evaluation, COMMON.round_off):
             return None
-        return self.solve_at(Resolution(odd, self.case.resolution.samples), budget)
+        return self.solve_at(Resolution(odd, self.case.resolution.samples), run)
 
-    def with_even(self, budget: Budget) -> ResolvedState | None:
+    def with_even(self, run: Run) -> ResolvedState | None:
         """The state solved with all harmonics up to its highest; None unless it lacks even harmonics that it needs."""
         resolution = self.case.resolution
         if resolution.highest == 1 or not lacks_even(resolution.orders, self.point.evaluation):
             return None
-        return self.solve_at(Resolution(all_orders(resolution.highest), resolution.samples), budget)
+        return self.solve_at(Resolution(all_orders(resolution.highest), resolution.samples), run)
 
-    def missed_event(self, budget: Budget) -> ResolvedState | None:
+    def missed_event(self, run: Run) -> ResolvedState | None:
         """The state with enough samples to show a slip, a separation or a contact between the samples; None if there is
         none. Without an event the harmonics are exact, so that one solve with the finest samples is enough.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        finest = self.solve_at(Resolution(orders, max(RESOLUTION.fine_samples, 2 * samples)), budget)
+        finest = self.solve_at(Resolution(orders, max(RESOLUTION.fine_samples, 2 * samples)), run)
         if finest is None or nothing_happens(finest.point.evaluation):
             return None
         while (samples := 2 * samples) < finest.case.resolution.samples:
-            level = self.solve_at(Resolution(orders, samples), budget)
+            level = self.solve_at(Resolution(orders, samples), run)
             if level is not None and not nothing_happens(level.point.evaluation):
                 return level
         return finest
 
-    def samples_error(self, budget: Budget) -> tuple[Estimate, ResolvedState | None]:
+    def samples_error(self, run: Run) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error by missing samples, and the state with more samples that gave it.
 
         The error depends on the position of an event (slip, stick, lift) between two of the N samples.
@@ -164,16 +156,14 @@ class ResolvedState:
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
         few = self.unknowns(self.case.resolution) <= NEWTON.dear_unknowns
-        finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), budget)
+        finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), run)
         if finer is not None:
             safety = ACCURACY.triple_samples_safety if few else ACCURACY.two_levels_safety
             return self.difference(finer).times(safety), finer
-        coarser = self.solve_at(Resolution(orders, samples // 2), budget) if samples // 2 > 2 * orders[-1] else None
+        coarser = self.solve_at(Resolution(orders, samples // 2), run) if samples // 2 > 2 * orders[-1] else None
         return (UNKNOWN if coarser is None else coarser.difference(self)), None
 
-    def harmonics_error(
-        self, budget: Budget, known: ResolvedState | None = None
-    ) -> tuple[Estimate, ResolvedState | None]:
+    def harmonics_error(self, run: Run, known: ResolvedState | None = None) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error by missing harmonics, and the state with more harmonics that gave it.
 
         The error is the difference to the state with the most harmonics among the following ones. The state has to be
@@ -209,9 +199,9 @@ class ResolvedState:
             affordable = self.unknowns(other) <= room_for(ACCURACY.compared_unknowns, self.joint.component_index.size)
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
                 level = known if 2 < levels <= reaching and known is not None and known.covers(other) else None
-                level = level or self.solve_at(other, budget)
+                level = level or self.solve_at(other, run)
                 if level is None and 2 < levels <= reaching:
-                    level = self.level_by_level(levels, budget)
+                    level = self.level_by_level(levels, run)
                 if level is not None:
                     richer = level if levels > 0 else None
                     if levels < seeing and seeing > 2:
@@ -225,14 +215,14 @@ class ResolvedState:
         own = self.case.resolution
         return own.orders == resolution.orders and own.samples >= resolution.samples
 
-    def level_by_level(self, levels: int, budget: Budget) -> ResolvedState | None:
+    def level_by_level(self, levels: int, run: Run) -> ResolvedState | None:
         """The state `levels` up, solved one level after the other; None where one of them fails."""
         level: ResolvedState | None = self
         for _ in range(levels):
-            level = None if level is None else level.solve_at(shifted(level.case.resolution, 1), budget)
+            level = None if level is None else level.solve_at(shifted(level.case.resolution, 1), run)
         return level
 
-    def relaxed(self, estimate: Estimate, budget: Budget) -> tuple[ResolvedState, Estimate]:
+    def relaxed(self, estimate: Estimate, run: Run) -> tuple[ResolvedState, Estimate]:
         """The state with as few harmonics and samples as it needs, and its estimated errors.
 
         The error is kept below a fraction of rtol, so that the next state does not need more harmonics at once.
@@ -241,7 +231,7 @@ class ResolvedState:
         here, enough = self, ACCURACY.kept_fraction * self.case.settings.rtol
         while estimate.largest <= ACCURACY.kept_fraction * enough:
             lower = fewer(here.case.resolution, here.case.settings)
-            level = here.solve_at(lower, budget) if lower != here.case.resolution else None
+            level = here.solve_at(lower, run) if lower != here.case.resolution else None
             if level is None:
                 break
             larger = level.difference(here).times(ACCURACY.two_levels_safety) + estimate

@@ -18,12 +18,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.continuation.natural import follow_naturally
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.prolongation import carried_history
+from solver.harmonic_balance.state import State
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.newton.run import Run
 from solver.settings import Resolution
 from solver.structure.fourier import build_basis, change_orders, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -31,7 +30,7 @@ from solver.structure.joint import Case, Joint
 
 
 def add_harmonics(
-    case: Case, joint: Joint, evaluation: Evaluation, resolution: Resolution, budget: Budget
+    case: Case, joint: Joint, evaluation: Evaluation, resolution: Resolution, run: Run
 ) -> Evaluation | None:
     """State with more harmonics, by a homotopy in their compliance.
 
@@ -41,8 +40,8 @@ def add_harmonics(
         The known state.
     resolution : Resolution
         All harmonics of the known state and new ones, and at least as many samples.
-    budget : Budget
-        Counts the Newton iterations.
+    run : Run
+        Tolerance and limits.
 
     Returns
     -------
@@ -50,17 +49,16 @@ def add_harmonics(
         State with the penalty of `case`; the caller transfers the state to the penalty of the new harmonics. None where
         the homotopy does not reach its end.
     """
-    tolerance = case.settings.tolerance
     finer = replace(case, resolution=resolution).joint(joint.omega, joint.excitation_amplitude)
     new = np.flatnonzero(~np.isin(resolution.orders, case.resolution.orders))
     homotopy = HarmonicHomotopy(finer, evaluation.history, evaluation.wear_depth, new, *compliances(finer, new))
     start = change_orders(evaluation.predicted_h, case.resolution.orders, resolution.orders)
     first = homotopy.at(0.0, evaluation.history)
-    result = solve_balance(first, start, JacobianSolver(), tolerance, budget)
+    result = run.fresh().solve(first, start)
     if not result.converged:
         return None
-    point = PathPoint(0.0, result.evaluation, evaluation.history)
-    last, arrived = follow_naturally(homotopy.at, point, 1.0, JacobianSolver(), tolerance, budget, keep_history=True)
+    begin = State(result.evaluation, evaluation.history, 0.0)
+    last, arrived = follow_naturally(homotopy.at, begin, 1.0, run.fresh(), keep_history=True)
     return last.evaluation if arrived else None
 
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from solver.continuation.options import CONTINUATION
 from solver.continuation.phase_lag import (
-    LaggingState,
     excitation_product,
     first_response,
     frequency_derivative,
@@ -23,22 +22,17 @@ from solver.continuation.phase_lag import (
 )
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.newton.bordering import Bordered
+from solver.newton.options import NEWTON
+from solver.newton.run import Run
 from solver.options import COMMON
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case
 
 
 def solve_at_peak(
-    case: Case,
-    balance: Balance,
-    start: FloatArray,
-    lag: float,
-    solver: JacobianSolver,
-    budget: Budget,
-    most: int | None = None,
-) -> tuple[LaggingState, float] | None:
+    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int | None = None
+) -> tuple[Bordered, float] | None:
     """The state of the largest amplitude near a phase lag, rad, and its lag; None where it is not found.
 
     Arguments as in `solve_at_lag`. Along the frequency the wear depth is constant, also where the depth grows with the
@@ -47,17 +41,17 @@ def solve_at_peak(
     below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
     before: tuple[float, float] | None = None
     for _ in range(CONTINUATION.attempts):
-        found = solve_at_lag(case, balance, start, lag, solver, budget, most)
+        found = solve_at_lag(case, balance, start, lag, run, most)
         if found is None:
             return None
-        rise, turn = rise_of_response(found, solver, accuracy)
+        rise, turn = rise_of_response(found, run, accuracy)
         # where the lag falls with the frequency there is no resonance
         if not (turn > 0.0 and math.isfinite(rise)):
             return None
         rise /= turn
         below, above = (lag, above) if rise > 0.0 else (below, lag)
         if abs(rise) <= accuracy or above - below <= accuracy:
-            return replace(found, turn=turn), lag
+            return replace(found, reduced=np.array([[turn]])), lag
         # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
         slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
         largest = CONTINUATION.largest_lag_step
@@ -73,7 +67,7 @@ def accepted_rise(rtol: float) -> float:
     return CONTINUATION.peak_rise * rtol
 
 
-def rise_of_response(state: LaggingState, solver: JacobianSolver, accuracy: float) -> tuple[float, float]:
+def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float, float]:
     """Changes along the frequency at fixed wear depth and tangential history, both s/rad.
 
     accuracy: rise over the turn that does not count.
@@ -87,9 +81,9 @@ def rise_of_response(state: LaggingState, solver: JacobianSolver, accuracy: floa
     """
     joint, at = state.balance.joint, state.at
     held = Balance.frozen(joint, at.history, at.wear_depth)
-    tangent, by_frequency = held.linearise(at), frequency_derivative(replace(state, balance=held))
-    step = solver.solve_by_parameter(tangent, -by_frequency.residual, 0.1 * accuracy)
-    moved = tangent.transmit(step)[0]
+    by_frequency = frequency_derivative(held, at)
+    step = run.step(held, at, -by_frequency.residual, min(NEWTON.forcing, 0.1 * accuracy))
+    moved = held.linearise(at).transmit(step)[0]
     response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
     rise = (by_frequency.response + first_response(joint, moved)) / response
     product = by_frequency.product + product_change(joint, moved)

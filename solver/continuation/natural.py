@@ -11,24 +11,21 @@ import numpy as np
 
 from solver.contact.coulomb import STICK
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import BalanceAt, PathPoint, final_history, vibration_change
 from solver.harmonic_balance.dlft import Evaluation
-from solver.newton.linear_solver import JacobianSolver
+from solver.harmonic_balance.state import BalanceAt, State, final_history, vibration_change
 from solver.newton.options import NEWTON
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.newton.run import Run
 
 
 def follow_naturally(
     balance_at: BalanceAt,
-    start: PathPoint,
+    start: State,
     target: float,
-    solver: JacobianSolver,
-    tolerance: float,
-    budget: Budget,
+    run: Run,
     keep_history: bool = False,
     fine: float = np.inf,
     shortest: float | None = None,
-) -> tuple[PathPoint, bool]:
+) -> tuple[State, bool]:
     """Step the parameter to the target. Steps are halved where Newton's method needs many iterations.
 
     The first Newton iteration from the last state is a tangent predictor (for wear: Eq. (19)). No other predictor is
@@ -38,12 +35,12 @@ def follow_naturally(
     ----------
     balance_at : callable
         Balance at a value of the parameter for a tangential history (n_contact, 2), m.
-    start : PathPoint
-        First state.
+    start : State
+        First state, with its parameter.
     target : float
         Last value of the parameter.
-    solver, tolerance, budget
-        As in `solve_balance`.
+    run : Run
+        Tolerance and limits.
     keep_history : bool
         True holds the tangential history of the start, for intermediate states that are no states of the joint.
     fine : float
@@ -55,35 +52,35 @@ def follow_naturally(
 
     Returns
     -------
-    point : PathPoint
+    state : State
         Last state.
     arrived : bool
         Whether the last state is at the target.
     """
-    point = start
+    state = start
     whole = target - start.parameter
     shortest = NEWTON.shortest_step if shortest is None else shortest
     if np.isfinite(fine) and whole != 0.0:
         shortest = min(shortest, 0.25 * fine / abs(whole))
     # fractions of two: sums of them are exact, so that the last step ends at the target
     fraction, done, failures = 1.0, 0.0, 0
-    while point.parameter != target:
+    while state.parameter != target:
         ahead = min(done + fraction, 1.0)
         reach = target if ahead == 1.0 else start.parameter + ahead * whole
-        balance = balance_at(reach, point.history)
+        balance = balance_at(reach, state.history)
         most = NEWTON.iterations if fraction <= 2.0 * shortest else CONTINUATION.near_iterations
-        result = solve_balance(balance, point.evaluation.predicted_h, solver, tolerance, budget, most)
-        smooth = abs(reach - point.parameter) <= fine or _is_smooth(point.evaluation, result.evaluation)
+        result = run.solve(balance, state.evaluation.predicted_h, most)
+        smooth = abs(reach - state.parameter) <= fine or _is_smooth(state.evaluation, result.evaluation)
         if result.converged and smooth:
-            history = point.history if keep_history else final_history(balance, result.evaluation)
-            point, done = PathPoint(reach, result.evaluation, history), ahead
+            history = state.history if keep_history else final_history(balance, result.evaluation)
+            state, done = State(result.evaluation, history, reach), ahead
             fraction = min(2.0 * fraction, 1.0)
         else:
             fraction *= 0.5
             failures += not result.converged
-            if fraction < shortest or failures > CONTINUATION.attempts or budget.exhausted:
-                return point, False
-    return point, True
+            if fraction < shortest or failures > CONTINUATION.attempts or run.budget.exhausted:
+                return state, False
+    return state, True
 
 
 def _is_smooth(before: Evaluation, after: Evaluation) -> bool:

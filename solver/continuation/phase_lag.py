@@ -1,15 +1,13 @@
 """A periodic state whose vibration lags behind its excitation by a given phase: the frequency is an unknown.
 
 With the first harmonics x of all displacements and F of the excitation, `F^H x = |F^H x| exp(-i lag)`. The lag rises
-from 0 below a resonance to pi above; the excitation does most work in phase resonance, at the lag pi/2. The unknowns
-are the predicted force p and the frequency omega, the equations are the harmonic balance `R(p, omega) = 0`, in an
-implicit step with the wear depth that grows with the motion, and
+from 0 below a resonance to pi above; the excitation does most work in phase resonance, at the lag pi/2. The frequency
+is the further unknown of a bordered balance (`solver.newton.bordering`), in an implicit step with the wear depth that
+grows with the motion, and the further equation is
 
     sin(arg(F^H x) + lag) = 0.
 
-Newton's method eliminates p: the solver of the Jacobian dR/dp gives the step of p for the residual and for the
-frequency, and one equation remains. The wear depth is eliminated in the Jacobian, so that its change with the frequency
-is part of the step.
+The wear depth is eliminated in the Jacobian, so that its change with the frequency is part of the step.
 """
 
 from __future__ import annotations
@@ -21,45 +19,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.model import ComplexArray, FloatArray
-from solver.newton.iteration import solve_newton
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
-from solver.newton.solve_balance import Budget
+from solver.newton.bordering import Bordered
+from solver.newton.run import Run
 from solver.options import COMMON
 from solver.structure.fourier import to_complex
 from solver.structure.frequency_slope import frequency_slope
 from solver.structure.joint import Case, Joint
-
-
-@dataclass(frozen=True)
-class LaggingState:
-    """Evaluation of the equations.
-
-    balance: harmonic balance at the frequency. at: its evaluation.
-    error: sine of the lag above the given one.
-    turn: change of the lag with the frequency, s/rad, from the last step of Newton's method; NaN without a step.
-    """
-
-    balance: Balance
-    at: Evaluation
-    error: float
-    turn: float = math.nan
-
-    @property
-    def omega(self) -> float:
-        """Frequency, rad/s."""
-        return self.balance.joint.omega
-
-    @property
-    def scale(self) -> tuple[float, float]:
-        """As in Evaluation."""
-        return self.at.scale
-
-    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
-        """Norm of the residual, dimensionless."""
-        return math.hypot(self.at.scaled_residual(scale), self.error)
 
 
 def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
@@ -73,69 +40,53 @@ def phase_lag(joint: Joint, at: Evaluation) -> float:
     return (-cmath.phase(excitation_product(joint, at.displacement_h)) + 0.5 * math.pi) % (2 * math.pi) - 0.5 * math.pi
 
 
-def solve_at_lag(
-    case: Case,
-    balance: Balance,
-    start: FloatArray,
-    lag: float,
-    solver: JacobianSolver,
-    budget: Budget,
-    most: int | None = None,
-) -> LaggingState | None:
-    """The state with a given lag; None where Newton's method fails.
+@dataclass(frozen=True)
+class AtLag:
+    """The problem: a balance, with fixed or with growing wear depths, whose frequency follows from its lag.
 
-    Parameters
-    ----------
-    case : Case
-        The case of the joint of the balance.
-    balance : Balance
-        The problem at the first frequency, with fixed or with growing wear depths.
-    start : array (n_rel, 2H+1)
-        First predicted force, N.
-    lag : float
-        rad, between 0 and pi.
-    solver, budget, most
-        As in `solve_balance`.
+    case: of the joint of the balance. balance: at some frequency. lag: rad, between 0 and pi.
+    The error is the sine of the lag above the given one, so that `Bordered.reduced` is the change of the lag with the
+    frequency along the states, s/rad.
     """
-    shape, unit, amplitude = start.shape, cmath.exp(1j * lag), balance.joint.excitation_amplitude
-    tolerance = case.settings.tolerance
 
-    def error(product: complex) -> float:
-        return -(unit * product).imag / max(abs(product), 1e-300)
+    case: Case
+    balance: Balance
+    lag: float
 
-    def evaluate(unknown: FloatArray) -> LaggingState:
-        here = replace(balance, joint=case.joint(float(unknown[-1]), amplitude))
-        at = here.evaluate(unknown[:-1].reshape(shape))
-        return LaggingState(here, at, error(excitation_product(here.joint, at.displacement_h)))
+    def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
+        """As in BorderedProblem; the value is the frequency, rad/s."""
+        joint = self.case.joint(float(values[0]), self.balance.joint.excitation_amplitude)
+        balance = replace(self.balance, joint=joint)
+        at = balance.evaluate(predicted_h)
+        product = excitation_product(joint, at.displacement_h)
+        return Bordered(balance, at, values, self._errors(product, product), extra=product)
 
-    turn = math.nan
+    def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
+        """As in BorderedProblem."""
+        by_frequency = frequency_derivative(here.balance, here.at)
+        return [by_frequency.residual], self._errors(by_frequency.product, here.extra)[:, None]
 
-    def direction(state: LaggingState) -> FloatArray:
-        budget.check_time()
-        rtol = max(NEWTON.forcing, 0.1 * tolerance / max(state.scaled_residual(), tolerance))
-        tangent, by_frequency = state.balance.linearise(state.at), frequency_derivative(state)
-        product = excitation_product(state.balance.joint, state.at.displacement_h)
+    def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
+        """As in BorderedProblem: of the equation times |F^H x|, whose derivative is linear in the motion."""
+        return self._errors(product_change(here.balance.joint, tangent.transmit(step)[0]), here.extra)
 
-        def change_of(step: FloatArray, by_omega: FloatArray) -> float:
-            nonlocal turn
-            own, with_frequency = (
-                product_change(state.balance.joint, tangent.transmit(part)[0]) for part in (step, by_omega)
-            )
-            # the equation times |F^H x|, whose derivative is linear in the motion
-            slope = (unit * (with_frequency + by_frequency.product)).imag
-            turn = -slope / max(abs(product), 1e-300)
-            return -(unit * (product + own)).imag / slope if slope != 0.0 else math.inf
+    def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
+        """The frequency changes by a small fraction of itself at most."""
+        return min(1.0, CONTINUATION.largest_frequency_change * float(here.values[0] / max(abs(change[0]), 1e-300)))
 
-        moved, change = solver.solve_with_parameter(
-            tangent, -state.at.residual, -by_frequency.residual, change_of, rtol
-        )
-        step = np.append(moved.ravel(), change)
-        largest = CONTINUATION.largest_frequency_change * state.omega
-        return np.asarray(step * min(1.0, largest / max(abs(change), 1e-300)))
+    def _errors(self, part: complex, product: complex) -> FloatArray:
+        """-Im(exp(i lag) part) / |product| (1,)."""
+        return np.array([-(cmath.exp(1j * self.lag) * part).imag / max(abs(product), 1e-300)])
 
-    end = solve_newton(evaluate, direction, np.append(start.ravel(), balance.joint.omega), tolerance, most)
-    budget.iterations += end.iterations
-    return replace(end.evaluation, turn=turn) if end.converged else None
+
+def solve_at_lag(
+    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int | None = None
+) -> Bordered | None:
+    """The state with a given lag, as `AtLag`; None where Newton's method fails.
+
+    start (n_rel, 2H+1): first predicted force, N, at the frequency of the balance. most: iterations.
+    """
+    return run.solve_bordered(AtLag(case, balance, lag), start, np.array([balance.joint.omega]), most)
 
 
 @dataclass(frozen=True)
@@ -151,16 +102,16 @@ class FrequencyDerivative:
     response: complex
 
 
-def frequency_derivative(state: LaggingState) -> FrequencyDerivative:
+def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencyDerivative:
     """Derivatives at a state; those of masses on rigid ground by differences."""
-    joint, at = state.balance.joint, state.at
+    joint = balance.joint
     amplitude, orders, u = joint.excitation_amplitude, joint.basis.orders, joint.to_relative(at.displacement_h)
     slope = frequency_slope(joint.model, joint.omega, amplitude, orders, u)
     residual, product, response = slope.force, slope.product, complex(slope.response[0])
     if joint.penalty.inertial.any():
         # longer than usual: the round-off of the static forces is small against the change of all others
         length = 10.0 * COMMON.difference * joint.omega
-        ahead = replace(state.balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
+        ahead = replace(balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
         motion = (ahead.displacement_h - at.displacement_h) / length
         residual = residual + (ahead.residual - at.residual) / length
         product += product_change(joint, motion)

@@ -20,11 +20,10 @@ import numpy as np
 
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.state import State, final_history
 from solver.model import FloatArray
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.structure.joint import Joint
 
 
@@ -40,41 +39,40 @@ def ratchets(joint: Joint, evaluation: Evaluation, fraction: float) -> bool:
     return ratcheting_work(joint, evaluation) > fraction * float(evaluation.slip_work.sum())
 
 
-def shake_down(joint: Joint, point: PathPoint, fraction: float, tolerance: float, budget: Budget) -> PathPoint:
+def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
     """State after shakedown of the masses, at an unchanged wear depth.
 
     Parameters
     ----------
-    joint, point : Joint, PathPoint
+    joint, state : Joint, State
         The state before shakedown.
     fraction : float
         Accepted work of ratcheting over the slip work.
-    tolerance, budget
-        As in `solve_balance`.
+    run : Run
+        Tolerance and limits.
 
     Returns
     -------
-    PathPoint
+    State
         The state after shakedown; the last state that was found where ratcheting does not end.
     """
-    solver = JacobianSolver()
-    worn = point.evaluation.wear_depth
+    run, worn = run.fresh(), state.evaluation.wear_depth
     for _ in range(CONTINUATION.attempts):
-        if not ratchets(joint, point.evaluation, fraction):
+        if not ratchets(joint, state.evaluation, fraction):
             break
-        homotopy = _MeanShift(joint, worn, point.evaluation.history, _mean_shift(joint, point))
-        start = PathPoint(0.0, point.evaluation, point.evaluation.history)
-        moved, arrived = follow_naturally(homotopy.at, start, 1.0, solver, tolerance, budget, keep_history=True)
+        homotopy = _MeanShift(joint, worn, state.evaluation.history, _mean_shift(joint, state))
+        start = State(state.evaluation, state.evaluation.history, 0.0)
+        moved, arrived = follow_naturally(homotopy.at, start, 1.0, run, keep_history=True)
         if not arrived:
             break
         history = final_history(homotopy.at(1.0, start.history), moved.evaluation)
-        point = PathPoint(point.parameter, moved.evaluation, history)
-    return point
+        state = State(moved.evaluation, history, state.parameter)
+    return state
 
 
-def _mean_shift(joint: Joint, point: PathPoint) -> FloatArray:
+def _mean_shift(joint: Joint, state: State) -> FloatArray:
     """Shift (n_contact, 2), m, of the inertial pairs from the mean position in the history to the position reached."""
-    shift = point.evaluation.displacement_h[:, 1:, 0] - point.evaluation.history
+    shift = state.evaluation.displacement_h[:, 1:, 0] - state.evaluation.history
     return np.where(joint.penalty.inertial[:, None], shift, 0.0)
 
 

@@ -21,18 +21,17 @@ from dataclasses import replace
 import numpy as np
 
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.state import State
 from solver.model import FloatArray
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.newton.run import Run
 from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, Joint, static_joint, viscous_joint
 
 
-def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, budget: Budget) -> PathPoint | Outcome:
+def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State | Outcome:
     """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
 
     Without gaps and wear the state grows in proportion to its load, as the first iterate of a step does. In the first
@@ -44,39 +43,37 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, tolerance: float, b
         The joint; its excitation is left out.
     wear_depth : array (n_contact,)
         Wear depth, m, held.
-    tolerance, budget
-        As in `solve_balance`.
+    run : Run
+        Tolerance and limits.
 
     Returns
     -------
-    PathPoint or Outcome
-        The parameter of the point is the load factor, 1. STATIC_SLIDING or STATIC_OPEN where there is no static state,
+    State or Outcome
+        The parameter of the state is the load factor, 1. STATIC_SLIDING or STATIC_OPEN where there is no static state,
         STATIC_FAILED where none is found.
     """
-    solver, n_steps = JacobianSolver(), CONTINUATION.load_steps
+    run, n_steps = run.fresh(), CONTINUATION.load_steps
     unmoved = np.zeros((joint.contact.n_contact, 3, 1))
     rest = Balance.frozen(static_joint(joint, 0.0), unmoved[:, 1:, 0], wear_depth)
-    point = PathPoint(0.0, rest.evaluate(rest.predict(unmoved, unmoved)), rest.history)
+    state = State(rest.evaluate(rest.predict(unmoved, unmoved)), rest.history, 0.0)
     for step in range(1, n_steps + 1):
-        balance = Balance.frozen(static_joint(joint, step / n_steps), point.history, wear_depth)
-        before = point.evaluation.predicted_h
+        balance = Balance.frozen(static_joint(joint, step / n_steps), state.history, wear_depth)
+        before = state.evaluation.predicted_h
         start = balance.joint.structure.force_h() if step == 1 else before * (step / (step - 1.0))
-        result = solve_balance(balance, start, solver, tolerance, budget)
-        if result.converged:
-            state, last = result.evaluation, balance
-        else:
-            used = budget.iterations
-            settled = _settle(balance, point.evaluation, solver, tolerance, budget)
+        found = run.state(balance, start)
+        if found is None:
+            used = run.budget.iterations
+            settled = _settle(balance, state.evaluation, run)
             # every search needs a static state, whose steps have a limit of their own
-            budget.limit += budget.iterations - used
+            run.budget.limit += run.budget.iterations - used
             if isinstance(settled, Outcome):
                 return settled
-            state, last = settled
-        point = PathPoint(step / n_steps, state, final_history(last, state))
-    return point
+            found = settled
+        state = replace(found, parameter=step / n_steps)
+    return state
 
 
-def predicted_at_rest(case: Case, quiet: Joint, static: PathPoint, wear_depth: FloatArray) -> FloatArray:
+def predicted_at_rest(case: Case, quiet: Joint, static: State, wear_depth: FloatArray) -> FloatArray:
     """Predicted force (n_rel, 2H+1), N, of the static state with the harmonics of a case, none of which vibrates.
 
     quiet: the joint without excitation, at the harmonics of the case.
@@ -88,23 +85,21 @@ def predicted_at_rest(case: Case, quiet: Joint, static: PathPoint, wear_depth: F
     return Balance.frozen(quiet, static.history, wear_depth).predict(displacement_h, force_h)
 
 
-def _settle(
-    balance: Balance, before: Evaluation, solver: JacobianSolver, tolerance: float, budget: Budget
-) -> tuple[Evaluation, Balance] | Outcome:
-    """Static state to which viscous pairs come from the state `before`, and its balance, or why there is none."""
+def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Outcome:
+    """Static state to which viscous pairs come from the state `before`, or why there is none."""
     most, viscosity, begun = CONTINUATION.near_iterations, 1.0, before.displacement_h
     far, moved = float((balance.joint.contact.gap + balance.wear_depth).max()), np.zeros_like(begun)
     for _ in range(CONTINUATION.viscous_steps):
         viscous = replace(balance, joint=viscous_joint(balance.joint, viscosity, before.displacement_h))
-        ahead = solve_balance(viscous, viscous.predict(*_motion(before)), solver, tolerance, budget, most)
-        if not ahead.converged:
+        ahead = run.state(viscous, viscous.predict(*_motion(before)), most=most)
+        if ahead is None:
             viscosity *= CONTINUATION.viscosity_rise
             continue
         before = ahead.evaluation
-        balance = replace(balance, history=final_history(viscous, before))
-        end = solve_balance(balance, balance.predict(*_motion(before)), solver, tolerance, budget, most)
-        if end.converged:
-            return end.evaluation, balance
+        balance = replace(balance, history=ahead.history)
+        end = run.state(balance, balance.predict(*_motion(before)), most=most)
+        if end is not None:
+            return end
         if not moved.any():
             # the first step is about as long as the load deforms the joint
             far = max(far, CONTINUATION.runaway * float(np.abs(before.displacement_h - begun).max()))

@@ -29,15 +29,14 @@ from typing import Any, cast
 import numpy as np
 
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.state import State, final_history
 from solver.model import ComplexArray, FloatArray, Matrix
-from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.newton.run import Run
 from solver.options import COMMON
 from solver.outcome import Outcome
-from solver.stability.hill import is_stable_at
+from solver.stability.hill import is_stable
 from solver.structure.condensation import CondensedStructure, condense, relative_indices
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -155,9 +154,8 @@ def relax_to_periodic(
     start: Evaluation,
     start_joint: Joint,
     history: FloatArray,
-    solver: JacobianSolver,
-    budget: Budget,
-) -> tuple[Outcome, PathPoint | None]:
+    run: Run,
+) -> State | Outcome:
     """Stable periodic state of `joint` to which the structure relaxes in time from a state of `start_joint`.
 
     Parameters
@@ -173,43 +171,42 @@ def relax_to_periodic(
         excitation leads to the state that builds up from rest.
     history : array (n_contact, 2)
         Tangential history at the start, m.
-    solver, budget
-        As in `solve_balance`.
+    run : Run
+        Tolerance and limits.
 
     Returns
     -------
-    outcome : Outcome
-        - CONVERGED: the state is found and stable.
+    State or Outcome
+        The stable state, or why there is none:
+
         - ADRIFT: the mean positions run away. All pairs slip, and only friction holds the parts: there is no periodic
           state.
         - UNSTABLE: the motion is an unstable periodic state and does not leave this state.
         - UNSETTLED: the motion does not settle within `CONTINUATION.search_iterations` Newton iterations.
-    point : PathPoint or None
-        The state; its parameter is NaN. None where the outcome is not CONVERGED.
     """
-    budget.tell(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
+    budget = run.budget
+    budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
     transient = Transient(case, joint)
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
     predicted, period = start.predicted_h, 2.0 * np.pi / joint.omega
     # the longest step, in periods, is practically infinite: the step is the harmonic balance itself
     length, longest, tried = 1.0, 1.0 / COMMON.round_off, np.inf
     size = float(np.abs(start.displacement_h).max())
-    tolerance, most = case.settings.tolerance, CONTINUATION.near_iterations
     left = CONTINUATION.search_iterations
     # whether an unstable state has been found, which the motion leaves
     grows = False
     while left > 0 and length >= NEWTON.shortest_step and not budget.exhausted:
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
-        result = solve_balance(balance, predicted, solver, tolerance, budget, most)
+        result = run.solve(balance, predicted, CONTINUATION.near_iterations)
         left -= max(result.iterations, 1)
         ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
         change = _change(motion, ahead)
         too_far = change > 2.0 * CONTINUATION.smooth_change and length > 1.0
         # a step over more than the time in which a motion grows would damp this motion
-        damped = grows and result.converged and not is_stable_at(balance, result.evaluation, solver, budget)
+        damped = grows and result.converged and not is_stable(balance, result.evaluation, run)
         if damped and result.iterations == 0:
-            return Outcome.UNSTABLE, None
+            return Outcome.UNSTABLE
         if not result.converged or too_far or damped:
             length *= CONTINUATION.transient_cut
             continue
@@ -218,44 +215,28 @@ def relax_to_periodic(
         moved = np.abs(result.evaluation.displacement_h)
         size = max(size, float(moved[:, :, 1:].max()))
         if moved[:, :, 0].max() > CONTINUATION.runaway * size:
-            return Outcome.ADRIFT, None
+            return Outcome.ADRIFT
         # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
         renewed = change < 0.5 * tried or length >= longest
         if change < CONTINUATION.relaxed_change and renewed:
             tried = change
             begun = budget.iterations
-            found, stable = _periodic(case, joint, wear_depth, predicted, history, solver, budget)
+            balance = Balance.frozen(joint, history, wear_depth)
+            # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
+            found = run.state(balance, predicted)
+            stable = found is not None and is_stable(balance, found.evaluation, run)
             left -= budget.iterations - begun
             grows = grows or (found is not None and not stable)
             if found is not None and stable:
                 distance = _change(transient.periodic(found.evaluation), motion)
                 if distance < CONTINUATION.smooth_change:
-                    return Outcome.CONVERGED, found
+                    return found
         elif change > CONTINUATION.relaxed_change:
             tried = np.inf
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
         growth = float(np.clip(CONTINUATION.smooth_change / max(change, 1e-300), 0.5, 2.0))
         length = min(max(length * growth, 1.0), longest)
-    return Outcome.UNSETTLED, None
-
-
-def _periodic(
-    case: Case,
-    joint: Joint,
-    wear_depth: FloatArray,
-    predicted: FloatArray,
-    history: FloatArray,
-    solver: JacobianSolver,
-    budget: Budget,
-) -> tuple[PathPoint | None, bool]:
-    """Periodic state near a relaxed motion, or None; and whether the state is stable."""
-    balance = Balance.frozen(joint, history, wear_depth)
-    # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
-    result = solve_balance(balance, predicted, solver, case.settings.tolerance, budget, NEWTON.iterations)
-    if not result.converged:
-        return None, False
-    found = PathPoint(float("nan"), result.evaluation, final_history(balance, result.evaluation))
-    return found, is_stable_at(balance, result.evaluation, solver, budget)
+    return Outcome.UNSETTLED
 
 
 def _change(before: Motion, after: Motion) -> float:

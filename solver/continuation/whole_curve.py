@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.continuation.arc_length import Arc, add_fold
-from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.state import State
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Branch:
     - returned: whether the branch has come back to the limit behind its start.
     """
 
-    points: tuple[PathPoint, ...]
+    points: tuple[State, ...]
     folds: tuple[int, ...]
     arrived: bool = False
     returned: bool = False

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from solver.continuation.options import CONTINUATION
+
 
 @dataclass(frozen=True)
 class LoadingOptions:
@@ -52,9 +56,22 @@ class LoadingOptions:
     """Most Newton iterations of a sweep: more in jumps and searches are in vain (the dovetail takes 300). Parts of the
     sweep may take the shares `node_iterations` and `first_iterations`."""
 
+    iterations_per_save: int = 100
+    """Newton iterations after which a sweep is saved at its next node, and its factorisation dropped, so that a resumed
+    sweep is equal to the last bit: 1 s of 48 pairs, 17 s of 336."""
+
     # where the first attempt fails
     other_starts: tuple[tuple[int, int], ...] = ((1, 64), (3, 256), (15, 256))
     """Harmonics and samples of further attempts to find a first state."""
+
+    def largest_change(self, rtol: float, wider: float, *, sticks: bool) -> float:
+        """Largest relative change of the vibration in a step; wider: factor where pairs slip or open.
+
+        sticks: whether no pair slips or opens at both ends. A longer step might go over a whole resonance.
+        """
+        if sticks:
+            return CONTINUATION.linear_change
+        return wider * float(np.clip(self.change_per_rtol * rtol, *self.change_limits))
 
     @property
     def node_iterations(self) -> int:

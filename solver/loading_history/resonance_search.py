@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,11 +18,11 @@ import numpy as np
 from solver.continuation.largest_response import solve_at_peak
 from solver.continuation.phase_lag import phase_lag
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import State
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
 from solver.loading_history.options import LOADING
-from solver.loading_history.sweep import NodeSweep
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.loading_history.sweep import Step, Sweep
+from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.settings import FollowedFrequency
 
@@ -34,9 +35,7 @@ def advance_to_resonance(line: FrequencySweep, follow: FollowedFrequency) -> Fou
     try:
         frequency = find_resonance(line, follow)
     except _NoneFoundError as error:
-        found = Found(error.outcome)
-        found.message = str(error)
-        return found
+        return Found(error.outcome, message=str(error))
     return line.advance(frequency)
 
 
@@ -54,16 +53,14 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
     for near, far in _segments(follow, line.sweep == "down"):
         # the state at a frequency belongs to the sweep of its quarter octave
         nodes = line.sweep_in_cell(0.5 * (near + far))
-        budget = Budget(deadline=line.budget.deadline)
+        run = Run(line.settings.tolerance, Budget(deadline=line.run.budget.deadline))
 
-        def excess(omega: float, nodes: NodeSweep = nodes, budget: Budget = budget) -> float:
+        def excess(omega: float, nodes: Sweep[State] = nodes, run: Run = run) -> float:
             """Positive before the resonance on the way of the sweep, negative behind."""
-            budget.iterations, budget.limit = 0, LOADING.node_iterations
-            step, _ = nodes.state_at(omega, budget)
-            if step is None:
-                raise _lost(line, nodes, omega)
-            joint = nodes.path.joint_at(omega)
-            return nodes.direction * math.cos(phase_lag(joint, step.point.evaluation))
+            run.budget.iterations, run.budget.limit = 0, LOADING.node_iterations
+            state = _state_at(line, nodes, omega, run)
+            joint = nodes.path.case.joint(omega, line.excitation_amplitude)
+            return nodes.direction * math.cos(phase_lag(joint, state.evaluation))
 
         place, end = (2.0 * math.pi * frequency for frequency in (near, far))
         if nodes.here is not None and (nodes.here.parameter - place) * nodes.direction > 0.0:
@@ -77,11 +74,11 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
             line.advance_nodes(nodes, float(np.nextafter(place, nodes.direction * math.inf)))
             if nodes.ahead is None:
                 raise _lost(line, nodes, place)
-            target = min(nodes.ahead.point.parameter, end, key=lambda at: (at - place) * nodes.direction)
+            target = min(nodes.ahead.state.parameter, end, key=lambda at: (at - place) * nodes.direction)
             there = excess(target)
             if here > 0.0 >= there:
-                found = _between(excess, place, target, nodes)
-                return (found if follow.of == "resonance" else _peak(line, nodes, found, budget)) / (2.0 * math.pi)
+                found = _between(line, excess, place, target, nodes)
+                return (found if follow.of == "resonance" else _peak(line, nodes, found, run)) / (2.0 * math.pi)
             place, here = target, there
         before = here
     raise _NoneFoundError(
@@ -100,27 +97,35 @@ def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, fl
     return ((high, low) for low, high in reversed(parts)) if down else iter(parts)
 
 
-def _peak(line: FrequencySweep, nodes: NodeSweep, omega: float, budget: Budget) -> float:
+def _peak(line: FrequencySweep, nodes: Sweep[State], omega: float, run: Run) -> float:
     """Frequency of the largest amplitude near phase resonance, rad/s. Raises _NoneFoundError."""
-    step, _ = nodes.state_at(omega, budget)
-    if step is None:
-        raise _lost(line, nodes, omega)
-    at = step.point.evaluation
-    balance = Balance.frozen(nodes.path.joint_at(omega), at.history, at.wear_depth)
-    found = solve_at_peak(nodes.case, balance, at.predicted_h, 0.5 * math.pi, JacobianSolver(), budget)
+    at, case = _state_at(line, nodes, omega, run).evaluation, nodes.path.case
+    balance = Balance.frozen(case.joint(omega, line.excitation_amplitude), at.history, at.wear_depth)
+    found = solve_at_peak(case, balance, at.predicted_h, 0.5 * math.pi, run.fresh())
     if found is None:
         raise _NoneFoundError(f"no largest amplitude is found near phase resonance at {omega / (2.0 * math.pi):.6g} Hz")
-    return found[0].omega
+    return float(found[0].values[0])
 
 
-def _between(excess: Callable[[float], float], one: float, other: float, nodes: NodeSweep) -> float:
+def _state_at(line: FrequencySweep, nodes: Sweep[State], omega: float, run: Run) -> State:
+    """State of the sweep between its nodes. Raises _NoneFoundError."""
+    found = nodes.state_at(omega, run.fresh())
+    if not isinstance(found, Step):
+        nodes.state = replace(nodes.state, failure=found)
+        raise _lost(line, nodes, omega)
+    return found.state
+
+
+def _between(
+    line: FrequencySweep, excess: Callable[[float], float], one: float, other: float, nodes: Sweep[State]
+) -> float:
     """Frequency, rad/s, at which the excess passes zero between two nodes. Raises _NoneFoundError."""
     if excess(one) <= 0.0:
         # zero but for round-off
         return one
     from scipy.optimize import brentq  # where it is used: it takes a while to load
 
-    found = float(brentq(excess, one, other, xtol=nodes.case.settings.tolerance * one, rtol=1e-12))
+    found = float(brentq(excess, one, other, xtol=line.settings.tolerance * one, rtol=1e-12))
     assert nodes.ahead is not None
     for fold in nodes.ahead.folds:
         if abs(found - fold) <= LOADING.free_step * fold:
@@ -130,7 +135,7 @@ def _between(excess: Callable[[float], float], one: float, other: float, nodes: 
     return found
 
 
-def _lost(line: FrequencySweep, nodes: NodeSweep, omega: float) -> _NoneFoundError:
+def _lost(line: FrequencySweep, nodes: Sweep[State], omega: float) -> _NoneFoundError:
     return _NoneFoundError(
         f"the sweep {line.sweep} ends at {omega / (2.0 * math.pi):.6g} Hz and has met no resonance until there",
         line.why_lost(nodes),

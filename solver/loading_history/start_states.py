@@ -15,9 +15,9 @@ import numpy as np
 from solver.clock import computing_time
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
 from solver.loading_history.resonance_search import advance_to_resonance
-from solver.loading_history.sweep_start import Sweep
+from solver.loading_history.sweep_start import Direction
 from solver.model import FloatArray, ReducedModel
-from solver.newton.solve_balance import OutOfTimeError
+from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
@@ -29,7 +29,7 @@ def follow_branch(
     friction_coefficient: float | FloatArray | None,
     excitation_amplitude: float,
     frequencies: FloatArray | FollowedFrequency,
-    sweep: Sweep,
+    sweep: Direction,
     settings: SolverSettings,
     keep: Callable[[Packed | str], None] | None = None,
     resume: Packed | None = None,
@@ -80,19 +80,18 @@ def follow_line(
     """The states of `follow_branch` from a sweep before its first state."""
     n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
     order = np.arange(n_states)[:: -1 if line.sweep == "down" else 1]
-    line.budget.tell = keep or line.budget.tell
+    line.run.budget.report = keep or line.run.budget.report
     if resume is not None:
-        line.load_state(unpack(resume))
+        line.load(unpack(resume))
 
     def save() -> None:
-        if keep is not None and (state := line.state_dict()) is not None:
+        if keep is not None and (state := line.state()) is not None:
             keep(pack(state))
 
     line.save = save
     started = computing_time()
     for index in order:
         line.set_deadline(started + line.settings.time_limit)
-        message = ""
         try:
             if isinstance(frequencies, FollowedFrequency):
                 found = advance_to_resonance(line, frequencies)
@@ -100,11 +99,9 @@ def follow_line(
                 found = line.advance(float(frequencies[index]))
         except OutOfTimeError:
             found = Found(Outcome.TIME_LIMIT)
-            line.abandon()
         except Exception as error:
             # an error spoils one point only: the sweep goes on from the state before
-            found, message = Found(Outcome.EXCEPTION), describe_error(error)
-            line.abandon()
+            found = Found(Outcome.EXCEPTION, message=describe_error(error))
         now = computing_time()
         yield (
             int(index),
@@ -120,7 +117,7 @@ def follow_line(
                 run_time=now - started,
                 branch=found.branch,
                 fold_frequency=found.fold / (2.0 * np.pi),
-                message=message or found.message,
+                message=found.message,
             ),
         )
         started = now

@@ -19,7 +19,7 @@ from solver.model import ReducedModel
 from solver.packing import packable
 from solver.structure.condensation import build_structure
 
-Sweep = Literal["up", "down", "ramp"]
+Direction = Literal["up", "down", "ramp"]
 
 
 @packable
@@ -38,7 +38,7 @@ class Origin:
     cell: int
 
 
-def find_origin(model: ReducedModel, frequency: float, sweep: Sweep) -> Origin:
+def find_origin(model: ReducedModel, frequency: float, sweep: Direction) -> Origin:
     """Origin of the sweep to a frequency, Hz."""
     cell = math.floor(LOADING.cells_per_octave * math.log2(frequency))
     low, high = (2.0 ** (edge / LOADING.cells_per_octave) for edge in (cell, cell + 1))

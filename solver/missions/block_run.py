@@ -12,9 +12,10 @@ import scipy.linalg
 from solver.accuracy.options import ACCURACY
 from solver.clock import computing_time
 from solver.contact.wear_law import WearLaw
+from solver.harmonic_balance.state import Failure
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.start_states import follow_line
-from solver.loading_history.sweep_start import Sweep
+from solver.loading_history.sweep_start import Direction
 from solver.missions.block_start import begin_again, continue_block
 from solver.missions.blocks import Block, Mission, worn
 from solver.model import ComplexArray, FloatArray
@@ -26,7 +27,6 @@ from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from solver.wear.rate_slope import rate_slope
 from solver.wear.solutions import Ended, Like, SlowTime, Solutions
-from solver.wear.state import Failure
 from solver.wear.wearing_joint import WearingJoint
 
 
@@ -110,7 +110,7 @@ class BlockCase:
         """The wear law, whose table counts depths from the unworn joint."""
         return self.mission.law.begun_at(self.depth)
 
-    def line(self, sweep: Sweep) -> FrequencySweep:
+    def line(self, sweep: Direction) -> FrequencySweep:
         """The sweep to the states of the block, at the depth before."""
         block = self.block
         model = worn(block.model, self.depth)
@@ -165,7 +165,7 @@ def _start(case: BlockCase) -> tuple[StartState, StartState | None]:
         near = begin_again(block, case.depth, case.begun, case.settings, case.every)
         if near is not None:
             return near, case.begun
-    sweep: Sweep = case.mission.first if block.way == "continue" else block.way
+    sweep: Direction = case.mission.first if block.way == "continue" else block.way
     _, start = next(follow_line(case.line(sweep), np.array([block.steady[0]])))
     return start, None if block.way == "continue" or start.state is None else start
 
@@ -175,7 +175,7 @@ def _slope(work: WearingJoint, ended: Ended, case: BlockCase, growth: FloatArray
     assert ended.state is not None
     at = ended.state.point.evaluation
     pairs = case.depth + growth > 0.0
-    slope = rate_slope(work.at(ended.state), at, work.gain(1.0), work.wearing, pairs, work.solver)
+    slope = rate_slope(work.at(ended.state), at, work.gain(1.0), work.wearing, pairs, work.run)
     return np.asarray(scipy.linalg.expm(case.block.steady[1] * slope) - np.eye(len(slope)))
 
 

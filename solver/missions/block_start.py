@@ -11,15 +11,14 @@ from solver.accuracy.error_estimate import Estimate
 from solver.clock import computing_time
 from solver.contact.coulomb import STICK
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import PathPoint, final_history, vibration_change
 from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.state import State, final_history, vibration_change
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
-from solver.loading_history.path_step import LoadingPath
-from solver.loading_history.sweep_start import Sweep
+from solver.loading_history.path import LoadingPath
+from solver.loading_history.sweep_start import Direction
 from solver.missions.blocks import Block, worn
 from solver.model import FloatArray
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget, OutOfTimeError, solve_balance
+from solver.newton.run import Budget, OutOfTimeError, Run
 from solver.outcome import Outcome, describe_error
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
@@ -84,27 +83,27 @@ def begin_again(
     OutOfTimeError
         The time is over.
     """
-    budget = Budget(deadline=computing_time() + settings.time_limit)
+    run = Run(settings.tolerance, Budget(deadline=computing_time() + settings.time_limit))
     path, before = _evaluated(block, depth, begun, settings)
     if begun.branch > 0 or not _forgets(before.evaluation):
         return None
     found = None
     with contextlib.suppress(np.linalg.LinAlgError):
-        found = path.solve((before,), 1.0, JacobianSolver(), budget)
+        found = path.solve((before,), 1.0, run)
     if found is None or not _forgets(found.evaluation):
         return None
     if vibration_change(before.evaluation, found.evaluation) > CONTINUATION.smooth_change:
         return None
     joint = path.joint_at(1.0)
-    if find_instability(path.case, joint, found.evaluation, budget, every):
+    if find_instability(path.case, joint, found.evaluation, run, every):
         return None
     state = periodic_state(joint, found)
-    return replace(begun, state=state, reference=None, newton_iterations=budget.iterations)
+    return replace(begun, state=state, reference=None, newton_iterations=run.budget.iterations)
 
 
 def _evaluated(
     block: Block, depth: FloatArray, begun: StartState, settings: SolverSettings
-) -> tuple[LoadingPath, PathPoint]:
+) -> tuple[LoadingPath, State]:
     """The joint with these depths, and the vibration of a state in it."""
     state, model = begun.state, worn(block.model, depth)
     assert state is not None
@@ -112,7 +111,7 @@ def _evaluated(
     path = LoadingPath(case, state.excitation_amplitude, state.omega)
     balance = path.balance_at(1.0, state.start_history)
     at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
-    return path, PathPoint(1.0, at, state.start_history)
+    return path, State(at, state.start_history, 1.0)
 
 
 def _forgets(at: Evaluation) -> bool:
@@ -156,16 +155,13 @@ class _Continuation:
         unworn = np.zeros_like(state.wear_depth)
         balance = Balance.frozen(joint, state.start_history, unworn)
         first = balance.predict(state.displacement_h, state.contact_force_h)
-        line = FrequencySweep(
-            self.model, self.block.friction_coefficient, state.excitation_amplitude, "up", self.settings
-        )
-        line.set_deadline(self.deadline)
-        found = solve_balance(balance, first, JacobianSolver(), self.settings.tolerance, line.budget)
-        self.iterations += line.budget.iterations
+        run = Run(self.settings.tolerance, Budget(deadline=self.deadline))
+        found = run.solve(balance, first)
+        self.iterations += run.budget.iterations
         if not found.converged:
             self.start = replace(start, state=None, outcome=Outcome.BRANCH_LOST)
             return
-        self.start = replace(start, state=periodic_state(joint, PathPoint(0.0, found.evaluation, state.start_history)))
+        self.start = replace(start, state=periodic_state(joint, State(found.evaluation, state.start_history)))
 
     def _go(self, ramp: bool, frequency: float, amplitude: float) -> None:
         """Go to another amplitude, N, or to another frequency, Hz, if it is another one."""
@@ -181,11 +177,11 @@ class _Continuation:
         balance = Balance.frozen(joint, before.start_history, np.zeros_like(before.wear_depth))
         at = balance.evaluate(balance.predict(before.displacement_h, before.contact_force_h))
         parameter = before.excitation_amplitude / amplitude if ramp else before.omega
-        sweep: Sweep = "ramp" if ramp else "up" if omega > before.omega else "down"
+        sweep: Direction = "ramp" if ramp else "up" if omega > before.omega else "down"
         line = FrequencySweep(self.model, self.block.friction_coefficient, amplitude, sweep, self.settings)
         line.set_deadline(self.deadline)
         found = Found(Outcome.UNSETTLED)
-        if line.go_on_from(case, PathPoint(parameter, at, final_history(balance, at)), frequency):
+        if line.go_on_from(case, State(at, final_history(balance, at), parameter), frequency):
             found = line.advance(frequency)
         self.iterations += line.n_iterations
         estimate = found.estimate if found.state is not None else Estimate(np.nan, np.nan)

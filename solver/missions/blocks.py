@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from solver.contact.wear_law import ARCHARD, WearLaw
-from solver.loading_history.sweep_start import Sweep
+from solver.loading_history.sweep_start import Direction
 from solver.model import FloatArray, ReducedModel
 from solver.settings import SolverSettings, WearTarget
 
@@ -30,7 +30,7 @@ class Passage:
         return abs(self.stop**2 - self.start**2) / (2.0 * self.rate)
 
     @property
-    def sweep(self) -> Sweep:
+    def sweep(self) -> Direction:
         """The direction."""
         return "up" if self.stop > self.start else "down"
 
@@ -100,7 +100,7 @@ class Mission:
     settings: SolverSettings
     law: WearLaw = ARCHARD
     until: WearTarget | None = None
-    first: Sweep = "up"
+    first: Direction = "up"
     largest_step: int | None = None
 
     @property

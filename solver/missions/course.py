@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockRun
 from solver.model import FloatArray
 from solver.packing import packable
 from solver.results.history import StartState
 from solver.wear.interpolation import depth_within
 from solver.wear.solutions import Like
-from solver.wear.state import Failure
 
 RESPONSES = ("response_begin", "response_end", "response_peak_begin", "response_peak_end")
 """Names of the responses in a node, (n_block, n_response), m: first harmonic and largest magnitude over a period."""

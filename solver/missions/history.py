@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from solver.accuracy.history_error import Both, HistoryError, history_error
 from solver.accuracy.target_error import error_of_wear, target_error
+from solver.harmonic_balance.state import Failure
 from solver.missions.blocks import Mission
 from solver.missions.course import RESPONSES, MissionCourse
 from solver.missions.one_block import integrate_one_block, is_one_history
@@ -22,7 +23,6 @@ from solver.model import FloatArray
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, unpack
 from solver.results.cut_off import describe_cut_off
-from solver.wear.state import Failure
 
 ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
 """Outcomes of a reference solution that are those of the history."""

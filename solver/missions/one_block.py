@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import Sweep
+from solver.loading_history.sweep_start import Direction
 from solver.missions.blocks import Mission, Passage
 from solver.missions.result import MissionHistory
 from solver.model import IntArray
@@ -32,7 +32,7 @@ def integrate_one_block(
     """The wear history of the only block, read at its missions; arguments as of `integrate_missions`."""
     (block,) = mission.blocks
     frequency, cycles = block.steady
-    sweep: Sweep = mission.first if block.way == "continue" else block.way
+    sweep: Direction = mission.first if block.way == "continue" else block.way
     _, start = next(
         follow_branch(
             block.model,

@@ -29,6 +29,7 @@ from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.reference import RTOL_RATIO
 from solver.clock import computing_time
 from solver.harmonic_balance.response_peak import largest_responses
+from solver.harmonic_balance.state import Failure
 from solver.loading_history.start_states import follow_line
 from solver.missions.block_run import BlockCase, BlockRun, not_flown
 from solver.missions.blocks import Passage, worn
@@ -43,7 +44,7 @@ from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
 from solver.wear.rate_slope import rate_slope
 from solver.wear.solutions import Like
-from solver.wear.state import Failure, WearState
+from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
 
 
@@ -157,7 +158,7 @@ def _slope(case: BlockCase, passage: Passage, state: SweptState) -> FloatArray:
         return np.zeros((pairs.size, pairs.size))
     work, begun = _joint(case, state.start)
     at = begun.point.evaluation
-    slope = rate_slope(work.at(begun), at, work.gain(1.0), work.wearing, pairs | (case.depth > 0.0), work.solver)
+    slope = rate_slope(work.at(begun), at, work.gain(1.0), work.wearing, pairs | (case.depth > 0.0), work.run)
     return np.asarray(slope * state.frequency / abs(passage.rate))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from solver.accuracy.reference import RTOL_RATIO
 from solver.clock import computing_time
+from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockCase, BlockRun, not_flown, run_block
 from solver.missions.blocks import Mission, Passage
 from solver.missions.course import MissionCourse, MissionNode, growth_within
@@ -25,7 +26,6 @@ from solver.results.history import StartState
 from solver.wear.control import allowed_error, next_ratio
 from solver.wear.integrate import guarded
 from solver.wear.interpolation import fraction_where
-from solver.wear.state import Failure
 
 
 @packable

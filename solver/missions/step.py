@@ -26,6 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockRun
 from solver.missions.blocks import Mission
 from solver.missions.course import MissionNode
@@ -33,7 +34,6 @@ from solver.missions.options import MISSIONS
 from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.results.history import StartState
-from solver.wear.state import Failure
 
 Fly = Callable[[int, FloatArray, StartState | None, bool], BlockRun]
 """Flies a block: place, depth before (n_contact,), m, state that it continues, whether the slope is asked for."""

@@ -22,7 +22,7 @@ def values_of(model: ReducedModel, point: ModePoint) -> ModeValues:
         linear = model.linear[0]
         sizes = (len(linear.response), len(linear.mass), model.contact.n_contact)
         return without_state(*ended, sizes, *effort)
-    joint, at, resolution = problem.joint_of(state), state.point.evaluation, problem.case.resolution
+    joint, at, resolution = problem.joint_of(state), state.state.evaluation, problem.case.resolution
     response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
     return ModeValues(
         *ended,

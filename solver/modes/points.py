@@ -10,12 +10,14 @@ from typing import Literal
 import numpy as np
 
 from solver.clock import computing_time
+from solver.loading_history.sweep import Sweep
 from solver.model import FloatArray, ReducedModel
-from solver.modes.amplitude_sweep import AmplitudeSweep, Nodes
-from solver.modes.mode_point import ModePoint, describe_loss, judge_point, solve_point
+from solver.modes.mode_balance import ModeState
+from solver.modes.mode_path import ModePath
+from solver.modes.mode_point import ModePoint, describe_loss, judge_point, problem_of, solve_point
 from solver.modes.mode_start import Rest, find_rest, first_amplitude, first_node, sliding_node
 from solver.modes.options import MODES
-from solver.newton.solve_balance import Budget, OutOfTimeError
+from solver.newton.run import OutOfTimeError, Run
 from solver.outcome import Outcome, describe_error
 from solver.settings import SolverSettings
 
@@ -46,7 +48,7 @@ def follow_mode(
     way = _Way(model, friction_coefficient, number, direction, settings)
     for index in way.order(amplitudes):
         began = computing_time()
-        way.budget.deadline = began + settings.time_limit
+        way.run.budget.deadline = began + settings.time_limit
         try:
             point = way.point(float(amplitudes[index]))
         except OutOfTimeError:
@@ -68,14 +70,16 @@ def top_of(amplitude: float) -> float:
 class _Lowered:
     """A sweep with falling amplitude.
 
-    - nodes: where it begins. raised: Newton iterations of the way to there. lowered: iterations since then.
+    - first: where it begins, with the harmonics of `path`.
+    - raised: Newton iterations of the way to there. lowered: iterations since then.
     - sweep: the sweep, from its first point on.
     """
 
-    nodes: Nodes
+    path: ModePath
+    first: ModeState
     raised: int
     lowered: int = 0
-    sweep: AmplitudeSweep | None = None
+    sweep: Sweep[ModeState] | None = None
 
 
 class _Way:
@@ -92,12 +96,12 @@ class _Way:
         direction: Direction,
         settings: SolverSettings,
     ) -> None:
-        self.budget, self.iterations = Budget(), 0
+        self.run, self.iterations = Run(settings.tolerance), 0
         self._direction = direction
         self._asked = (model, friction_coefficient, number, settings)
         self._rest: Rest | tuple[Outcome, str] | None = None
         self._to_rest = self._raised = 0
-        self._up: AmplitudeSweep | None = None
+        self._up: Sweep[ModeState] | None = None
         self._tops: list[float] = []
         self._down: dict[float, _Lowered] = {}
 
@@ -109,10 +113,10 @@ class _Way:
 
     def point(self, amplitude: float) -> ModePoint:
         """The point at the next amplitude."""
-        before = self.budget.iterations
+        before = self.run.budget.iterations
         if self._rest is None:
-            self._rest = find_rest(*self._asked, self.budget)
-            self._to_rest = self.budget.iterations - before
+            self._rest = find_rest(*self._asked, self.run)
+            self._to_rest = self.run.budget.iterations - before
         self.iterations = self._to_rest
         if isinstance(self._rest, tuple):
             return ModePoint(*self._rest)
@@ -123,23 +127,23 @@ class _Way:
         sweep = None if first else self._sweep_to(self._rest, amplitude)
         if sweep is None and not first:
             return self._failed()
-        if self._direction == "down" and amplitude > self._down[top_of(amplitude)].nodes.here.amplitude:
+        if self._direction == "down" and amplitude > self._down[top_of(amplitude)].first.parameter:
             # the mode could not be raised to the amplitude from which it is lowered
             assert self._up is not None
             return ModePoint(Outcome.BRANCH_LOST, describe_loss(self._up))
-        before = self.budget.iterations
+        before = self.run.budget.iterations
         try:
             if sweep is not None:
-                return solve_point(sweep, amplitude, self.budget)
-            nodes = first_node(self._rest, amplitude, self.budget)
-            return self._failed() if nodes is None else judge_point(nodes.problem, nodes.here, None, self.budget)
+                return solve_point(sweep, amplitude, self.run)
+            node = first_node(self._rest, amplitude, self.run)
+            return self._failed() if node is None else judge_point(self._rest.problem, node, None, self.run)
         finally:
-            self.iterations += self.budget.iterations - before
+            self.iterations += self.run.budget.iterations - before
 
     def _failed(self) -> ModePoint:
         return ModePoint(Outcome.START_FAILED, "the mode was not found at its first amplitude")
 
-    def _sweep_to(self, rest: Rest, amplitude: float) -> AmplitudeSweep | None:
+    def _sweep_to(self, rest: Rest, amplitude: float) -> Sweep[ModeState] | None:
         """The sweep at the node before an amplitude; None where it does not begin."""
         if self._direction == "up":
             raised = self._raised_to(rest, amplitude)
@@ -148,23 +152,29 @@ class _Way:
         down = self._lowered(rest, top_of(amplitude))
         if down is None:
             return None
-        before = self.budget.iterations
-        down.sweep = down.sweep or AmplitudeSweep(down.nodes, -1.0, self.budget)
+        before = self.run.budget.iterations
+        down.sweep = down.sweep or self._begun(down.path, down.first, -1.0)
         down.sweep.advance_to(amplitude)
-        down.lowered += self.budget.iterations - before
+        down.lowered += self.run.budget.iterations - before
         self.iterations += down.raised + down.lowered
         return down.sweep
 
-    def _raised_to(self, rest: Rest, amplitude: float) -> AmplitudeSweep | None:
+    def _raised_to(self, rest: Rest, amplitude: float) -> Sweep[ModeState] | None:
         """The sweep with rising amplitude at the node before an amplitude; None where it does not begin."""
-        before = self.budget.iterations
+        before = self.run.budget.iterations
         if self._up is None:
-            nodes = first_node(rest, first_amplitude(rest), self.budget)
-            self._up = None if nodes is None else AmplitudeSweep(nodes, 1.0, self.budget)
+            node = first_node(rest, first_amplitude(rest), self.run)
+            self._up = None if node is None else self._begun(ModePath(rest.problem), node, 1.0)
         if self._up is not None:
             self._up.advance_to(amplitude)
-        self._raised += self.budget.iterations - before
+        self._raised += self.run.budget.iterations - before
         return self._up
+
+    def _begun(self, path: ModePath, first: ModeState, direction: float) -> Sweep[ModeState]:
+        """A sweep at its first node."""
+        sweep: Sweep[ModeState] = Sweep(path, direction, self.run.budget, with_reference=True)
+        sweep.begin(path, first)
+        return sweep
 
     def _lowered(self, rest: Rest, wanted: float) -> _Lowered | None:
         """The sweep with falling amplitude from a top, m sqrt(kg); None where it does not begin.
@@ -175,12 +185,13 @@ class _Way:
         for top in self._tops:
             if top in self._down:
                 continue
-            nodes, before = None, self.budget.iterations
+            first, path, before = None, ModePath(rest.problem), self.run.budget.iterations
             if not rest.glued:
-                nodes = sliding_node(rest, top, self.budget)
+                first = sliding_node(rest, top, self.run)
             elif (raised := self._raised_to(rest, top)) is not None:
-                nodes = Nodes(raised.nodes.problem, (raised.ahead or raised.nodes.here,))
-            if nodes is not None:
-                spent = self._raised if rest.glued else self.budget.iterations - before
-                self._down[top] = _Lowered(nodes, spent)
+                path = ModePath(problem_of(raised))
+                first = raised.last if raised.ahead is None else raised.ahead.state
+            if first is not None:
+                spent = self._raised if rest.glued else self.run.budget.iterations - before
+                self._down[top] = _Lowered(path, first, spent)
         return self._down.get(wanted)

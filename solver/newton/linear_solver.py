@@ -6,8 +6,7 @@ preconditioner.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -30,13 +29,6 @@ class JacobianSolver:
     _factor: Factor | None = field(default=None, repr=False)
     _recycled: Recycled = field(default_factory=Recycled, repr=False)
     _products: list[int] = field(default_factory=list, repr=False)
-    _by_parameter: FloatArray | None = field(default=None, repr=False)
-    _epoch: int = field(default=0, repr=False)
-
-    def renew(self, epoch: int) -> None:
-        """Drop the factorisation unless it was kept in this epoch of a journal (`solver.newton.journal`)."""
-        if epoch != self._epoch:
-            self._factor, self._recycled, self._by_parameter, self._epoch = None, Recycled(), None, epoch
 
     def solve(self, tangent: Linearisation, right: FloatArray, rtol: float = NEWTON.forcing) -> FloatArray:
         """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
@@ -54,58 +46,6 @@ class JacobianSolver:
         rest[rows] = False
         step[rest] = (right - tangent.apply_roughly(step))[rest]
         return step
-
-    def solve_with_parameter(
-        self,
-        tangent: Linearisation,
-        right: FloatArray,
-        by_parameter: FloatArray,
-        change_of: Callable[[FloatArray, FloatArray], float],
-        rtol: float = NEWTON.forcing,
-    ) -> tuple[FloatArray, float]:
-        """Step (n_rel, m) and change of a parameter, where the parameter has an equation of its own.
-
-        The step is a + c b, with Jacobian times a = right, and Jacobian times b = by_parameter. b changes little from
-        solve to solve: a large system begins with the last one, and is solved as far as the step needs.
-
-        Parameters
-        ----------
-        tangent, right, rtol
-            As in `solve`.
-        by_parameter : array (n_rel, m)
-            Minus the derivative of the residual by the parameter.
-        change_of : callable
-            The change c of the parameter that solves the equation of the parameter, from a and b.
-        """
-        if _is_dense(tangent, right.shape[1]):
-            step, with_parameter = self.solve_all(tangent, (right, by_parameter), rtol)
-            change = change_of(step, with_parameter)
-            return step + change * with_parameter, change
-        step = self.solve(tangent, right, rtol)
-        known, left = self._kept(tangent, by_parameter)
-        whole, error = (float(np.linalg.norm(part)) for part in (by_parameter, left))
-        change = change_of(step, known) if known.any() else math.inf
-        allowed = max(rtol * float(np.linalg.norm(right)) / max(abs(change), 1e-300), rtol * whole)
-        if error > min(allowed, math.sqrt(rtol) * whole):
-            known = known + self.solve(tangent, left, allowed / error)
-            change = change_of(step, known)
-        self._by_parameter = known
-        return step + change * known, change
-
-    def solve_by_parameter(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
-        """As `solve`, for a derivative by the parameter that is near the one of the last `solve_with_parameter`."""
-        known, left = self._kept(tangent, right)
-        whole, error = (float(np.linalg.norm(part)) for part in (right, left))
-        return known if error <= rtol * whole else known + self.solve(tangent, left, rtol * whole / error)
-
-    def _kept(self, tangent: Linearisation, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The last derivative by the parameter (n_rel, m) and its residual, or zero where this is nearer."""
-        kept = self._by_parameter
-        if kept is not None and kept.shape == right.shape:
-            left = right - tangent.apply(kept)
-            if np.linalg.norm(left) < np.linalg.norm(right):
-                return kept, left
-        return np.zeros_like(right), right
 
     def solve_all(
         self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = NEWTON.forcing

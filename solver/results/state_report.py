@@ -9,9 +9,9 @@ from numba import njit
 
 from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.response_peak import largest_responses
+from solver.harmonic_balance.state import State
 from solver.model import ComplexArray, FloatArray
 from solver.packing import packable
 from solver.results.history import PeriodicState
@@ -22,7 +22,7 @@ from solver.structure.fourier import to_complex
 from solver.structure.joint import Joint
 
 
-def periodic_state(joint: Joint, point: PathPoint) -> PeriodicState:
+def periodic_state(joint: Joint, point: State) -> PeriodicState:
     """The state as a result in physical units; its arrays lie in rows, as when read from a file."""
     at = point.evaluation
     return PeriodicState(

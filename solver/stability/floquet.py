@@ -24,12 +24,12 @@ import numpy as np
 from scipy.linalg import eigvals
 
 from solver.contact.coulomb import SEPARATED
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.state import State
 from solver.model import BoolArray, ComplexArray, LinearModel, Matrix
 from solver.newton.krylov import ritz_values
 from solver.newton.options import NEWTON
-from solver.newton.solve_balance import Budget, move_point
+from solver.newton.run import Run
 from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.settings import Resolution, all_orders, samples_for
@@ -74,9 +74,7 @@ class Instability:
         return f"{said}: look for negative damping or stiffness of the structure" if self.driven else said
 
 
-def find_instability(
-    case: Case, joint: Joint, at: Evaluation, budget: Budget, every: bool = True
-) -> Instability | None:
+def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: bool = True) -> Instability | None:
     """Instability of a state at a fixed wear depth; None where the state is stable, or where stability is not known.
 
     Stability is not tested in these cases:
@@ -90,8 +88,8 @@ def find_instability(
     ----------
     case, joint, at
         Case, joint and evaluation of the state.
-    budget
-        Counts the Newton iterations.
+    run
+        Tolerance and limits.
     every
         False leaves out large joints and joints that do not open and close, where a pair slips. This is for states
         between the first and the last of a wear history, where only impacts change the motion of a joint suddenly.
@@ -99,7 +97,7 @@ def find_instability(
     Raises
     ------
     OutOfTimeError
-        After the deadline of the budget.
+        The time is over.
     """
     switching, stuck = switching_pairs(at)
     frequency = joint.omega / (2.0 * np.pi)
@@ -114,7 +112,7 @@ def find_instability(
     if not (every or (small and opens_and_closes(at))):
         return None
     if small:
-        finer = sharper(case, joint, at, budget)
+        finer = sharper(case, joint, at, run)
         if finer is None and not _is_driven(joint):
             return None
         joint, at = finer or (joint, at)
@@ -128,14 +126,14 @@ def find_instability(
     return _judge(second, 2.0 * error, joint)
 
 
-def sharper(case: Case, joint: Joint, at: Evaluation, budget: Budget) -> tuple[Joint, Evaluation] | None:
+def sharper(case: Case, joint: Joint, at: Evaluation, run: Run) -> tuple[Joint, Evaluation] | None:
     """The state with enough harmonics for a joint that opens and closes; None where no such state is found."""
     if case.resolution.highest >= STABILITY.opening_harmonics or not opens_and_closes(at):
         return joint, at
     samples = max(case.resolution.samples, samples_for(STABILITY.opening_harmonics))
     sharp = case.at(Resolution(all_orders(STABILITY.opening_harmonics), samples))
     finer = sharp.joint(joint.omega, joint.excitation_amplitude)
-    moved = move_point(case, sharp, finer, PathPoint(0.0, at, at.history), budget)
+    moved = run.move(case, sharp, finer, State(at, at.history))
     return None if moved is None else (finer, moved.evaluation)
 
 

@@ -19,19 +19,13 @@ reported states. Disturbances of friction are taken as slow, with the closure ov
 
 from __future__ import annotations
 
-from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.newton.run import Run
 
 
-def is_stable(tangent: Linearisation, solver: JacobianSolver) -> bool:
-    """False where the state has an odd number of real multipliers beyond +1.
+def is_stable(balance: Balance, at: Evaluation, run: Run) -> bool:
+    """False where a state has an odd number of real multipliers beyond +1 at a fixed wear depth.
 
-    tangent: of a state at a fixed wear depth (`wear_gain` zero): the vibration is fast, the wear is slow.
+    balance: of the state at a fixed wear depth: the vibration is fast, the wear is slow.
     """
-    return bool(solver.determinant_sign(tangent) >= 0.0)
-
-
-def is_stable_at(balance: Balance, at: Evaluation, solver: JacobianSolver, budget: Budget) -> bool:
-    """`is_stable` for a state of a balance, from the journal of the budget where the journal has this result."""
-    return budget.once(solver, lambda: is_stable(balance.linearise(at), solver), lambda known: isinstance(known, bool))
+    return bool(run.solver.determinant_sign(balance.linearise(at)) >= 0.0)

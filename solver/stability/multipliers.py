@@ -14,7 +14,7 @@ import numpy as np
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import ComplexArray
 from solver.newton.options import NEWTON
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.stability.floquet import exponents, march_samples, moving, multipliers_of, opens_and_closes, sharper
 from solver.stability.hill_exponents import hill_multipliers, hill_size
 from solver.stability.monodromy import build_monodromy, switching_pairs
@@ -55,7 +55,7 @@ NOT_KNOWN = Multipliers(np.empty(0, np.complex128), np.inf)
 """Of a state whose multipliers are not computed."""
 
 
-def find_multipliers(case: Case, joint: Joint, at: Evaluation, budget: Budget) -> Multipliers:
+def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run) -> Multipliers:
     """Multipliers of a state at a fixed wear depth; for the limits see `floquet.find_instability`.
 
     A small joint that opens and closes is solved with `STABILITY.opening_harmonics` before, and its multipliers are
@@ -73,7 +73,7 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, budget: Budget) -
     linear = joint.model.linear[0]
     small = int(moving(joint, stuck).sum()) <= NEWTON.small_joint_displacements
     if small:
-        finer = sharper(case, joint, at, budget)
+        finer = sharper(case, joint, at, run)
         if finer is None or _first(finer[1], at) > STABILITY.other_branch:
             return NOT_KNOWN
         joint, at = finer

@@ -12,7 +12,7 @@ from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import lacks_even, left_out
 from solver.accuracy.refinement import refine
 from solver.harmonic_balance.dlft import worn_by
-from solver.newton.solve_balance import move_point
+from solver.harmonic_balance.state import Failure
 from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.results.state_report import StateReport, report_state
@@ -22,7 +22,7 @@ from solver.wear.branch_loss import is_stable_when_held
 from solver.wear.followed import frequency_error
 from solver.wear.free_slide import creeps, free_slide
 from solver.wear.options import WEAR
-from solver.wear.state import Choice, Failure, WearState
+from solver.wear.state import Choice, WearState
 from solver.wear.wearing_joint import WearingJoint
 
 
@@ -111,7 +111,7 @@ def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution)
     work.at(state)
     old, case = work.case, work.case.at(resolution)
     joint = case.joint(state.omega, work.excitation_amplitude)
-    point = move_point(old, case, joint, state.point, work.budget)
+    point = work.run.move(old, case, joint, state.point)
     if point is None:
         return None
     tuned = work.tuned(replace(state, point=point, resolution=resolution, change=None))
@@ -152,7 +152,7 @@ def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
     work.at(state)
     refined = refine(
-        work.case, state.omega, work.excitation_amplitude, state.point, work.budget, usual_work=work.usual_work
+        work.case, state.omega, work.excitation_amplitude, state.point, work.run, usual_work=work.usual_work
     )
     resolution = refined.case.resolution
     choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
@@ -176,7 +176,7 @@ def _note_accuracy(state: WearState) -> WearState:
 def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failure | None:
     """Instability of a state by its Floquet multipliers, None if stable; every: as in `find_instability`."""
     joint = work.at(state)
-    unstable = find_instability(work.case, joint, state.point.evaluation, work.budget, every)
+    unstable = find_instability(work.case, joint, state.point.evaluation, work.run, every)
     return None if unstable is None else Failure(unstable.outcome, unstable.sentence)
 
 
@@ -184,6 +184,6 @@ def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable."""
     joint, at = work.at(state), state.point.evaluation
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
-    if free_slide(joint, at) is None and not is_stable_when_held(joint, at, work.solver):
+    if free_slide(joint, at) is None and not is_stable_when_held(joint, at, work.run):
         return Failure(Outcome.UNSTABLE)
     return _multipliers(work, state, every=True)

@@ -11,12 +11,12 @@ from typing import Protocol
 import numpy as np
 
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import vibration_change
+from solver.harmonic_balance.state import Failure, vibration_change
 from solver.options import COMMON
 from solver.settings import Scheme
 from solver.wear.bdf2 import Attempt, bdf2_attempt
 from solver.wear.options import WEAR
-from solver.wear.state import Failure, WearState
+from solver.wear.state import WearState
 from solver.wear.step import Step, bounded_euler_step, euler_step
 from solver.wear.wearing_joint import WearingJoint
 
@@ -131,7 +131,7 @@ def step_across(work: WearingJoint, state: WearState, shortest: float, end: floa
     end: cycle count beyond which no step goes.
     """
     # a search without success leaves no trace: where a joint begins to slide, round-off decides what is found next
-    kept = work.solver
+    kept = work.run
     work.drop_factor()
     for doubling in range(1, WEAR.doublings_across + 1):
         length = 2.0**doubling * shortest
@@ -141,7 +141,7 @@ def step_across(work: WearingJoint, state: WearState, shortest: float, end: floa
         if tried is not None and is_smooth(state, tried):
             size = float(np.abs(tried.error) @ work.area)
             return Step(work.accepted(state, tried.end, length).planned(length), size, length)
-    work.solver = kept
+    work.run = kept
     return None
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from solver.contact.archard import wear_gain, wear_rate
 from solver.contact.wear_law import WearingWork
-from solver.harmonic_balance.converged import BalanceAt
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
+from solver.harmonic_balance.state import BalanceAt
 from solver.model import FloatArray
 from solver.settings import Scheme
 from solver.structure.joint import Joint

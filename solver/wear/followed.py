@@ -11,16 +11,15 @@ import math
 
 from solver.continuation.largest_response import accepted_rise, rise_of_response, solve_at_peak
 from solver.continuation.options import CONTINUATION
-from solver.continuation.phase_lag import LaggingState, solve_at_lag
-from solver.harmonic_balance.converged import PathPoint, final_history
+from solver.continuation.phase_lag import solve_at_lag
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import FloatArray
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import FollowedFrequency
 from solver.structure.joint import Case
-from solver.wear.state import Failure, Reached, WearState
+from solver.wear.state import Reached, WearState
 
 
 def end_at_resonance(
@@ -29,8 +28,7 @@ def end_at_resonance(
     start: FloatArray,
     state: WearState,
     follow: FollowedFrequency,
-    solver: JacobianSolver,
-    budget: Budget,
+    run: Run,
     most: int = CONTINUATION.near_iterations,
 ) -> Reached | None:
     """The state of a balance at the frequency that is followed; None where it is not found.
@@ -43,24 +41,23 @@ def end_at_resonance(
         The state before.
     follow
         What the frequency follows.
-    solver, budget, most
-        As in `solve_balance`.
+    run, most
+        As in `Run.solve`.
     """
-    found: LaggingState | None
     lag = state.lag
     if follow.of == "peak":
-        peak = solve_at_peak(case, balance, start, lag, solver, budget, most)
+        peak = solve_at_peak(case, balance, start, lag, run, most)
         found, lag = (None, lag) if peak is None else peak
     else:
-        found = solve_at_lag(case, balance, start, lag, solver, budget, most)
+        found = solve_at_lag(case, balance, start, lag, run, most)
     if found is None:
         return None
-    turn = abs(found.turn)
+    turn = math.nan if found.reduced is None else abs(float(found.reduced[0, 0]))
     if math.isnan(turn) and state.half_width == 0.0:
-        turn = abs(rise_of_response(found, solver, accepted_rise(case.settings.rtol))[1])
+        turn = abs(rise_of_response(found, run, accepted_rise(case.settings.rtol))[1])
     half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
-    point = PathPoint(0.0, found.at, final_history(found.balance, found.at))
-    return Reached(point, found.omega, lag, half_width)
+    point = State(found.at, final_history(found.balance, found.at))
+    return Reached(point, float(found.values[0]), lag, half_width)
 
 
 def frequency_error(follow: FollowedFrequency | None, state: WearState, response_error: float, rtol: float) -> float:

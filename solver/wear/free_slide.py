@@ -15,15 +15,16 @@ no longer negligible there is no periodic state, and the outcome is ADRIFT.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from solver.contact.coulomb import STICK
 from solver.continuation.natural import follow_naturally
-from solver.harmonic_balance.converged import PathPoint, final_history, vibration_change
 from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.state import State, final_history, vibration_change
 from solver.model import FloatArray
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.options import COMMON
 from solver.results.options import RESULTS
 from solver.stability.options import STABILITY
@@ -57,9 +58,7 @@ def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
     return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > RESULTS.held_force * friction
 
 
-def held_on(
-    case: Case, joint: Joint, last: PathPoint, worn: FloatArray, solver: JacobianSolver, budget: Budget
-) -> tuple[Hold, PathPoint] | None:
+def held_on(case: Case, joint: Joint, last: State, worn: FloatArray, run: Run) -> tuple[Hold, State] | None:
     """The hold of a joint, and the held state at the depths `worn` (n_contact,), m, just beyond the last state.
 
     None where the joint does not slide as a whole, or where the vibration changes: then a branch has ended.
@@ -70,14 +69,14 @@ def held_on(
     held = case.held(hold)
     other = held.joint(joint.omega, joint.excitation_amplitude)
     balance_at = held_wear(other, last.evaluation.wear_depth, worn)
-    found, arrived = follow_naturally(balance_at, last, 1.0, solver, case.settings.tolerance, budget, keep_history=True)
+    found, arrived = follow_naturally(balance_at, replace(last, parameter=0.0), 1.0, run, keep_history=True)
     changed = vibration_change(last.evaluation, found.evaluation) > STABILITY.other_branch
     if (
         not arrived
         or changed
         or creeps(other, hold, found.evaluation)
-        or not is_stable_when_held(other, found.evaluation, solver)
+        or not is_stable_when_held(other, found.evaluation, run)
     ):
         return None
     history = final_history(balance_at(1.0, last.history), found.evaluation)
-    return hold, PathPoint(0.0, found.evaluation, history)
+    return hold, State(found.evaluation, history)

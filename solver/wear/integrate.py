@@ -10,7 +10,8 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from solver.continuation.options import CONTINUATION
-from solver.newton.solve_balance import OutOfTimeError
+from solver.harmonic_balance.state import Failure
+from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, describe_error
 from solver.packing import in_rows, packable
 from solver.wear.check import Checked
@@ -19,7 +20,7 @@ from solver.wear.followed import lost_resonance, out_of_range
 from solver.wear.jump import land
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput
-from solver.wear.state import Failure, WearState
+from solver.wear.state import WearState
 from solver.wear.step import Step
 from solver.wear.wearing_joint import WearingJoint
 
@@ -90,18 +91,18 @@ class Integration:
 
     def run(self, work: WearingJoint, progress: Progress) -> tuple[WearState, Failure]:
         """Integrate to the end: last state and reason of the end."""
-        state, n_steps, saved = progress.state, progress.n_steps, work.budget.iterations
+        state, n_steps, saved = progress.state, progress.n_steps, work.run.budget.iterations
         while (ended := self.stop(work, state, self.output)) is None:
             n_steps += 1
-            if work.budget.iterations > self.most_iterations + CONTINUATION.near_iterations * n_steps:
+            if work.run.budget.iterations > self.most_iterations + CONTINUATION.near_iterations * n_steps:
                 return state, Failure(Outcome.MARCH_FAILED)
             after = guarded(partial(self._one, work, state))
             if isinstance(after, Failure):
                 return state, after
             state = after
-            if work.budget.iterations >= saved + WEAR.iterations_per_save:
+            if work.run.budget.iterations >= saved + WEAR.iterations_per_save:
                 # done in every history, so that an interrupted one gives equal numbers
-                state, saved = in_rows(state), work.budget.iterations
+                state, saved = in_rows(state), work.run.budget.iterations
                 work.drop_factor()
                 self.save(Progress(state, n_steps))
         return state, ended

@@ -13,12 +13,12 @@ import numpy as np
 from solver.contact.wear_law import WearingWork
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
-from solver.newton.linear_solver import JacobianSolver
+from solver.newton.run import Run
 from solver.structure.joint import Joint
 
 
 def rate_slope(
-    joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, pairs: BoolArray, solver: JacobianSolver
+    joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, pairs: BoolArray, run: Run
 ) -> FloatArray:
     """Derivative dg/dW (n_contact, n_contact), 1 per cycle; column: pair whose depth changes.
 
@@ -32,7 +32,7 @@ def rate_slope(
         Part of the slip work that wears.
     pairs
         (n_contact,), the pairs whose depths change; the columns of all others are 0.
-    solver
+    run
         Solves with the Jacobian of the state.
     """
     balance = Balance.frozen(joint, at.history, at.wear_depth)
@@ -45,7 +45,7 @@ def rate_slope(
         return slope
     rights = np.zeros((normal.size, *at.predicted_h.shape))
     rights[:, :, 0] = -joint.structure.static_stiffness[:, normal].T
-    for row, step in zip(normal, solver.solve_all(plain, rights), strict=True):
+    for row, step in zip(normal, run.solver.solve_all(plain, rights), strict=True):
         moved = joint.to_pairs(step).reshape(growth.shape)
         slope[:, joint.component_index[row] // 3] += (growth * moved).sum(axis=1)
     return slope

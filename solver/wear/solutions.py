@@ -13,10 +13,9 @@ from solver.accuracy.reference import RTOL_RATIO, coarser
 from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray
-from solver.newton.solve_balance import solve_balance
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable
 from solver.results.history import StartState
@@ -27,7 +26,7 @@ from solver.wear.control import AdaptiveSteps, Control, GivenSteps
 from solver.wear.integrate import Integration, Progress, guarded
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput, OutputState
-from solver.wear.state import Failure, WearState
+from solver.wear.state import WearState
 from solver.wear.stop import AtCount, InSteadyState
 from solver.wear.wearing_joint import WearingJoint
 
@@ -176,7 +175,7 @@ class Solutions:
             return ended
         state = ended.state
         unstable = guarded(lambda: unstable_at_end(work, state))
-        return replace(ended, failure=unstable or ended.failure, iterations=work.budget.iterations)
+        return replace(ended, failure=unstable or ended.failure, iterations=work.run.budget.iterations)
 
     def reference(self, fine: Ended) -> Ended:
         """Integrate the reference solution of a history, for all counts at which both are compared or read."""
@@ -249,30 +248,30 @@ class Solutions:
         assert self.start.state is not None
         asked = self.asked
         work = WearingJoint.of(self.case, self.start.state, asked.wear_coefficient, asked.law, asked.follow)
-        work.budget.deadline = self.began + self.case.settings.time_limit
+        work.run.budget.deadline = self.began + self.case.settings.time_limit
         return work
 
     def _run(self, integration: Integration, work: WearingJoint, begin: Callable[[], WearState], end: float) -> Ended:
         """Run an integration from its first or its saved state to the count `end` (inf: open)."""
         progress: Progress | Failure
         if self.saved is not None:
-            work.budget.iterations, integration.output.taken = self.saved.iterations, self.saved.output
+            work.run.budget.iterations, integration.output.taken = self.saved.iterations, self.saved.output
             progress, self.saved = self.saved.progress, None
         else:
             progress = guarded(lambda: integration.begin(work, begin()))
         if isinstance(progress, Failure):
-            return Ended(None, progress, integration.output.taken, work.budget.iterations)
+            return Ended(None, progress, integration.output.taken, work.run.budget.iterations)
         state, failure = integration.run(work, progress)
         last, over = integration.output.last, state.cycle < end < math.inf and not work.wears(state)
         if failure.outcome is Outcome.CONVERGED and last is not None and over:
             # nothing wears any more: the state holds for all later counts
             integration.output.add(end, last.report, last.rate, 0.0)
-        return Ended(state, failure, integration.output.taken, work.budget.iterations)
+        return Ended(state, failure, integration.output.taken, work.run.budget.iterations)
 
     def _save(self, integration: Integration, work: WearingJoint, progress: Progress, fine: Ended | None) -> None:
         """Pass the progress of an integration to `keep`."""
         if self.keep is not None:
-            saved = Saved(progress, integration.output.taken, work.budget.iterations, fine, self.spent)
+            saved = Saved(progress, integration.output.taken, work.run.budget.iterations, fine, self.spent)
             self.keep(pack(saved))
 
 
@@ -292,10 +291,5 @@ def begin_reference(work: WearingJoint, start: StartState, step_limit: float) ->
     history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
     balance = Balance.frozen(work.at(begun), history, begun.depth)
     first = begun.point.evaluation.predicted_h
-    found = solve_balance(
-        balance, first, work.solver, work.case.settings.tolerance, work.budget, CONTINUATION.near_iterations
-    )
-    if not found.converged:
-        return begun
-    point = PathPoint(0.0, found.evaluation, final_history(balance, found.evaluation))
-    return work.noted(replace(begun, point=point))
+    point = work.run.state(balance, first, most=CONTINUATION.near_iterations)
+    return begun if point is None else work.noted(replace(begun, point=point))

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
-from solver.harmonic_balance.converged import PathPoint
+from solver.harmonic_balance.state import State
 from solver.model import FloatArray
-from solver.outcome import Outcome
 from solver.packing import packable
 from solver.settings import Resolution
 from solver.structure.joint import Hold
@@ -66,7 +65,7 @@ class WearState:
 
     cycle: float
     omega: float
-    point: PathPoint
+    point: State
     resolution: Resolution
     choice: Choice
     rates: WearRates
@@ -108,16 +107,7 @@ class Reached:
     omega, lag, half_width: as in `WearState`.
     """
 
-    point: PathPoint
+    point: State
     omega: float
     lag: float
     half_width: float
-
-
-@packable
-@dataclass(frozen=True)
-class Failure:
-    """Reason for the end of a history. message: addition to the outcome."""
-
-    outcome: Outcome
-    message: str = ""

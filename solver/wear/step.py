@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 from solver.accuracy.error_estimate import euler_error
 from solver.continuation.natural import follow_naturally
-from solver.harmonic_balance.converged import BalanceAt, PathPoint, final_history
+from solver.harmonic_balance.state import BalanceAt, Failure, State, final_history
 from solver.newton.options import NEWTON
 from solver.outcome import Outcome
 from solver.settings import Scheme
 from solver.wear.branch_loss import is_stable_when_held
 from solver.wear.euler import euler_balance
 from solver.wear.options import WEAR
-from solver.wear.state import Failure, Reached, WearState
+from solver.wear.state import Reached, WearState
 from solver.wear.step_limit import too_long
 from solver.wear.wearing_joint import WearingJoint
 
@@ -42,8 +42,7 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
     Where the branch of the vibration ends within the step, the result has the last stable state, located with the
     accuracy `fold_resolution`.
     """
-    joint, tolerance = work.at(state), work.case.settings.tolerance
-    base = PathPoint(0.0, state.point.evaluation, state.point.history)
+    joint, base = work.at(state), replace(state.point, parameter=0.0)
     balance_at = euler_balance(joint, scheme, base.evaluation, length, work.wear_coefficient, work.wearing)
     whole = balance_at(1.0, base.history)
     start, whole = work.predicted(state, whole, length)
@@ -56,16 +55,14 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
     shortest = min(resolution, NEWTON.shortest_step)
     if work.follow is not None:
         return _shortened(work, state, length, balance_at, shortest)
-    last, arrived = follow_naturally(
-        balance_at, base, 1.0, work.solver, tolerance, work.budget, keep_history=True, shortest=shortest
-    )
-    if not is_stable_when_held(joint, last.evaluation, work.solver):
+    last, arrived = follow_naturally(balance_at, base, 1.0, work.run, keep_history=True, shortest=shortest)
+    if not is_stable_when_held(joint, last.evaluation, work.run):
         # the place of the loss of stability is not known: the jump begins at the start of the step
         last, arrived = base, False
     if not arrived and last.parameter <= 0.0:
         return Step(state, 0.0, length, arrived=False, end_known_to=shortest * length)
     ahead = last.parameter * length
-    point = PathPoint(0.0, last.evaluation, final_history(balance_at(last.parameter, base.history), last.evaluation))
+    point = State(last.evaluation, final_history(balance_at(last.parameter, base.history), last.evaluation))
     taken = _euler(work, state, Reached(point, state.omega, state.lag, state.half_width), ahead)
     return replace(taken, length=length, arrived=arrived, end_known_to=shortest * length)
 
@@ -73,7 +70,7 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
 def _shortened(work: WearingJoint, state: WearState, length: float, balance_at: BalanceAt, shortest: float) -> Step:
     """A step at the frequency that is followed, halved until its end is found; shortest: as a fraction of the step."""
     fraction = 0.5
-    while fraction >= shortest and not work.budget.exhausted:
+    while fraction >= shortest and not work.run.budget.exhausted:
         balance = balance_at(fraction, state.point.history)
         end = work.solved(state, *work.predicted(state, balance, fraction * length))
         if end is not None:

@@ -26,15 +26,13 @@ from solver.contact.wear_law import WearingWork
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
 from solver.newton.krylov import ritz_values
-from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
+from solver.newton.run import Run
 from solver.structure.joint import Joint
 from solver.wear.options import WEAR
 
 
-def explicit_step_limit(
-    joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, solver: JacobianSolver
-) -> float:
+def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, run: Run) -> float:
     """Largest stable explicit step of Eq. (20) at a state.
 
     The eigenvalues come from Arnoldi's method with at most `NEWTON.sign_products` solves. A complex eigenvalue counts
@@ -48,7 +46,7 @@ def explicit_step_limit(
         (n_contact,), `archard.wear_gain` of one cycle, m/J.
     wearing
         Part of the slip work that wears. Its own dependence on the depth is neglected.
-    solver
+    run
         Solves with the Jacobian of the state.
 
     Returns
@@ -68,7 +66,7 @@ def explicit_step_limit(
 
     def product(vector: FloatArray) -> FloatArray:
         predicted = vector.reshape(shape)
-        return solver.solve(plain, worn.apply(predicted) - plain.apply(predicted)).ravel()
+        return run.solver.solve(plain, worn.apply(predicted) - plain.apply(predicted)).ravel()
 
     start = product(np.random.default_rng(0).normal(size=at.predicted_h.size))
     if not np.all(np.isfinite(start)) or not start.any():

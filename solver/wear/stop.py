@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.harmonic_balance.state import Failure
 from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput
-from solver.wear.state import Failure, WearState
+from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
 
 AS_ASKED = Failure(Outcome.CONVERGED)

@@ -11,19 +11,18 @@ from solver.accuracy.period_events import left_out
 from solver.contact.archard import volume_rate, wear_gain, wear_rate
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
+from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import FloatArray
-from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.newton.run import Run
 from solver.results.history import PeriodicState
 from solver.settings import FollowedFrequency, Resolution
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.followed import end_at_resonance, lost_resonance
 from solver.wear.friction_history import history_along
 from solver.wear.rates import WearRates
-from solver.wear.state import Choice, Failure, Reached, WearState
+from solver.wear.state import Choice, Reached, WearState
 from solver.wear.step_limit import explicit_step_limit
 
 
@@ -36,9 +35,8 @@ class WearingJoint:
     excitation_amplitude: N.
     wear_coefficient: 1/Pa.
     wearing: part of the slip work that wears.
-    budget: counts the iterations and limits the time.
     follow: what the frequency follows; None for a constant frequency.
-    solver: keeps a factorisation from one solve to the next.
+    run: counts the iterations, limits the time, and keeps a factorisation from one solve to the next.
     usual_work: N m, lower bound of the slip work to which errors are relative in the choice of harmonics.
     """
 
@@ -48,10 +46,12 @@ class WearingJoint:
     wear_coefficient: float
     wearing: WearingWork
     follow: FollowedFrequency | None = None
-    budget: Budget = field(default_factory=Budget)
-    solver: JacobianSolver = field(default_factory=JacobianSolver)
+    run: Run = field(init=False)
     usual_work: float = 0.0
     _joint: Joint | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        self.run = Run(self.case.settings.tolerance)
 
     @classmethod
     def of(
@@ -88,7 +88,7 @@ class WearingJoint:
 
     def drop_factor(self) -> None:
         """Drop the kept factorisation, so that the next solve depends on the state alone."""
-        self.solver = JacobianSolver()
+        self.run = self.run.fresh()
 
     def wearing_work(self, at: Evaluation) -> FloatArray:
         """Work (n_contact,) that wears in a cycle, J."""
@@ -126,7 +126,7 @@ class WearingJoint:
         at = balance.evaluate(balance.predict(start.displacement_h, start.contact_force_h))
         n_rates = self.area.size + 1
         choice = Choice(left_out(resolution.orders, at), estimate, accurate)
-        point = PathPoint(0.0, at, final_history(balance, at))
+        point = State(at, final_history(balance, at))
         rates = WearRates.none(n_rates)
         # the stability of a start state has been checked
         begun = WearState(
@@ -157,20 +157,16 @@ class WearingJoint:
         rates = state.rates.after(np.append(volumes, volumes.sum()))
         state = replace(state, rates=rates, most_rate=max(state.most_rate, most))
         if np.isnan(state.step_limit) and self.wears(state):
-            limit = explicit_step_limit(self.at(state), at, self.gain(1.0), self.wearing, self.solver)
+            limit = explicit_step_limit(self.at(state), at, self.gain(1.0), self.wearing, self.run)
             state = replace(state, step_limit=limit)
         return state
 
     def solved(self, state: WearState, start: FloatArray, balance: Balance) -> Reached | None:
         """End of a step from a state, with values from `predicted`; None where it is not found."""
-        settings, most = self.case.settings, CONTINUATION.near_iterations
         if self.follow is not None:
-            return end_at_resonance(self.case, balance, start, state, self.follow, self.solver, self.budget)
-        found = solve_balance(balance, start, self.solver, settings.tolerance, self.budget, most)
-        if not found.converged:
-            return None
-        point = PathPoint(0.0, found.evaluation, final_history(balance, found.evaluation))
-        return Reached(point, state.omega, state.lag, state.half_width)
+            return end_at_resonance(self.case, balance, start, state, self.follow, self.run)
+        point = self.run.state(balance, start, most=CONTINUATION.near_iterations)
+        return None if point is None else Reached(point, state.omega, state.lag, state.half_width)
 
     def tuned(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depths and its tangential history."""
@@ -178,9 +174,7 @@ class WearingJoint:
             return state
         at = state.point.evaluation
         balance = Balance.frozen(self.at(state), at.history, at.wear_depth)
-        found = end_at_resonance(
-            self.case, balance, at.predicted_h, state, self.follow, self.solver, self.budget, NEWTON.iterations
-        )
+        found = end_at_resonance(self.case, balance, at.predicted_h, state, self.follow, self.run, NEWTON.iterations)
         if found is None:
             return lost_resonance(self.follow, state)
         return replace(state, **vars(found))

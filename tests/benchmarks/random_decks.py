@@ -13,7 +13,7 @@ from collections import Counter
 import numpy as np
 
 from solver.continuation.static_state import solve_static_state
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
@@ -30,7 +30,7 @@ def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float], int]:
     joint = build_case(deck.model, deck.friction, OMEGA, SETTINGS).joint(OMEGA, 0.0)
     structure, budget = joint.structure, Budget()
     exists = EXISTS[equilibrium_possible(structure.static_stiffness, structure.static_force, deck.friction)]
-    point = solve_static_state(joint, np.zeros(joint.contact.n_contact), SETTINGS.tolerance, budget)
+    point = solve_static_state(joint, np.zeros(joint.contact.n_contact), Run(SETTINGS.tolerance, budget))
     if isinstance(point, Outcome):
         return exists, point, {}, budget.iterations
     return exists, Outcome.CONVERGED, law_errors(joint, point), budget.iterations

@@ -11,12 +11,10 @@ from solver.accuracy.refinement import refine
 from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import follow_naturally
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import State
 from solver.model import ReducedModel
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
-from solver.outcome import Outcome
+from solver.newton.run import Budget, Run
 from solver.settings import SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, build_case
@@ -101,28 +99,24 @@ class Errors:
         return self.estimate.response >= response and self.estimate.wear_rate >= wear
 
 
-def first_found(exact: ExactState, case: Case, budget: Budget) -> PathPoint:
+def first_found(exact: ExactState, case: Case, budget: Budget) -> State:
     """State at the frequency, by the sweep that the branch asks for."""
     begin = exact.omega if exact.begin is None else exact.begin
     idle = np.zeros(exact.model.contact.n_contact)
-    outcome, point = solve_first_state(case, begin, exact.amplitude, idle, JacobianSolver(), budget)
-    assert outcome is Outcome.CONVERGED
+    point = solve_first_state(case, begin, exact.amplitude, idle, Run(case.settings.tolerance, budget))
+    assert isinstance(point, State)
     if exact.begin is None:
         return point
 
     def balance_at(omega: float, history: np.ndarray) -> Balance:
         return Balance.frozen(case.joint(omega, exact.amplitude), history, idle)
 
-    tolerance, solver = case.settings.tolerance, JacobianSolver()
-    at = PathPoint(begin, point.evaluation, point.history)
+    run = Run(case.settings.tolerance, budget)
+    at = State(point.evaluation, point.history, begin)
     for target in np.append(np.arange(begin + SWEEP_STEP, exact.omega, SWEEP_STEP), exact.omega):
-        followed, arrived = follow_naturally(balance_at, at, float(target), solver, tolerance, budget)
-        arc = (
-            None
-            if arrived
-            else follow_arc(Arc(balance_at, followed, SWEEP_STEP, solver, tolerance, budget), float(target))
-        )
-        reached = followed if arc is None else arc.point
+        followed, arrived = follow_naturally(balance_at, at, float(target), run)
+        arc = None if arrived else follow_arc(Arc(balance_at, followed, SWEEP_STEP, run), float(target))
+        reached = followed if arc is None else arc.state
         assert reached is not None
         at = reached
     return at
@@ -133,7 +127,7 @@ def errors_of(exact: ExactState, settings: SolverSettings) -> Errors:
     budget = Budget()
     case = build_case(exact.model, exact.friction, exact.omega, settings)
     point = first_found(exact, case, budget)
-    refined = refine(case, exact.omega, exact.amplitude, point, budget)
+    refined = refine(case, exact.omega, exact.amplitude, point, Run(case.settings.tolerance, budget))
     joint = refined.case.joint(exact.omega, exact.amplitude)
     evaluation = refined.point.evaluation
     found = to_complex(joint.structure.response_h(joint.to_relative(evaluation.displacement_h)))[:, 0]

@@ -9,12 +9,11 @@ import numpy as np
 from scipy.linalg import eigh
 
 from solver.continuation.first_state import solve_first_state
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import State
 from solver.loading_history.start_states import follow_branch
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.history import PeriodicState, StartState, WearHistory
@@ -184,10 +183,10 @@ def branch_states(
     return [found[index] for index in range(len(omegas))]
 
 
-def first_point(case: Case, omega: float, amplitude: float, wear_depth: FloatArray) -> PathPoint:
+def first_point(case: Case, omega: float, amplitude: float, wear_depth: FloatArray) -> State:
     """State found from nothing, which must exist; its parameter is the share 1 of the excitation."""
-    outcome, point = solve_first_state(case, omega, amplitude, wear_depth, JacobianSolver(), Budget())
-    assert outcome is Outcome.CONVERGED
+    point = solve_first_state(case, omega, amplitude, wear_depth, Run(case.settings.tolerance))
+    assert isinstance(point, State)
     assert point is not None
     return point
 
@@ -201,7 +200,7 @@ def converged_state(
     return start.state
 
 
-def start_state(joint: Joint, point: PathPoint, iterations: int = 0) -> StartState:
+def start_state(joint: Joint, point: State, iterations: int = 0) -> StartState:
     """A state as a march takes it up, its errors not estimated."""
     return StartState(
         outcome=Outcome.CONVERGED,

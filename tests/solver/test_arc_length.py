@@ -8,10 +8,9 @@ import pytest
 from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.harmonic_balance.state import State
+from solver.newton.run import Budget, Run
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from tests.solver.models import first_point, scene
@@ -28,9 +27,9 @@ def upper_branch_size(amplitude):
         return Balance.frozen(case.joint(omega, amplitude), history, idle)
 
     found = first_point(case, 0.9, amplitude, idle)
-    point = PathPoint(0.9, found.evaluation, found.history)
+    point = State(found.evaluation, found.history, 0.9)
     for omega in np.linspace(0.95, WALL_OMEGA, 6):
-        point, arrived = follow_naturally(balance_at, point, float(omega), JacobianSolver(), TOLERANCE, Budget())
+        point, arrived = follow_naturally(balance_at, point, float(omega), Run(TOLERANCE))
         assert arrived
     structure = case.joint(WALL_OMEGA, amplitude).structure
     response = structure.response_h(point.evaluation.displacement_h[0, :1])
@@ -46,8 +45,8 @@ def test_arc_length_goes_through_both_folds_to_the_other_branch():
         return balance_at(amplitude, history)
 
     start = first(0.03)
-    result = follow_arc(Arc(watched, start, 0.03, JacobianSolver(), TOLERANCE, Budget()), 0.06)
-    point = result.point
+    result = follow_arc(Arc(watched, start, 0.03, Run(TOLERANCE)), 0.06)
+    point = result.state
     assert len(result.folds) == 2
     assert result.folds[0] == pytest.approx(GRAZING, rel=0.01, abs=0.0)
     assert point.parameter == 0.06
@@ -61,8 +60,8 @@ def test_arc_length_goes_through_both_folds_to_the_other_branch():
 def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target():
     balance_at, first, _ = wall(0.5)
     budget = Budget()
-    result = follow_arc(Arc(balance_at, first(0.01), 0.01, JacobianSolver(), TOLERANCE, budget), np.inf)
-    assert result.point is None
+    result = follow_arc(Arc(balance_at, first(0.01), 0.01, Run(TOLERANCE, budget)), np.inf)
+    assert result.state is None
     assert budget.iterations <= CONTINUATION.arc_correctors * CONTINUATION.near_iterations
 
 
@@ -78,9 +77,9 @@ def test_arc_length_does_not_go_on_where_stability_is_lost_without_a_fold():
             visited.append(amplitude)
             return balance_at(amplitude, history)
 
-        arc = Arc(watched, first(0.01), 0.02, JacobianSolver(), TOLERANCE, budget)
+        arc = Arc(watched, first(0.01), 0.02, Run(TOLERANCE, budget))
         result = follow_arc(arc, 0.03, lambda _: False, beyond=beyond)
-        assert result.point is None
+        assert result.state is None
         spent.append(budget.iterations)
         farthest.append(max(visited))
     assert farthest[1] < 0.05 < farthest[0]

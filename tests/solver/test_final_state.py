@@ -10,11 +10,10 @@ import pytest
 from solver import march_wear
 from solver.accuracy.error_estimate import NOTHING
 from solver.contact.wear_law import ARCHARD
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import State
 from solver.loading_history.start_states import follow_branch
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
@@ -168,7 +167,7 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case):
     work, state = begun(case)
     joint, at = work.at(state), state.point.evaluation
     pairs = np.argsort(-at.slip_work)[:3]
-    slopes = work_slopes(joint, at, work.wearing, JacobianSolver(), pairs)
+    slopes = work_slopes(joint, at, work.wearing, work.run, pairs)
     step = 1e-5 * float(at.slip_work.max() / np.abs(slopes).max())
     for place, pair in enumerate(pairs):
         works = []
@@ -176,7 +175,7 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case):
             depth = at.wear_depth.copy()
             depth[pair] += sign * step
             balance = Balance.frozen(joint, at.history, depth)
-            solved = solve_balance(balance, at.predicted_h, JacobianSolver(), 1e-13, Budget())
+            solved = Run(1e-13).solve(balance, at.predicted_h)
             works.append(solved.evaluation.slip_work)
         wanted = (works[0] - works[1]) / (2.0 * step)
         assert slopes[:, place] == pytest.approx(wanted, abs=1e-3 * np.abs(wanted).max())
@@ -196,7 +195,7 @@ def test_the_tests_of_cooperation_refuse_other_final_states():
     # it stops short of the end
     point = final.state.point
     half = replace(point.evaluation, wear_depth=0.5 * point.evaluation.wear_depth)
-    short = replace(final, state=replace(final.state, point=PathPoint(0.0, half, point.history)))
+    short = replace(final, state=replace(final.state, point=State(half, point.history, 0.0)))
     assert "still wear" in failure(work, before, short, 1e-4)
 
 

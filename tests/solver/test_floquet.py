@@ -10,7 +10,7 @@ from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Balance
 from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.stability.floquet import find_instability, multipliers_of
@@ -117,7 +117,10 @@ def test_with_negative_damping_as_well(kind, damping):
             continue
         if abs(exact - 1.0) > 0.05:
             seen += 1
-            assert (find_instability(case, joint, at, Budget()) is not None) == (exact > 1.0), (seed, exact)
+            assert (find_instability(case, joint, at, Run(case.settings.tolerance)) is not None) == (exact > 1.0), (
+                seed,
+                exact,
+            )
     assert seen > 0
 
 
@@ -128,7 +131,7 @@ def test_a_multiplier_beyond_minus_one_doubles_the_period(seed):
     scene, case, joint, at = state_of("impact", seed)
     exact = exact_multipliers(scene, joint, at)
     beyond = bool(((np.abs(exact.imag) < 1e-9) & (exact.real < -1.0)).any())
-    unstable = find_instability(case, joint, at, Budget())
+    unstable = find_instability(case, joint, at, Run(case.settings.tolerance))
     assert (unstable is not None and unstable.outcome is Outcome.PERIOD_DOUBLED) == beyond
 
 
@@ -141,7 +144,7 @@ def test_a_stable_mass_at_a_wall_is_not_rejected_with_few_harmonics(omega, n_har
     )
     assert (at.status_t == SEPARATED).any()
     assert not (at.status_t == SEPARATED).all()
-    assert find_instability(case, joint, at, Budget()) is None
+    assert find_instability(case, joint, at, Run(case.settings.tolerance)) is None
 
 
 def with_matrices(name, **matrices):
@@ -227,6 +230,11 @@ def test_it_is_not_looked_for_in_a_travelling_wave():
     at = balance.evaluate(predicted)
     assert switching_pairs(at)[0].any()
     assert (
-        find_instability(build_case(balance.joint.model, 0.5, 1.0, SolverSettings(3, 24)), balance.joint, at, Budget())
+        find_instability(
+            build_case(balance.joint.model, 0.5, 1.0, SolverSettings(3, 24)),
+            balance.joint,
+            at,
+            Run(1e-8),
+        )
         is None
     )

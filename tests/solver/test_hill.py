@@ -1,17 +1,19 @@
 """Stability of states on all three branches of a mass at a wall; signs of determinants against dense ones."""
 
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
 from solver.continuation.arc_length import Arc, follow_arc
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import State
+from solver.newton.bordering import Bordered, bordered_step
 from solver.newton.cost import is_dense_cheapest
 from solver.newton.krylov import ritz_values
 from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.settings import SolverSettings
 from solver.stability.hill import is_stable
 from solver.structure.joint import build_case
@@ -32,24 +34,24 @@ def crossings():
     state = converged_state(CASE.model, 0.0, FORCE, 1.55, SETTINGS)
     start = balance_at(1.55, state.start_history)
     at = start.evaluate(start.predict(state.displacement_h, state.contact_force_h))
-    found: dict[float, list[PathPoint]] = {1.3: [], 1.55: []}
+    found: dict[float, list[State]] = {1.3: [], 1.55: []}
     for target, seen in found.items():
 
         def collect(point, seen=seen):
             seen.append(point)
             return len(seen) == 2
 
-        begin = PathPoint(1.55, at, state.start_history)
-        follow_arc(Arc(balance_at, begin, 0.08, JacobianSolver(), 1e-8, Budget()), target, collect, toward=1.0)
-    found[1.55].insert(0, PathPoint(1.55, at, state.start_history))
+        begin = State(at, state.start_history, 1.55)
+        follow_arc(Arc(balance_at, begin, 0.08, Run(1e-8)), target, collect, toward=1.0)
+    found[1.55].insert(0, State(at, state.start_history, 1.55))
     return found
 
 
 @pytest.mark.slow
 def test_the_branches_have_alternating_stability():
     upper, middle, lower = crossings()[1.55]
-    tangents = [balance_at(1.55, point.history).linearise(point.evaluation) for point in (upper, middle, lower)]
-    assert [is_stable(tangent, JacobianSolver()) for tangent in tangents] == [True, False, True]
+    stable = [is_stable(balance_at(1.55, at.history), at.evaluation, Run(1e-8)) for at in (upper, middle, lower)]
+    assert stable == [True, False, True]
     sizes = [np.abs(point.evaluation.displacement_h).max() for point in (upper, middle, lower)]
     assert sizes[0] > sizes[1] > 0
     assert not lower.evaluation.force_h.any()
@@ -61,7 +63,7 @@ def test_a_joint_that_is_open_or_stuck_all_over_is_stable():
         predicted[balance.joint.component_index % 3 == 0, 0] = level
         at = balance.evaluate(predicted)
         assert (at.status_t == (0 if level < 0 else 1)).all()
-        assert is_stable(balance.linearise(at), JacobianSolver())
+        assert is_stable(balance, at, Run(1e-8))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6])
@@ -79,26 +81,47 @@ def test_the_sign_with_a_kept_factorisation_is_that_of_the_dense_matrix(seed):
         predicted = predicted + 0.05 * np.abs(predicted).mean() * random.normal(size=predicted.shape)
 
 
-def test_two_right_sides_are_solved_as_one_by_one():
-    for kinds in (("3d", "normal_only"), ("3d",) * 14):
-        balance, predicted = random_balance(random_model(3, kinds), SolverSettings(3, 24), 4, wear=False)
-        tangent = balance.linearise(balance.evaluate(predicted))
-        first, second, noise = np.random.default_rng(5).normal(size=(3, *predicted.shape))
-        solver = JacobianSolver()
-        row = noise / np.linalg.norm(noise)
+@dataclass(frozen=True)
+class _Affine:
+    """A balance with two further unknowns q that push it, R(p) + B q = 0, and two linear equations of p and q."""
 
-        def change_of(step, by_parameter, row=row):
-            return (0.3 - float(np.vdot(row, step))) / float(np.vdot(row, by_parameter))
+    balance: Balance
+    pushes: np.ndarray  # (2, n_rel, m)
+    rows: np.ndarray  # (2, n_rel, m)
+    own: np.ndarray  # (2, 2)
 
-        # a second side near the one before, equal to it, and far from it
-        for other in (second, second + 1e-2 * noise, second + 1e-2 * noise, noise):
-            step, change = solver.solve_with_parameter(tangent, first, other, change_of)
-            assert np.linalg.norm(tangent.apply(step) - first - change * other) < 4e-3 * np.linalg.norm(first)
-            assert np.vdot(row, step) == pytest.approx(0.3, rel=1e-9)
-            near = solver.solve_by_parameter(tangent, other, 1e-2)
-            assert np.linalg.norm(tangent.apply(near) - other) < 2e-2 * np.linalg.norm(other)
-        for right, step in zip((first, second), solver.solve_all(tangent, (first, second)), strict=True):
-            assert np.linalg.norm(tangent.apply(step) - right) < 2e-3 * np.linalg.norm(right)
+    def evaluate(self, predicted_h, values):
+        at = self.balance.evaluate(predicted_h)
+        at = replace(at, residual=at.residual + np.tensordot(values, self.pushes, 1))
+        errors = np.tensordot(self.rows, predicted_h, 2) + self.own @ values - 0.3
+        return Bordered(self.balance, at, values, errors)
+
+    def by_values(self, _):
+        return list(self.pushes), self.own
+
+    def by_step(self, _, __, step):
+        return np.tensordot(self.rows, step, 2)
+
+    def fraction(self, *_):
+        return 1.0
+
+
+@pytest.mark.parametrize("kinds", [("3d", "normal_only"), ("3d",) * 14])
+def test_a_bordered_step_is_that_of_the_whole_jacobian(kinds):
+    balance, predicted = random_balance(random_model(3, kinds), SolverSettings(3, 24), 4, wear=False)
+    random, shape = np.random.default_rng(5), predicted.shape
+    pushes, rows = random.normal(size=(2, 2, *shape)) / predicted.size
+    problem = _Affine(balance, pushes, rows, random.normal(size=(2, 2)))
+    here = problem.evaluate(predicted, np.array([0.7, -0.2]))
+    tangent = balance.linearise(here.at)
+    found = bordered_step(problem, here, JacobianSolver(), 1e-9)
+    jacobian = tangent.dense(np.arange(balance.joint.contact.n_contact))
+    by_values = pushes.reshape(2, -1).T
+    whole = np.block([[jacobian, by_values], [rows.reshape(2, -1), problem.own]])
+    wanted = np.linalg.solve(whole, -np.concatenate([here.at.residual.ravel(), here.errors]))
+    assert found.unknown == pytest.approx(wanted, rel=1e-6, abs=1e-6 * np.abs(wanted).max())
+    reduced = problem.own - rows.reshape(2, -1) @ np.linalg.solve(jacobian, by_values)
+    assert found.reduced == pytest.approx(reduced, rel=1e-6, abs=1e-6)
 
 
 def test_ritz_values_of_a_whole_space_are_the_eigenvalues():

@@ -8,7 +8,7 @@ import pytest
 from solver.accuracy.resolved_state import ResolvedState
 from solver.continuation.homotopy import HarmonicHomotopy, add_harmonics, compliances
 from solver.loading_history.start_states import follow_branch
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import change_orders
@@ -47,11 +47,11 @@ def test_the_homotopy_begins_at_the_state_and_ends_at_the_balance(which):
 def test_the_homotopy_ends_at_the_state_that_a_warm_start_finds(which):
     case, omega, amplitude, point = states()[which]
     case = replace(case, settings=SolverSettings())
-    found = ResolvedState(case, case.joint(omega, amplitude), point).by_homotopy(RICH, Budget())
+    found = ResolvedState(case, case.joint(omega, amplitude), point).by_homotopy(RICH, Run(case.settings.tolerance))
     best = solved_at(case, omega, amplitude, point, RICH)
     ours = response(found.case, omega, amplitude, found.point)
     assert ours == pytest.approx(response(case.at(RICH), omega, amplitude, best), rel=1e-6)
-    along = add_harmonics(case, case.joint(omega, amplitude), point.evaluation, RICH, Budget())
+    along = add_harmonics(case, case.joint(omega, amplitude), point.evaluation, RICH, Run(case.settings.tolerance))
     assert along.scaled_residual() <= case.settings.tolerance
 
 

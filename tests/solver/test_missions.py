@@ -11,6 +11,7 @@ from scipy.linalg import expm
 
 from solver import Block, MissionHistory, Outcome, Passage, SolverSettings, integrate_mission, march_wear
 from solver.contact.wear_law import WearLaw, WearTable
+from solver.harmonic_balance.state import Failure
 from solver.missions import solutions
 from solver.missions.block_run import BlockCase, BlockRun, run_block
 from solver.missions.blocks import Begin, Mission
@@ -24,7 +25,6 @@ from solver.packing import Packed
 from solver.results.history import StartState
 from solver.settings import Resolution, WearTarget
 from solver.wear.solutions import Like
-from solver.wear.state import Failure
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studies.scenes.sdof_slider import Parameters as SliderParameters
 from tests.solver.models import scene

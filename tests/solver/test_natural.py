@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from solver.continuation.natural import follow_naturally
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.harmonic_balance.state import State, final_history
+from solver.newton.run import Run
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from tests.solver.models import OMEGA, first_point, random_model, scene
@@ -28,7 +27,7 @@ def wall(omega, n_harmonics=5):
 
     def first(amplitude):
         found = first_point(case, omega, amplitude, idle)
-        return PathPoint(amplitude, found.evaluation, found.history)
+        return State(found.evaluation, found.history, amplitude)
 
     def size(point):
         structure = case.joint(omega, point.parameter).structure
@@ -41,7 +40,7 @@ def wall(omega, n_harmonics=5):
 def test_a_natural_step_reaches_its_target_from_either_side():
     balance_at, first, size = wall(0.5)
     for start, target in ((0.01, 0.06), (0.06, 0.01)):
-        point, arrived = follow_naturally(balance_at, first(start), target, JacobianSolver(), TOLERANCE, Budget())
+        point, arrived = follow_naturally(balance_at, first(start), target, Run(TOLERANCE))
         assert arrived
         assert point.parameter == target
         assert point.evaluation.scaled_residual() <= TOLERANCE
@@ -51,7 +50,7 @@ def test_a_natural_step_reaches_its_target_from_either_side():
 
 def test_natural_steps_end_before_a_fold_and_say_so():
     balance_at, first, size = wall(WALL_OMEGA)
-    point, arrived = follow_naturally(balance_at, first(0.03), 0.06, JacobianSolver(), TOLERANCE, Budget())
+    point, arrived = follow_naturally(balance_at, first(0.03), 0.06, Run(TOLERANCE))
     assert not arrived
     # the branch without impacts ends where the mass reaches the wall; 1/64 of the range is the shortest step
     assert point.parameter == pytest.approx(GRAZING, abs=2 * 0.03 / 64)
@@ -69,12 +68,10 @@ def test_history_is_handed_on_or_kept():
         return Balance.frozen(case.joint(OMEGA, amplitude), history, idle)
 
     found = first_point(case, OMEGA, 20.0, idle)
-    start = PathPoint(20.0, found.evaluation, found.history)
+    start = State(found.evaluation, found.history, 20.0)
     assert start.history.any()
     for keep in (True, False):
-        point, arrived = follow_naturally(
-            balance_at, start, 80.0, JacobianSolver(), TOLERANCE, Budget(), keep_history=keep
-        )
+        point, arrived = follow_naturally(balance_at, start, 80.0, Run(TOLERANCE), keep_history=keep)
         assert arrived
         if keep:
             assert np.array_equal(point.history, start.history)

@@ -8,15 +8,14 @@ import pytest
 
 from solver.continuation.largest_response import rise_of_response
 from solver.continuation.phase_lag import (
-    LaggingState,
     excitation_product,
     frequency_derivative,
     phase_lag,
     solve_at_lag,
 )
 from solver.harmonic_balance.dlft import Balance
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.newton.bordering import Bordered
+from solver.newton.run import Run
 from solver.settings import SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
@@ -32,11 +31,10 @@ def slider_state(gain=0.0, damping=20.0, friction=0.5):
     case = build_case(model, friction, OMEGA, TIGHT)
     joint = case.joint(OMEGA, 10.0)
     balance = Balance(joint, np.zeros((1, 2)), np.zeros(1), np.full(1, gain))
-    solver = JacobianSolver()
     start = balance.predict(np.zeros((1, 3, 7)), np.zeros((1, 3, 7)))
-    found = solve_balance(balance, start, solver, 1e-11, Budget(), 100)
+    found = Run(1e-11).solve(balance, start, 100)
     assert found.converged
-    return case, LaggingState(balance, found.evaluation, 0.0)
+    return case, Bordered(balance, found.evaluation, np.array([OMEGA]), np.zeros(1))
 
 
 @pytest.mark.parametrize("gain", [0.0, 2e-3], ids=["fixed depth", "growing depth"])
@@ -45,8 +43,8 @@ def test_a_state_at_its_own_lag_has_its_own_frequency(gain):
     assert (state.at.wear_depth > 0.0) == (gain > 0.0)
     lag = phase_lag(state.balance.joint, state.at)
     other = replace(state.balance, joint=case.joint(0.99 * OMEGA, 10.0))
-    found = solve_at_lag(case, other, state.at.predicted_h, lag, JacobianSolver(), Budget())
-    assert found.omega == pytest.approx(OMEGA, rel=1e-9)
+    found = solve_at_lag(case, other, state.at.predicted_h, lag, Run(case.settings.tolerance))
+    assert found.values[0] == pytest.approx(OMEGA, rel=1e-9)
     np.testing.assert_allclose(found.at.wear_depth, state.at.wear_depth, rtol=1e-8)
 
 
@@ -57,14 +55,14 @@ def test_the_change_of_the_lag_with_the_frequency_is_that_of_finite_differences(
     lags, length = [], 1e-5 * OMEGA
     for omega in (OMEGA - length, OMEGA + length):
         balance = replace(state.balance, joint=case.joint(omega, 10.0))
-        end = solve_balance(balance, state.at.predicted_h, JacobianSolver(), 1e-12, Budget())
+        end = Run(1e-12).solve(balance, state.at.predicted_h)
         lags.append(phase_lag(balance.joint, end.evaluation))
     expected = (lags[1] - lags[0]) / (2.0 * length)
     lag = phase_lag(state.balance.joint, state.at)
     # a single step of Newton's method, whose derivative is that of the start
     loose = replace(case, settings=replace(TIGHT, tolerance=1e-9))
-    near = solve_at_lag(loose, state.balance, state.at.predicted_h, lag + 1e-6, JacobianSolver(), Budget(), most=1)
-    assert near.turn == pytest.approx(expected, rel=1e-4)
+    near = solve_at_lag(loose, state.balance, state.at.predicted_h, lag + 1e-6, Run(loose.settings.tolerance), most=1)
+    assert float(near.reduced[0, 0]) == pytest.approx(expected, rel=1e-4)
 
 
 @pytest.mark.parametrize("word", ["slider", "dovetail"])
@@ -77,8 +75,8 @@ def test_derivatives_with_the_frequency_are_those_of_finite_differences(word):
         predicted = np.random.default_rng(0).normal(size=(joint.component_index.size, 7)) * 10.0
         predicted[joint.component_index % 3 == 0, 0] += 100.0
         balance = Balance.frozen(joint, np.zeros((16, 2)), np.zeros(16))
-        state = LaggingState(balance, balance.evaluate(predicted), 0.0)
-    found, length = frequency_derivative(state), 1e-5 * OMEGA
+        state = Bordered(balance, balance.evaluate(predicted), np.array([OMEGA]), np.zeros(1))
+    found, length = frequency_derivative(state.balance, state.at), 1e-5 * OMEGA
     ends = []
     for omega in (OMEGA - length, OMEGA + length):
         balance = replace(state.balance, joint=case.joint(omega, state.balance.joint.excitation_amplitude))
@@ -93,26 +91,26 @@ def test_a_linear_oscillator_has_its_natural_frequency_and_its_peak_below():
     damping = 100.0  # N s/m: 40 % of the critical damping
     natural, ratio = math.sqrt(1.6e5 / 0.1), damping / (2.0 * math.sqrt(1.6e5 * 0.1))
     case, state = slider_state(damping=damping, friction=0.0)
-    solver = JacobianSolver()
-    found = solve_at_lag(case, state.balance, state.at.predicted_h, 0.5 * math.pi, solver, Budget())
-    assert found.omega == pytest.approx(natural, rel=1e-10)
-    rise, turn = rise_of_response(found, solver, 1e-2)
+
+    found = solve_at_lag(case, state.balance, state.at.predicted_h, 0.5 * math.pi, Run(case.settings.tolerance))
+    assert found.values[0] == pytest.approx(natural, rel=1e-10)
+    rise, turn = rise_of_response(found, Run(1e-12), 1e-2)
     # at the natural frequency the amplitude falls as 1 / omega, and the lag rises by 1 / (zeta omega)
     assert rise * natural == pytest.approx(-1.0, rel=1e-5)
     assert turn * natural == pytest.approx(1.0 / ratio, rel=1e-5)
     peak = replace(found.balance, joint=case.joint(natural * math.sqrt(1.0 - 2.0 * ratio**2), 10.0))
-    end = solve_balance(peak, found.at.predicted_h, solver, 1e-12, Budget())
-    at_peak, turn = rise_of_response(LaggingState(peak, end.evaluation, 0.0), solver, 1e-2)
+    end = Run(1e-12).solve(peak, found.at.predicted_h)
+    at_peak, turn = rise_of_response(Bordered(peak, end.evaluation, np.zeros(1), np.zeros(1)), Run(1e-12), 1e-2)
     assert abs(at_peak) < 1e-5 * turn
 
 
 def test_the_rise_of_the_response_is_that_of_finite_differences():
     case, state = slider_state()
-    rise, _ = rise_of_response(state, JacobianSolver(), 1e-2)
+    rise, _ = rise_of_response(state, Run(1e-12), 1e-2)
     length, sizes = 1e-5 * OMEGA, []
     for omega in (OMEGA - length, OMEGA + length):
         balance = replace(state.balance, joint=case.joint(omega, 10.0))
-        at = solve_balance(balance, state.at.predicted_h, JacobianSolver(), 1e-12, Budget()).evaluation
+        at = Run(1e-12).solve(balance, state.at.predicted_h).evaluation
         response = balance.joint.structure.response_h(balance.joint.to_relative(at.displacement_h))
         sizes.append(abs(to_complex(response)[0, 0]))
     assert rise == pytest.approx(math.log(sizes[1] / sizes[0]) / (2.0 * length), rel=1e-4)

@@ -6,10 +6,10 @@ import pytest
 from solver.accuracy.certificate import certify
 from solver.accuracy.resolved_state import ResolvedState
 from solver.continuation.ratcheting import ratcheting_work, ratchets, shake_down
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import State
 from solver.loading_history.start_states import follow_branch
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import Joint, build_case
@@ -28,7 +28,7 @@ def started(seed):
 
 def ratcheting(seed, monkeypatch):
     """The first state that is refined at the frequency of the scene, before its masses shake down."""
-    seen: list[tuple[Joint, PathPoint]] = []
+    seen: list[tuple[Joint, State]] = []
 
     def note(level, _):
         seen.append((level.joint, level.point))
@@ -46,7 +46,7 @@ def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch):
     joint, point = ratcheting(SHAKEN_DOWN, monkeypatch)
     assert ratcheting_work(joint, point.evaluation) > 0.5 * point.evaluation.slip_work.sum()
     assert "energy_error" in certify(joint, point.evaluation).failures(TOLERANCE)
-    shaken = shake_down(joint, point, 1e-3, TOLERANCE, Budget())
+    shaken = shake_down(joint, point, 1e-3, Run(TOLERANCE))
     assert shaken.evaluation.slip_work.sum() < 1e-6 * point.evaluation.slip_work.sum()
     assert shaken.evaluation.scaled_residual() <= TOLERANCE
     assert certify(joint, shaken.evaluation).holds(TOLERANCE)
@@ -55,11 +55,11 @@ def test_a_mass_that_vibration_shakes_down_does_not_wear(monkeypatch):
 @pytest.mark.slow
 def test_a_mass_that_slides_on_wears_by_its_vibration_alone(monkeypatch):
     joint, point = ratcheting(SLIDING_ON, monkeypatch)
-    shaken = shake_down(joint, point, 1e-3, TOLERANCE, Budget())
+    shaken = shake_down(joint, point, 1e-3, Run(TOLERANCE))
     assert not ratchets(joint, shaken.evaluation, 1e-3)
     assert shaken.evaluation.slip_work.sum() > 0.1 * point.evaluation.slip_work.sum()
     # the next state starts from where this one stays
-    again = shake_down(joint, shaken, 1e-3, TOLERANCE, Budget())
+    again = shake_down(joint, shaken, 1e-3, Run(TOLERANCE))
     assert again is shaken
     middle = shaken.evaluation.displacement_h[:, 1:, 0] - shaken.evaluation.history
     moved = np.abs(shaken.evaluation.displacement_h[:, 1:, 1:]).max()

@@ -8,11 +8,11 @@ import pytest
 
 from solver.accuracy.history_error import Both, Met, history_error
 from solver.accuracy.options import ACCURACY
+from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome
 from solver.settings import Scheme, SolverSettings
 from solver.wear.check import FullCheck
 from solver.wear.control import AdaptiveSteps
-from solver.wear.state import Failure
 from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 

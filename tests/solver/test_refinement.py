@@ -12,11 +12,10 @@ from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.refinement import refine
 from solver.contact.coulomb import SLIP, STICK
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.response_peak import largest_responses
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.harmonic_balance.state import State, final_history
+from solver.newton.run import Run
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
@@ -40,9 +39,9 @@ def solved_at(case, omega, amplitude, point, resolution):
     """The same state with other harmonics and samples, which must be found."""
     other = case.at(resolution)
     balance, start = transfer(other, other.joint(omega, amplitude), point.evaluation, case.resolution.orders)
-    result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, Budget(), 60)
+    result = Run(case.settings.tolerance).solve(balance, start, 60)
     assert result.converged
-    return PathPoint(point.parameter, result.evaluation, final_history(balance, result.evaluation))
+    return State(result.evaluation, final_history(balance, result.evaluation), point.parameter)
 
 
 def response(case, omega, amplitude, point):
@@ -53,7 +52,7 @@ def response(case, omega, amplitude, point):
 def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics():
     case, point = slider(SolverSettings())
     assert case.resolution.orders == (1, 2, 3)
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Run(case.settings.tolerance))
     orders = refined.case.resolution.orders
     assert len(orders) > 1
     assert all(order % 2 for order in orders)
@@ -73,7 +72,7 @@ def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics():
 
 def test_a_state_with_even_harmonics_keeps_them():
     case, point = started(random_model(2), FRICTION, OMEGA, SLIPPING, SolverSettings())
-    refined = refine(case, OMEGA, SLIPPING, point, Budget())
+    refined = refine(case, OMEGA, SLIPPING, point, Run(case.settings.tolerance))
     orders = refined.case.resolution.orders
     assert orders == all_orders(orders[-1])
     assert 2 in orders
@@ -84,9 +83,9 @@ def test_a_stuck_state_keeps_the_first_harmonic_alone(settings):
     amplitude = 1e-2
     case, point = started(random_model(1), FRICTION, OMEGA, amplitude, settings)
     # the second solve starts from where the first one slipped to: everything sticks
-    again = solved_at(case, OMEGA, amplitude, PathPoint(1.0, point.evaluation, point.history), case.resolution)
+    again = solved_at(case, OMEGA, amplitude, State(point.evaluation, point.history, 1.0), case.resolution)
     assert (again.evaluation.status_t == STICK).all()
-    refined = refine(case, OMEGA, amplitude, again, Budget())
+    refined = refine(case, OMEGA, amplitude, again, Run(case.settings.tolerance))
     assert refined.case.resolution == Resolution((1,), case.resolution.samples)
     assert refined.estimate == Estimate(0.0, 0.0)
     assert refined.accurate
@@ -100,7 +99,7 @@ def test_a_stuck_state_keeps_the_first_harmonic_alone(settings):
 def test_a_state_that_is_not_allowed_what_it_needs_says_so(name, most, monkeypatch):
     case, point = slider(SolverSettings(rtol=1e-4))
     monkeypatch.setattr(refinement, "ACCURACY", replace(ACCURACY, **{name: most}))
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Run(case.settings.tolerance))
     assert not refined.accurate
     assert refined.estimate.largest > 1e-4
     assert refined.point.evaluation.scaled_residual() <= 1e-8
@@ -116,7 +115,7 @@ def test_a_state_far_better_than_needed_goes_down_to_fewer():
     model = scene("sdof_slider", normal_stiffness=0.0)
     settings, rich = SolverSettings(rtol=0.05), Resolution((1, 3, 5, 7, 9), 256)
     case, point = started(model, 0.5, SLIDER_OMEGA, 10.0, settings, rich)
-    refined = refine(case, SLIDER_OMEGA, 10.0, point, Budget())
+    refined = refine(case, SLIDER_OMEGA, 10.0, point, Run(case.settings.tolerance))
     assert refined.accurate
     assert refined.case.resolution == Resolution((1, 3), 64)
     exact = response(case, SLIDER_OMEGA, 10.0, point)
@@ -160,7 +159,7 @@ def test_estimates_of_elastic_joints_are_at_least_half_the_error(amplitude, rtol
     case, point = started(random_model(4, KINDS), FRICTION, OMEGA, amplitude, SolverSettings(rtol=rtol))
     assert SLIP in point.evaluation.status_t
     assert not case.penalty.inertial.any()
-    refined = refine(case, OMEGA, amplitude, point, Budget())
+    refined = refine(case, OMEGA, amplitude, point, Run(case.settings.tolerance))
     assert refined.accurate
     assert fine > refined.case.resolution.highest
     error = true_error(refined, amplitude, Resolution(all_orders(fine), 4096))
@@ -175,6 +174,6 @@ def test_a_state_of_odd_harmonics_takes_even_ones_again_where_its_forces_have_th
     odd = case.at(Resolution((1, 3, 5, 7, 9), 128))
     point = solved_at(case, OMEGA, SLIPPING, whole, odd.resolution)
     assert certify(odd.joint(OMEGA, SLIPPING), point.evaluation).cone_violation > 0.01
-    refined = refine(odd, OMEGA, SLIPPING, point, Budget())
+    refined = refine(odd, OMEGA, SLIPPING, point, Run(case.settings.tolerance))
     assert 2 in refined.case.resolution.orders
     assert certify(refined.case.joint(OMEGA, SLIPPING), refined.point.evaluation).holds(settings.tolerance)

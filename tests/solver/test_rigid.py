@@ -9,7 +9,7 @@ import pytest
 from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.prolongation import carried_history
 from solver.harmonic_balance.response_peak import largest_responses, tail_orders
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings
 from solver.structure.fourier import synthesis
@@ -89,7 +89,7 @@ def test_a_state_is_found_again_where_its_mass_is_no_longer_marched(first, secon
     rich, poor = (Resolution(tuple(range(1, highest + 1, 2)), 1024) for highest in (first, second))
     case = build_case(beam.model(), FRICTION, omega, SolverSettings(), rich)
     point = first_point(case, omega, force, np.zeros(1))
-    other = ResolvedState(case, case.joint(omega, force), point).solve_at(poor, Budget())
+    other = ResolvedState(case, case.joint(omega, force), point).solve_at(poor, Run(case.settings.tolerance))
     assert case.penalty.inertial[0] != other.case.penalty.inertial[0]
     # both are within their errors of the exact motion
     level = ResolvedState(case, case.joint(omega, force), point)

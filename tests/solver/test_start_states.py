@@ -76,8 +76,8 @@ def test_a_structure_that_is_singular_with_its_joint_held_is_said_to_be():
 
 def test_a_sweep_that_finds_no_state_has_nothing_to_keep(monkeypatch):
     def in_vain(*given):
-        given[-1].iterations += 1000
-        return Outcome.STATIC_FAILED, None
+        given[-1].budget.iterations += 1000
+        return Outcome.STATIC_FAILED
 
     monkeypatch.setattr(frequency_sweep, "solve_first_state", in_vain)
     kept: list[Packed | str] = []

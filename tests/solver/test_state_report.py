@@ -8,7 +8,7 @@ import pytest
 
 from solver.accuracy.certificate import certify
 from solver.continuation.static_state import solve_static_state
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.results.state_report import periodic_state, report_state
 from solver.settings import RESOLUTION, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
@@ -40,7 +40,7 @@ def periodic(kinds, seed):
 
 
 def static_point(case, wear_depth, tolerance=1e-10):
-    point = solve_static_state(case.joint(OMEGA, 0.0), wear_depth, tolerance, Budget())
+    point = solve_static_state(case.joint(OMEGA, 0.0), wear_depth, Run(tolerance))
     assert point is not None
     return point
 

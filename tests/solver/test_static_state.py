@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver.continuation.static_state import solve_static_state
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.condensation import condense
@@ -48,7 +48,7 @@ def glued_force(model):
 
 def static_point(model, friction):
     case = build_case(model, friction, OMEGA, SETTINGS)
-    point = solve_static_state(case.joint(OMEGA, 0.0), np.zeros(model.contact.n_contact), 1e-9, Budget())
+    point = solve_static_state(case.joint(OMEGA, 0.0), np.zeros(model.contact.n_contact), Run(1e-9))
     assert not isinstance(point, Outcome), f"no static state at a friction coefficient of {friction}"
     return point
 
@@ -138,7 +138,7 @@ def test_a_joint_without_a_static_state_says_why(direction, edge, expected):
     joint = build_case(model, 0.1, OMEGA, SETTINGS).joint(OMEGA, 0.0)
     exists = equilibrium_possible(joint.structure.static_stiffness, joint.structure.static_force, 0.1)
     assert exists is (expected is None)
-    found = solve_static_state(joint, np.zeros(joint.contact.n_contact), 1e-9, Budget())
+    found = solve_static_state(joint, np.zeros(joint.contact.n_contact), Run(1e-9))
     assert (found if isinstance(found, Outcome) else None) is expected
 
 

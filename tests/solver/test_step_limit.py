@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.continuation.static_state import solve_static_state
-from solver.newton.solve_balance import Budget
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
@@ -35,7 +35,7 @@ def test_the_share_is_that_by_which_the_normal_forces_change():
     depth = 2e-7 * np.random.default_rng(1).uniform(size=16)
     states = []
     for worn in (np.zeros(16), depth):
-        point = solve_static_state(joint, worn, 1e-10, Budget())
+        point = solve_static_state(joint, worn, Run(1e-10))
         states.append(point.evaluation)
     before, after = (state.force_h[:, 0, 0] for state in states)
     change = np.linalg.norm(after - before) / np.linalg.norm(before)
@@ -46,7 +46,7 @@ def test_the_share_is_that_by_which_the_normal_forces_change():
 def test_the_reason_names_the_step_and_one_that_would_do():
     case = build_case(dovetail(), FRICTION, 2.0 * np.pi * FREQUENCY, SETTINGS)
     joint = case.joint(2.0 * np.pi * FREQUENCY, 0.0)
-    point = solve_static_state(joint, np.zeros(16), 1e-10, Budget())
+    point = solve_static_state(joint, np.zeros(16), Run(1e-10))
     one = np.zeros(16)
     one[0] = 1e-9
     unit = moved_fraction(joint, point.evaluation, one)

@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.options import LOADING
@@ -74,7 +75,7 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch):
     found = {}
     for change in (0.3, 0.02):
         options = replace(LOADING, change_limits=(change, change))
-        monkeypatch.setattr(sweep_module, "LOADING", options)
+        monkeypatch.setattr(path_module, "LOADING", options)
         found[change] = starts([213.25], settings=settings)[213.25]
     coarse, fine = found[0.3], found[0.02]
     assert coarse.reference is not None
@@ -128,10 +129,67 @@ def test_a_joint_without_grip_ends_within_bounded_effort():
 
 
 def test_a_first_state_that_more_harmonics_refuse_begins_no_sweep(monkeypatch):
-    monkeypatch.setattr(sweep_module.NodeSweep, "_choose_resolution", lambda _: 0.6)
-    sweep = FrequencySweep(scene("sdof_slider"), 0.3, 1.0, "up", AUTOMATIC)
-    origin = find_origin(sweep.model, 100.0, "up")
-    sweep.origin, sweep.nodes = origin, sweep._new_sweep(origin, None)
-    sweep._begin(sweep.nodes, origin)
-    assert sweep.nodes.here is None
-    assert sweep.nodes.state.failure is Outcome.UNSETTLED
+    monkeypatch.setattr(sweep_module.Sweep, "_choose_resolution", lambda _: 0.6)
+    nodes = FrequencySweep(scene("sdof_slider"), 0.3, 1.0, "up", AUTOMATIC).sweep_in_cell(100.0)
+    assert nodes.here is None
+    assert nodes.state.failure is Outcome.UNSETTLED
+
+
+class KilledError(BaseException):
+    """The end of a run, in the middle of its work."""
+
+
+def in_short_runs(model, friction, amplitude, frequencies, way):
+    """The start states from runs that all end at their second save, and the number of runs."""
+    found: dict[int, StartState] = {}
+    saved: list[Packed] = []
+    for n_runs in range(1, 1000):
+        n_saves = 0
+
+        def keep(progress):
+            nonlocal n_saves
+            if isinstance(progress, str):
+                return
+            saved[:], n_saves = [progress], n_saves + 1
+            if n_saves == 2:
+                raise KilledError
+
+        left = [index for index in range(frequencies.size) if index not in found]
+        resume = saved[0] if saved else None
+        try:
+            asked = model, friction, amplitude, frequencies[left], way, AUTOMATIC
+            for place, start in follow_branch(*asked, keep=keep, resume=resume):
+                found[left[place]] = start
+        except KilledError:
+            continue
+        return found, n_runs
+    raise AssertionError("the runs never end")
+
+
+INTERRUPTED = {
+    "nodes and resolutions": (lambda: dovetail(13), 0.5, 0.5, [212.0, 212.6], "up"),
+    "folds and settling in time": (lambda: scene("vibro_impact"), 0.0, 0.02, [0.2, 0.255], "up"),
+    "masses on sliders": (lambda: scene("two_masses"), 0.5, 20.0, [0.1], "down"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", INTERRUPTED)
+def test_runs_that_end_at_each_save_arrive_at_the_same_numbers(case, monkeypatch):
+    monkeypatch.setattr(sweep_module, "LOADING", replace(LOADING, iterations_per_save=5))
+    build, friction, amplitude, frequencies, way = INTERRUPTED[case]
+    model, at = build(), np.array(frequencies)
+    whole = dict(follow_branch(model, friction, amplitude, at, way, AUTOMATIC))
+    assert max(start.branch for start in whole.values()) == (1 if "folds" in case else 0)
+    found, n_runs = in_short_runs(model, friction, amplitude, at, way)
+    assert n_runs > 2 * len(whole)
+    for index, wanted in whole.items():
+        assert_same_state(found[index], wanted)
+        assert found[index].newton_iterations == wanted.newton_iterations
+
+
+@pytest.mark.slow
+def test_the_iterations_of_a_frequency_are_its_own_whatever_is_known():
+    together = starts([205.0, 211.0, 212.0])
+    assert starts([212.0])[212.0].newton_iterations == together[212.0].newton_iterations
+    assert together[205.0].newton_iterations < together[211.0].newton_iterations

@@ -11,10 +11,9 @@ from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.options import CONTINUATION
 from solver.continuation.static_state import solve_static_state
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
-from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.dlft import Balance
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget, solve_balance
+from solver.harmonic_balance.state import State
+from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
@@ -35,15 +34,15 @@ def from_rest(model, friction, amplitude, omega, settings):
     case = build_case(model, friction, omega, settings)
     idle = np.zeros(model.contact.n_contact)
     quiet = case.joint(omega, 0.0)
-    static = solve_static_state(quiet, idle, settings.tolerance, Budget())
+    static = solve_static_state(quiet, idle, Run(settings.tolerance))
     still = Balance.frozen(quiet, static.history, idle)
     at = static.evaluation
     orders = case.resolution.orders
     start = still.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
-    rest = solve_balance(still, start, JacobianSolver(), settings.tolerance, Budget())
+    rest = Run(settings.tolerance).solve(still, start)
     assert rest.converged
     joint = case.joint(omega, amplitude)
-    _, point = relax_to_periodic(case, joint, idle, rest.evaluation, quiet, static.history, JacobianSolver(), Budget())
+    point = relax_to_periodic(case, joint, idle, rest.evaluation, quiet, static.history, Run(case.settings.tolerance))
     assert point.evaluation.scaled_residual() <= settings.tolerance
     return np.abs(full_motion(model, periodic_state(joint, point)).displacement[1])
 
@@ -71,7 +70,7 @@ def upper_state(case, omega):
     balance = Balance.frozen(case.joint(omega, FORCE), state.start_history, idle)
     at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
     assert np.abs(state.contact_force_h).max() > 1e-2
-    return PathPoint(omega, at, state.start_history)
+    return State(at, state.start_history, omega)
 
 
 @pytest.mark.slow
@@ -83,8 +82,8 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega):
     before, joint = case.joint(1.55, FORCE), case.joint(omega, FORCE)
     start = upper_state(case, 1.55)
     budget = Budget()
-    _, found = relax_to_periodic(
-        case, joint, np.zeros(1), start.evaluation, before, start.history, JacobianSolver(), budget
+    found = relax_to_periodic(
+        case, joint, np.zeros(1), start.evaluation, before, start.history, Run(case.settings.tolerance, budget)
     )
     assert found is not None
     moved = full_motion(case.model, periodic_state(joint, found)).displacement[1][1]
@@ -97,17 +96,17 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
     balance_at, first, size = wall(WALL_OMEGA)
 
     def grows(point):
-        return not is_stable(balance_at(point.parameter, point.history).linearise(point.evaluation), JacobianSolver())
+        return not is_stable(balance_at(point.parameter, point.history), point.evaluation, Run(1e-8))
 
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
-    start, solver = first(0.03), JacobianSolver()
-    middle = follow_arc(Arc(balance_at, start, 0.03, solver, 1e-9, Budget()), 0.03, grows, 1.0).point
+    start = first(0.03)
+    middle = follow_arc(Arc(balance_at, start, 0.03, Run(1e-9)), 0.03, grows, 1.0).state
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
-    outcome, found = relax_to_periodic(
-        case, joint, np.zeros(1), middle.evaluation, before, middle.history, JacobianSolver(), Budget()
+    found = relax_to_periodic(
+        case, joint, np.zeros(1), middle.evaluation, before, middle.history, Run(case.settings.tolerance)
     )
-    assert outcome is Outcome.CONVERGED
+    assert isinstance(found, State)
     assert found is not None
     landed = replace(found, parameter=0.03 * (1.0 + change))
     assert not grows(landed)
@@ -136,7 +135,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure():
         predicted = np.zeros((1, 5))
         for _ in range(steps):
             balance = Balance.frozen(transient.step(motion, inverse), history, idle)
-            result = solve_balance(balance, predicted, JacobianSolver(), 1e-10, Budget())
+            result = Run(1e-10).solve(balance, predicted)
             assert result.converged
             predicted = result.evaluation.predicted_h
             motion = transient.after(result.evaluation, motion, inverse)
@@ -156,10 +155,10 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch)
     for most in (CONTINUATION.search_iterations, 10):
         monkeypatch.setattr(transient, "CONTINUATION", replace(CONTINUATION, search_iterations=most))
         budget = Budget()
-        outcome, _ = relax_to_periodic(
-            case, joint, idle, rest.evaluation, quiet, rest.history, JacobianSolver(), budget
+        outcome = relax_to_periodic(
+            case, joint, idle, rest.evaluation, quiet, rest.history, Run(case.settings.tolerance, budget)
         )
-        outcomes.append(outcome)
+        outcomes.append(Outcome.CONVERGED if isinstance(outcome, State) else outcome)
         # one step and one search for the periodic state may be under way
         assert budget.iterations <= most + CONTINUATION.near_iterations + CONTINUATION.near_iterations
     assert outcomes == [Outcome.CONVERGED, Outcome.UNSETTLED]

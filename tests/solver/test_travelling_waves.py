@@ -7,10 +7,9 @@ import pytest
 
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.transient import relax_to_periodic
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.solve_balance import Budget
+from solver.harmonic_balance.state import State, final_history
+from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
@@ -44,10 +43,10 @@ def state(nodal_diameter):
     """A state in which pairs slip, a little below the resonance."""
     omega = 2.0 * np.pi * (RESONANCE[nodal_diameter] - 0.3)
     case = build_case(dovetail(3, nodal_diameter), FRICTION, omega, SETTINGS)
-    outcome, point = solve_first_state(case, omega, 0.5, np.zeros(16), JacobianSolver(), Budget())
-    assert outcome is Outcome.CONVERGED
+    point = solve_first_state(case, omega, 0.5, np.zeros(16), Run(case.settings.tolerance))
+    assert isinstance(point, State)
     assert point.evaluation.slip_work.sum() > 1e-9
-    return case, PathPoint(omega, point.evaluation, point.history)
+    return case, State(point.evaluation, point.history, omega)
 
 
 @pytest.mark.slow
@@ -78,12 +77,12 @@ def test_the_structure_settles_to_the_state_that_the_balance_has():
     case, point = state(3)
     omega = point.parameter
     joint, quiet = case.joint(omega, 0.5), case.joint(omega, 0.0)
-    outcome, rest = solve_first_state(case, omega, 1e-6, np.zeros(16), JacobianSolver(), Budget())
-    assert outcome is Outcome.CONVERGED
-    outcome, settled = relax_to_periodic(
-        case, joint, np.zeros(16), rest.evaluation, quiet, rest.history, JacobianSolver(), Budget()
+    rest = solve_first_state(case, omega, 1e-6, np.zeros(16), Run(case.settings.tolerance))
+    assert isinstance(rest, State)
+    settled = relax_to_periodic(
+        case, joint, np.zeros(16), rest.evaluation, quiet, rest.history, Run(case.settings.tolerance)
     )
-    assert outcome is Outcome.CONVERGED
+    assert isinstance(settled, State)
     one, other = (
         joint.structure.response_h(joint.to_relative(at.evaluation.displacement_h))[0, 1:3] for at in (point, settled)
     )

@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from solver.harmonic_balance.state import Failure
 from solver.missions import solutions
 from solver.missions.block_run import BlockRun
 from solver.missions.blocks import Passage
 from solver.outcome import Outcome
 from solver.wear.solutions import Like
-from solver.wear.state import Failure
 
 STUDY = """
 [study]

@@ -22,11 +22,10 @@ import numpy as np
 from solver.contact.coulomb import SEPARATED
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.converged import PathPoint, final_history
 from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.state import State, final_history
 from solver.model import BoolArray, FloatArray
 from solver.newton.options import NEWTON
-from solver.newton.solve_balance import solve_balance
 from solver.options import COMMON
 from solver.structure.joint import Joint
 from solver.wear.euler import held_wear
@@ -90,7 +89,7 @@ def wear_off(work: WearingJoint, state: WearState, unworn: FloatArray, off: Bool
         depth = grazing_depth(joint, point.evaluation, unworn, off)
         held = Balance.frozen(joint, point.evaluation.history, depth)
         grazing = held.evaluate(held.predict(point.evaluation.displacement_h, point.evaluation.force_h))
-        grazes = PathPoint(0.0, grazing, final_history(held, grazing))
+        grazes = State(grazing, final_history(held, grazing))
         state = replace(
             work.accepted(state, Reached(grazes, state.omega, state.lag, state.half_width), 0.0),
             change=None,
@@ -109,9 +108,9 @@ def closing(joint: Joint, at: Evaluation) -> FloatArray:
     return np.asarray((at.displacement_h[:, 0] @ joint.basis.synthesis).max(axis=1) - joint.contact.gap)
 
 
-def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolArray) -> PathPoint:
+def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolArray) -> State:
     """State in which the worn pairs `off` are open throughout the period. Raises NoActiveSetError."""
-    joint, last, tolerance = work.at(state), state.point, work.case.settings.tolerance
+    joint, last = work.at(state), state.point
     rows = np.flatnonzero(joint.component_index % 3 == 0)
     stiffness = np.zeros(unworn.size)
     stiffness[joint.component_index[rows] // 3] = joint.structure.static_stiffness[rows, rows]
@@ -127,28 +126,20 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
         depth = np.where(off, np.maximum(closing(joint, last.evaluation), unworn) + margin, unworn)
         balance = Balance.frozen(joint, last.history, depth)
         start = balance.predict(last.evaluation.displacement_h, force_h)
-        found = solve_balance(balance, start, work.solver, tolerance, work.budget)
-        point = PathPoint(0.0, found.evaluation, last.history)
+        found = work.run.solve(balance, start)
+        point = State(found.evaluation, last.history)
         if not found.converged:
             before = last.evaluation.wear_depth
             balance_at = held_wear(joint, before, np.where(off, np.maximum(depth - margin, before), before))
-            near, arrived = follow_naturally(
-                balance_at,
-                PathPoint(0.0, last.evaluation, last.history),
-                1.0,
-                work.solver,
-                tolerance,
-                work.budget,
-                keep_history=True,
-            )
+            near, arrived = follow_naturally(balance_at, replace(last, parameter=0.0), 1.0, work.run, keep_history=True)
             if not arrived:
                 raise NoActiveSetError("without the pairs that slip under pressure no state was found")
             last, force_h = near, np.where(off[:, None, None], 0.0, near.evaluation.force_h)
             continue
         if (point.evaluation.status_t[off] == SEPARATED).all():
             # one more iteration: without it the depths of a sphere are 3e-6 off
-            finer = NEWTON.forcing * tolerance
-            exact = solve_balance(balance, found.evaluation.predicted_h, work.solver, finer, work.budget)
-            return PathPoint(0.0, exact.evaluation, last.history) if exact.converged else point
+            finer = work.run.to(NEWTON.forcing * work.run.tolerance)
+            exact = finer.solve(balance, found.evaluation.predicted_h)
+            return State(exact.evaluation, last.history) if exact.converged else point
         margin *= 10.0
     raise NoActiveSetError("without the pairs that slip under pressure the joint does not bear its load")

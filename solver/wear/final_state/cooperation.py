@@ -28,7 +28,7 @@ from solver.contact.wear_law import WearingWork
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import FloatArray, IntArray
-from solver.newton.linear_solver import JacobianSolver
+from solver.newton.run import Run
 from solver.structure.joint import Joint
 from solver.wear.euler import held_wear
 from solver.wear.final_state.active_set import WornOff, grazing_depth, least_rate, without
@@ -37,9 +37,7 @@ from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
 
 
-def work_slopes(
-    joint: Joint, at: Evaluation, wearing: WearingWork, solver: JacobianSolver, pairs: IntArray
-) -> FloatArray:
+def work_slopes(joint: Joint, at: Evaluation, wearing: WearingWork, run: Run, pairs: IntArray) -> FloatArray:
     """Derivatives (n_contact, n_pairs), J/m, of the wearing work of all pairs with respect to the depths of some pairs.
 
     From the balance `R(p, W) = 0`, the predicted force follows a depth as `dp = -J^-1 Z E dW`, with E the static normal
@@ -53,7 +51,7 @@ def work_slopes(
     for place, pair in enumerate(pairs):
         moved = np.zeros_like(at.displacement_h)
         moved[pair, 0, 0] = 1.0
-        step = solver.solve(tangent, -joint.structure.apply(joint.to_relative(moved)))
+        step = run.solver.solve(tangent, -joint.structure.apply(joint.to_relative(moved)))
         found[:, place] = (row * joint.to_pairs(step).reshape(joint.contact.n_contact, -1)).sum(axis=1)
     return found
 
@@ -63,13 +61,13 @@ def failure(work: WearingJoint, unworn: WearState, final: WornOff, share: float)
 
     unworn: first state of a history, with the harmonics and samples of the final state.
     """
-    joint, tolerance, solver = work.at(unworn), work.case.settings.tolerance, JacobianSolver()
+    joint, run = work.at(unworn), work.run.fresh()
     before, after = unworn.depth, final.state.depth
-    balance_at, point = held_wear(joint, before, after), unworn.point
+    balance_at, point = held_wear(joint, before, after), replace(unworn.point, parameter=0.0)
     largest = np.zeros(before.size)
     for place in range(WEAR.tested_states + 1):
         fraction = place / WEAR.tested_states
-        point, arrived = follow_naturally(balance_at, point, fraction, solver, tolerance, work.budget)
+        point, arrived = follow_naturally(balance_at, point, fraction, run)
         if not arrived:
             return f"the vibration does not go on to {100 * fraction:.0f} % of the final depths"
         at = point.evaluation
@@ -94,7 +92,7 @@ def failure(work: WearingJoint, unworn: WearState, final: WornOff, share: float)
         if (final.off & pressed & ~wears).any():
             return f"{where} pairs stick under pressure that wear before"
         pairs = np.flatnonzero(wears)
-        slopes = work_slopes(joint, at, work.wearing, solver, pairs)[pairs]
+        slopes = work_slopes(joint, at, work.wearing, run, pairs)[pairs]
         depth_rate = rate[pairs] / joint.contact.area[pairs]
         own = np.abs(np.diagonal(slopes)) * depth_rate
         np.fill_diagonal(slopes, 0.0)

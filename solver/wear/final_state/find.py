@@ -12,8 +12,9 @@ from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.reference import coarser
 from solver.clock import computing_time
 from solver.continuation.options import CONTINUATION
+from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
-from solver.newton.solve_balance import OutOfTimeError
+from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, describe_error
 from solver.packing import Packed
 from solver.results.cut_off import first_cut_off
@@ -27,7 +28,7 @@ from solver.wear.final_state.cooperation import failure
 from solver.wear.history import integrate_wear
 from solver.wear.output import DenseOutput
 from solver.wear.solutions import SlowTime, begin_reference
-from solver.wear.state import Failure, WearState
+from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
 
 
@@ -94,7 +95,7 @@ def _directly(case: Case, start: StartState, asked: SlowTime) -> tuple[WearHisto
     assert isinstance(asked.cycles, ToTheEnd)
     began, share = computing_time(), asked.cycles.final_share
     work = WearingJoint.of(case, start.state, asked.wear_coefficient, asked.law)
-    work.budget.deadline = began + case.settings.time_limit
+    work.run.budget.deadline = began + case.settings.time_limit
     estimate = Estimate(start.response_error, start.wear_rate_error)
     state = work.begin(start.state, start.resolution, estimate, accurate=start.outcome is Outcome.CONVERGED)
     found = _solved(work, state, FullCheck(asked.loops), share)
@@ -104,7 +105,7 @@ def _directly(case: Case, start: StartState, asked: SlowTime) -> tuple[WearHisto
     history = _assembled(work, start, asked, found, error)
     spent = replace(
         history,
-        newton_iterations=start.newton_iterations + work.budget.iterations,
+        newton_iterations=start.newton_iterations + work.run.budget.iterations,
         run_time=start.run_time + computing_time() - began,
     )
     return spent, found.reason

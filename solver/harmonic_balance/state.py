@@ -1,7 +1,8 @@
-"""A converged state, and the tangential history that it leaves to the next state."""
+"""A converged state with the tangential history that it leaves to the next state, or the reason why there is none."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ import numpy as np
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
+from solver.outcome import Outcome
 from solver.packing import packable
 from solver.structure.joint import Joint
 
@@ -19,12 +21,26 @@ BalanceAt = Callable[[float, FloatArray], Balance]
 
 @packable
 @dataclass(frozen=True)
-class PathPoint:
-    """A converged state at a value of the parameter. history (n_contact, 2): for the next state, m."""
+class State:
+    """A converged periodic state; the next one depends on it alone.
 
-    parameter: float
+    evaluation: of the balance, with the worn depth.
+    history (n_contact, 2): tangential history for the next state, m.
+    parameter: of the path on which the state lies; NaN where there is none.
+    """
+
     evaluation: Evaluation
     history: FloatArray
+    parameter: float = math.nan
+
+
+@packable
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no state, or why a history ends. message: addition to the outcome, for the user."""
+
+    outcome: Outcome
+    message: str = ""
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
@@ -37,7 +53,7 @@ def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
     return np.where(joint.penalty.inertial[:, None], evaluation.displacement_h[:, 1:, 0], at_end)
 
 
-def history_at_rest(joint: Joint, point: PathPoint) -> FloatArray:
+def history_at_rest(joint: Joint, state: State) -> FloatArray:
     """Tangential history (n_contact, 2), m, for a next state in which pairs that slip now may stick.
 
     When the range of slip of a pair shrinks to zero, the pair comes to stick in the middle of the range. So the history
@@ -45,7 +61,7 @@ def history_at_rest(joint: Joint, point: PathPoint) -> FloatArray:
     its history. Behind the resonance of the dovetail the motion after a sweep is 0.5 % wrong with the middle, and 2.3 %
     with `final_history`, for an equal number of states.
     """
-    evaluation, history = point.evaluation, point.history.copy()
+    evaluation, history = state.evaluation, state.history.copy()
     slips = (evaluation.status_t == SLIP).any(axis=1) & ~joint.penalty.inertial
     closed = (evaluation.status_t[slips] != SEPARATED)[:, None, :]
     slip = evaluation.state_t[slips, :, 1:]

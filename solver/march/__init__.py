@@ -1,0 +1,1 @@
+"""Steps along a line of states, whose lengths follow from one rule."""
