@@ -29,7 +29,7 @@ class Line(Protocol[HereT, EndT]):
         """Change or error of a step over the allowed one; above 1 the step is refused."""
 
     def rescue(self, here: HereT, length: float, /) -> EndT | Failure:
-        """End of a step that `attempt` does not find, however short, or why the line ends."""
+        """End of a step that is not found, or refused, however short; or why the line ends."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def take_step(line: Line[HereT, EndT], here: HereT, length: float, lengths: Leng
         ratio = math.inf if end is None else line.judge(here, end, length)
         if end is not None and ratio <= 1.0:
             return end, length * lengths.factor(ratio, accepted=True)
-        if end is None and length <= lengths.rescue:
+        if length <= (lengths.rescue if end is None else lengths.shortest):
             rescued = line.rescue(here, length)
             return rescued if isinstance(rescued, Failure) else (rescued, length)
         floor = lengths.rescue if end is None else lengths.shortest

@@ -23,7 +23,7 @@ from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable
 from solver.results.history import StartState
-from solver.wear.control import allowed_error, next_ratio
+from solver.wear.control import SECOND_ORDER, allowed_error
 from solver.wear.integrate import guarded
 from solver.wear.interpolation import fraction_where
 
@@ -115,8 +115,8 @@ class MissionSolutions:
         volumes = [float(of.depth @ self.mission.area) for of in (node, step.node)]
         error = step.error / allowed(*volumes, node.mission, length)
         if error > 1.0 and length > 1:
-            return replace(progress, length=max(int(next_ratio(error, accepted=False) * length), 1))
-        ahead = max(int(next_ratio(error, accepted=True) * length), 1)
+            return replace(progress, length=max(int(SECOND_ORDER.factor(error, accepted=False) * length), 1))
+        ahead = max(int(SECOND_ORDER.factor(error, accepted=True) * length), 1)
         return replace(progress, course=course.longer(step.node, step.runs), length=ahead)
 
     def missions_to_target(self, course: MissionCourse) -> float:

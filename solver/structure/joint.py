@@ -169,7 +169,7 @@ class Case:
     - penalty: penalties and masses of the pairs.
     - settings: settings of the solver.
     - resolution: harmonics and samples in use.
-    - hold: spring on a joint that slides as a whole, see `solver.wear.free_slide`; None without a spring.
+    - hold: spring on a joint that slides as a whole, see `solver.wear.jump`; None without a spring.
     """
 
     model: ReducedModel

@@ -18,9 +18,8 @@ from solver.outcome import Outcome
 from solver.results.state_report import StateReport, report_state
 from solver.settings import Resolution
 from solver.stability.floquet import find_instability
-from solver.wear.branch_loss import is_stable_when_held
 from solver.wear.followed import frequency_error
-from solver.wear.free_slide import creeps, free_slide
+from solver.wear.jump import creeps, free_slide
 from solver.wear.options import WEAR
 from solver.wear.state import Choice, WearState
 from solver.wear.wearing_joint import WearingJoint
@@ -184,6 +183,6 @@ def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable."""
     joint, at = work.at(state), state.point.evaluation
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
-    if free_slide(joint, at) is None and not is_stable_when_held(joint, at, work.run):
+    if free_slide(joint, at) is None and not work.is_stable(state, at):
         return Failure(Outcome.UNSTABLE)
     return _multipliers(work, state, every=True)

@@ -12,13 +12,18 @@ import numpy as np
 
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.state import Failure, vibration_change
+from solver.march.steps import Lengths, take_step
 from solver.options import COMMON
+from solver.outcome import Outcome
 from solver.settings import Scheme
-from solver.wear.bdf2 import Attempt, bdf2_attempt
 from solver.wear.options import WEAR
 from solver.wear.state import WearState
-from solver.wear.step import Step, bounded_euler_step, euler_step
+from solver.wear.step import Step, attempt_step, end_of_branch
+from solver.wear.step_limit import too_long
 from solver.wear.wearing_joint import WearingJoint
+
+SECOND_ORDER = Lengths(2)
+"""Lengths of steps of second order, from their local errors."""
 
 
 class Control(Protocol):
@@ -52,7 +57,7 @@ class GivenSteps:
         return replace(state, length=self.length, first_length=self.length)
 
     def step(self, work: WearingJoint, state: WearState) -> Step | Failure:
-        """As in `Control`."""
+        """As in `Control`; a step whose wear would move many times the normal forces is a failure."""
         planned = self.length
         if self.end == np.inf:
             slower = float(state.rates.largest[-1] / state.rates.value[-1])
@@ -61,7 +66,11 @@ class GivenSteps:
             planned = self.largest_depth / float(work.rate(state.point.evaluation).max())
         # no extra step for a remainder below the round-off of the count
         reach = self.end if state.cycle + planned >= self.end * (1.0 - 1e-12) else state.cycle + planned
-        return bounded_euler_step(work, replace(state, length=planned), reach - state.cycle, self.scheme)
+        length, state = reach - state.cycle, replace(state, length=planned)
+        step = euler_step(work, state, length, self.scheme)
+        ahead = step.state.cycle - state.cycle
+        said = too_long(work.at(state), state.point.evaluation, step.state.depth, state.cycle, ahead)
+        return step if said is None else Failure(Outcome.STEP_TOO_LONG, said)
 
 
 @dataclass(frozen=True)
@@ -93,31 +102,58 @@ class AdaptiveSteps:
         return replace(state, length=length, first_length=length)
 
     def step(self, work: WearingJoint, state: WearState) -> Step | Failure:
-        """One step within the allowed error.
+        """As in `Control`: one step within the allowed error.
 
-        The shortest step is half of the accuracy to which the end of a branch is located. Where the vibration changes
-        much over the shortest step, or its end is not found, an Euler step shows whether the branch ends there. An end
-        that a longer step goes across is only a corner.
+        The shortest step is half of the accuracy to which the end of a branch is located.
         """
-        length = min(state.length, self.end - state.cycle)
         shortest = max(0.5 * WEAR.fold_resolution * state.cycle, WEAR.shortest_slow_step * state.first_length)
-        while True:
-            tried = bdf2_attempt(work, state, length)
-            shorter = COMMON.smallest_step_ratio
-            if tried is not None:
-                size = float(np.abs(tried.error) @ work.area)
-                before, after = (float(at @ work.area) for at in (state.depth, tried.end.point.evaluation.wear_depth))
-                ratio = size / allowed_error(WEAR.step_error_fraction * self.rtol, before, after, state.cycle, length)
-                # at the shortest step: a corner of the wear rate, or the end of the branch if the vibration changes
-                if ratio <= 1.0 or (length <= shortest and is_smooth(state, tried)):
-                    ahead = length * next_ratio(ratio, accepted=True)
-                    return Step(work.accepted(state, tried.end, length).planned(ahead), size, length)
-                shorter = next_ratio(ratio, accepted=False)
-            if length <= shortest:
-                taken = euler_step(work, state, length, "implicit")
-                across = step_across(work, state, length, self.end) if tried is None and not taken.arrived else None
-                return across or replace(taken, state=taken.state.planned(length))
-            length = max(shorter * length, 0.999 * shortest)
+        longest = self.end - state.cycle
+        lengths = replace(SECOND_ORDER, shortest=min(shortest, longest), rescue=min(shortest, longest))
+        line = _Controlled(work, self.rtol, self.end, lengths.shortest)
+        taken = take_step(line, state, min(state.length, longest), lengths)
+        if isinstance(taken, Failure):
+            return taken
+        step, ahead = taken
+        return replace(step, state=step.state.planned(ahead))
+
+
+@dataclass(frozen=True)
+class _Controlled:
+    """The line of the adaptive steps of a joint. shortest: length of the shortest step, cycles."""
+
+    work: WearingJoint
+    rtol: float
+    end: float
+    shortest: float
+
+    def attempt(self, state: WearState, length: float) -> Step | None:
+        """As in Line."""
+        return attempt_step(self.work, state, length, "adaptive")
+
+    def judge(self, state: WearState, step: Step, length: float) -> float:
+        """As in Line. The shortest step is a corner of the wear rate where the vibration changes little."""
+        before, after = (float(at.depth @ self.work.area) for at in (state, step.state))
+        allowed = allowed_error(WEAR.step_error_fraction * self.rtol, before, after, state.cycle, length)
+        ratio = step.volume_error(self.work.area) / allowed
+        return min(ratio, 1.0) if length <= self.shortest and is_smooth(state, step) else ratio
+
+    def rescue(self, state: WearState, length: float) -> Step:
+        """As in Line, where the vibration changes much over the shortest step, or its end is not found.
+
+        An Euler step; a longer step across corners; the end of the branch.
+        """
+        euler = euler_step(self.work, state, length, "implicit")
+        if euler.arrived:
+            return euler
+        return step_across(self.work, state, length, self.end) or euler
+
+
+def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step:
+    """An Euler step to a stable state, or the end of the branch within the step."""
+    step = attempt_step(work, state, length, scheme)
+    if step is not None and (work.follow is not None or work.is_stable(state, step.state.point.evaluation)):
+        return step
+    return end_of_branch(work, state, length, scheme)
 
 
 def step_across(work: WearingJoint, state: WearState, shortest: float, end: float) -> Step | None:
@@ -137,18 +173,16 @@ def step_across(work: WearingJoint, state: WearState, shortest: float, end: floa
         length = 2.0**doubling * shortest
         if state.cycle + length > end:
             break
-        tried = bdf2_attempt(work, state, length)
+        tried = attempt_step(work, state, length, "adaptive")
         if tried is not None and is_smooth(state, tried):
-            size = float(np.abs(tried.error) @ work.area)
-            return Step(work.accepted(state, tried.end, length).planned(length), size, length)
+            return tried
     work.run = kept
     return None
 
 
-def is_smooth(state: WearState, tried: Attempt) -> bool:
+def is_smooth(state: WearState, step: Step) -> bool:
     """Whether the vibration changes so little over a step that the branch does not end within the step."""
-    change = vibration_change(state.point.evaluation, tried.end.point.evaluation)
-    return change < CONTINUATION.smooth_change
+    return vibration_change(state.point.evaluation, step.state.point.evaluation) < CONTINUATION.smooth_change
 
 
 def allowed_error(share: float, before: float, after: float, count: float, length: float) -> float:
@@ -160,13 +194,3 @@ def allowed_error(share: float, before: float, after: float, count: float, lengt
     """
     at_mean_rate = after * length / (count + length)
     return max(share * max(after - before, at_mean_rate), 1e-300)
-
-
-def next_ratio(error: float, *, accepted: bool) -> float:
-    """Length of the next step of second order, or of a step that is tried again, over the length of the present one.
-
-    error: of the present step, over the allowed error.
-    """
-    wanted = COMMON.step_safety / np.sqrt(max(error, 1e-12))
-    least, most = COMMON.step_safety, COMMON.largest_step_ratio
-    return float(np.clip(wanted, *((least, most) if accepted else (COMMON.smallest_step_ratio, least))))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol, TypeVar
 
@@ -21,7 +21,6 @@ from solver.wear.jump import land
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput
 from solver.wear.state import WearState
-from solver.wear.step import Step
 from solver.wear.wearing_joint import WearingJoint
 
 T = TypeVar("T")
@@ -113,13 +112,13 @@ class Integration:
         if isinstance(step, Failure):
             return step
         if step.arrived:
-            return self._kept(work, step.state, step.error)
+            return self._kept(work, step.state, step.volume_error(work.area))
         if step.state.cycle > state.cycle:
             # the last state before the end of the branch counts, too
-            reached = self._kept(work, step.state, step.error)
+            reached = self._kept(work, step.state, step.volume_error(work.area))
             if isinstance(reached, Failure):
                 return reached
-            step = Step(reached, 0.0, step.length, arrived=False, end_known_to=step.end_known_to)
+            step = replace(step, state=reached)
         landed = land(work, step, bounded=self.bounded)
         if work.follow is not None:
             landed = lost_resonance(work.follow, step.state) if isinstance(landed, Failure) else work.tuned(landed)

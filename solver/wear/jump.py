@@ -1,4 +1,20 @@
-"""A jump: from the end of the branch of the vibration to a stable state a little beyond, while the joint wears."""
+"""A jump: from the end of the branch of the vibration to a stable state a little beyond, while the joint wears.
+
+Two things end a branch. Where it folds, the vibration goes on in a state of another branch. Where the joint begins to
+slide as a whole, its mean position gets a soft hold in the direction without stiffness:
+
+Only friction holds a root along a prismatic slot. Where every pair slips at some time of the period, nothing determines
+the mean position along the slot: the Jacobian is singular, and the mean friction along the slot has to be zero.
+
+- In a symmetric joint the mean friction is zero.
+- Pairs with unequal wear, even by 1e-5 of their depth, leave a small force g (dovetail, friction 0.3, 1 N: up to 2e-6
+  of the friction F). Strictly, no periodic state exists: the root creeps. The force turns the directions of slip by
+  g / F. So the root moves by about g / F of its slip path in a period, here 1e-12 m, and motion and wear change by
+  g / F at most.
+
+So a soft spring holds the mean position from there on. Its force is the force g that drives the creep. Where g / F is
+no longer negligible there is no periodic state, and the outcome is ADRIFT.
+"""
 
 from __future__ import annotations
 
@@ -6,24 +22,27 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.contact.coulomb import STICK
+from solver.continuation.after_fold import states_after_fold
+from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.state import Failure, State, vibration_change
+from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
 from solver.model import FloatArray
+from solver.options import COMMON
 from solver.outcome import Outcome
+from solver.results.options import RESULTS
 from solver.stability.options import STABILITY
-from solver.wear.branch_loss import state_after_fold
-from solver.wear.free_slide import held_on
+from solver.structure.joint import Hold, Joint
+from solver.structure.options import STRUCTURE
 from solver.wear.state import WearState
-from solver.wear.step import Step
+from solver.wear.step import Step, held_wear
 from solver.wear.step_limit import too_long
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.wearing_joint import WearingJoint, is_stable_when_held
 
 
 def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failure:
     """A stable state a little beyond the end of the branch that a step has reached.
-
-    Where the branch ends because the joint slides as a whole, the state has a hold of the mean position (`free_slide`).
-    Otherwise the state belongs to another branch (`branch_loss`).
 
     bounded: whether a jump that moves many times the normal forces is refused.
     """
@@ -41,24 +60,69 @@ def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failur
     return replace(landed, cycle=state.cycle + beyond, change=None, previous=None)
 
 
-def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | None:
-    """The state with a hold of the mean position; None where the joint does not slide as a whole."""
-    if state.hold is not None:
-        return None
-    found = held_on(work.case, work.at(state), state.point, worn, work.run)
-    if found is None:
-        return None
-    hold, point = found
-    return replace(state, point=point, hold=hold, held_from=state.cycle)
-
-
 def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
     """A stable state of another branch at depths `worn` (n_contact,), m."""
-    landed = state_after_fold(work.case, work.at(state), state.point, worn, work.run)
-    if not isinstance(landed, State):
-        return Failure(landed if landed is Outcome.ADRIFT else Outcome.MARCH_FAILED)
-    if vibration_change(state.point.evaluation, landed.evaluation) <= STABILITY.other_branch:
-        # a small fold of the branch at a corner is no jump, and there may be many corners
-        return replace(state, point=landed)
-    first = state.cycle if np.isnan(state.jump_cycle) else state.jump_cycle
-    return replace(state, point=landed, jump_cycle=first)
+    joint = work.at(state)
+    for found in states_after_fold(work.case, joint, state.point, worn, work.run):
+        if isinstance(found, Outcome):
+            return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
+        # a search along the frequency keeps the old depth: the state has to exist at the depths `worn`, too
+        landed = _at_depth(work, joint, found, worn)
+        if landed is None:
+            continue
+        if vibration_change(state.point.evaluation, landed.evaluation) <= STABILITY.other_branch:
+            # a small fold of the branch at a corner is no jump, and there may be many corners
+            return replace(state, point=landed)
+        first = state.cycle if np.isnan(state.jump_cycle) else state.jump_cycle
+        return replace(state, point=landed, jump_cycle=first)
+    return Failure(Outcome.MARCH_FAILED)
+
+
+def _at_depth(work: WearingJoint, joint: Joint, state: State, worn: FloatArray) -> State | None:
+    """The stable state at other depths (n_contact,), m, to which a state leads; None where there is none."""
+    balance_at = held_wear(joint, state.evaluation.wear_depth, worn)
+    start = replace(state, parameter=0.0)
+    found, arrived = follow_naturally(balance_at, start, 1.0, work.run, keep_history=True)
+    if not arrived or not is_stable_when_held(joint, found.evaluation, work.run):
+        return None
+    return State(found.evaluation, final_history(balance_at(1.0, start.history), found.evaluation))
+
+
+def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | None:
+    """The state with a hold of the mean position; None where the joint does not slide as a whole, or where the
+    vibration changes: then a branch has ended.
+    """
+    hold = None if state.hold is not None else free_slide(work.at(state), state.point.evaluation)
+    if hold is None:
+        return None
+    joint = work.case.held(hold).joint(state.omega, work.excitation_amplitude)
+    found = _at_depth(work, joint, state.point, worn)
+    if found is None or creeps(joint, hold, found.evaluation):
+        return None
+    if vibration_change(state.point.evaluation, found.evaluation) > STABILITY.other_branch:
+        return None
+    return replace(state, point=found, hold=hold, held_from=state.cycle)
+
+
+def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
+    """Hold of the mean position of a state.
+
+    None unless every pair slips at some time and the structure is free to slide in one direction.
+    """
+    if (at.status_t == STICK).all(axis=1).any() or joint.penalty.inertial.any():
+        return None
+    stiffness, directions = np.linalg.eigh(joint.structure.static_stiffness)
+    # spin softening may give small negative eigenvalues
+    free = np.abs(stiffness) < COMMON.round_off * stiffness[-1]
+    along = directions[:, int(np.argmin(np.abs(stiffness)))]
+    closes = np.abs(along[joint.component_index % 3 == 0]).max(initial=0.0)
+    if np.count_nonzero(free) != 1 or closes > COMMON.negligible:
+        return None
+    motion = joint.to_relative(at.displacement_h)[:, 0]
+    return Hold(along, STRUCTURE.mean_stiffness_fraction * float(stiffness[-1]), float(along @ motion))
+
+
+def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
+    """Whether the force of a hold is so large that the joint would creep noticeably without it."""
+    friction = float(joint.friction_coefficient @ at.force_h[:, 0, 0])
+    return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > RESULTS.held_force * friction

@@ -18,6 +18,7 @@ from solver.newton.options import NEWTON
 from solver.newton.run import Run
 from solver.results.history import PeriodicState
 from solver.settings import FollowedFrequency, Resolution
+from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.followed import end_at_resonance, lost_resonance
 from solver.wear.friction_history import history_along
@@ -89,6 +90,10 @@ class WearingJoint:
     def drop_factor(self) -> None:
         """Drop the kept factorisation, so that the next solve depends on the state alone."""
         self.run = self.run.fresh()
+
+    def is_stable(self, state: WearState, at: Evaluation) -> bool:
+        """Whether a state of the joint of another one is stable at fixed wear depth."""
+        return is_stable_when_held(self.at(state), at, self.run)
 
     def wearing_work(self, at: Evaluation) -> FloatArray:
         """Work (n_contact,) that wears in a cycle, J."""
@@ -197,3 +202,8 @@ class WearingJoint:
             return now, balance
         history = history_along(there.joint, state.point.evaluation, state.point.history, found)
         return ahead, replace(there, history=history)
+
+
+def is_stable_when_held(joint: Joint, at: Evaluation, run: Run) -> bool:
+    """Whether a state is stable at fixed wear depth."""
+    return is_stable(Balance.frozen(joint, at.history, at.wear_depth), at, run)

@@ -10,7 +10,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.free_slide import creeps, free_slide
+from solver.wear.jump import creeps, free_slide
 from solver.wear_history import march_wear
 from studies import build_scene
 

@@ -62,7 +62,7 @@ def test_a_given_step_follows_its_own_equation(scheme):
     taken = rate[:-1] if scheme == "explicit" else rate[1:]
     assert np.diff(depths(states)) == pytest.approx(4000.0 * taken, rel=1e-9)
     expected = euler_error(4000.0, np.abs(np.diff(rate)) * AREA)
-    assert [step.error for step in steps] == pytest.approx(expected, rel=1e-9)
+    assert [step.volume_error(np.array([AREA])) for step in steps] == pytest.approx(expected, rel=1e-9)
 
 
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
@@ -90,24 +90,31 @@ def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     for place, step in enumerate(steps):
         at_mean_rate = worn[place + 1] * step.length / at[place + 1]
         allowed = OPTIONS.step_error_fraction * rtol * max(worn[place + 1] - worn[place], at_mean_rate)
-        assert step.error <= allowed
+        assert step.volume_error(np.array([AREA])) <= allowed
     assert (lengths[1:] <= COMMON.largest_step_ratio * lengths[:-1] * (1.0 + 1e-12)).all()
     assert (steps_of(AdaptiveSteps(1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
 
 
+def failing(monkeypatch, fails):
+    """Attempts at adaptive steps, of which some fail: lengths of all, and those of the Euler steps."""
+    own, tried, euler = control.attempt_step, list[float](), list[float]()
+
+    def attempt(work, state, length, scheme):
+        (tried if scheme == "adaptive" else euler).append(length)
+        return None if fails(len(tried), length, scheme) else own(work, state, length, scheme)
+
+    monkeypatch.setattr(control, "attempt_step", attempt)
+    return tried, euler
+
+
 def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch):
     first = steps_of(AdaptiveSteps(1e-2), 0)[0][0].length
-    own, tried = control.bdf2_attempt, []
-
-    def lose(*given, most):
-        tried.append(given[2])
-        return None if len(tried) <= most else own(*given)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(control, "bdf2_attempt", lambda *given: lose(*given, most=1))
-    _, (shorter, *_) = steps_of(AdaptiveSteps(1e-2), 1)
+    with monkeypatch.context() as patch:
+        tried, _ = failing(patch, lambda n, _, scheme: scheme == "adaptive" and n == 1)
+        _, (shorter, *_) = steps_of(AdaptiveSteps(1e-2), 1)
     assert tried[:2] == [first, COMMON.smallest_step_ratio * first]
     assert shorter.length == tried[-1]
-    monkeypatch.setattr(control, "bdf2_attempt", lambda *_: None)
+    failing(monkeypatch, lambda _, __, scheme: scheme == "adaptive")
     states, (euler, *_) = steps_of(AdaptiveSteps(1e-2), 1)
     assert euler.length == pytest.approx(OPTIONS.shortest_slow_step * first, rel=2e-3)
     assert depths(states)[1] == pytest.approx(euler.length * rates(states)[1], rel=1e-6)
@@ -117,19 +124,14 @@ def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monk
 def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeypatch, found_from, end, doublings):
     work, state = begun(WEAR)
     first = AdaptiveSteps(1e-2).begin(work, state)
-    shortest = OPTIONS.shortest_slow_step * first.length
-    own, tried, ended = control.bdf2_attempt, list[float](), list[Step]()
-
-    def attempt(joint, at, length):
-        tried.append(length)
-        return own(joint, at, length) if ended and length > found_from * shortest else None
+    shortest, ended = OPTIONS.shortest_slow_step * first.length, list[Step]()
+    tried, _ = failing(monkeypatch, lambda *at: at[2] != "adaptive" or not ended or at[1] <= found_from * shortest)
 
     def end_here(_, at, length, __):
-        ended.append(Step(at, 0.0, length, arrived=False, end_known_to=0.01 * length))
+        ended.append(Step(at, np.zeros(1), length, arrived=False, end_known_to=0.01 * length))
         return ended[-1]
 
-    monkeypatch.setattr(control, "bdf2_attempt", attempt)
-    monkeypatch.setattr(control, "euler_step", end_here)
+    monkeypatch.setattr(control, "end_of_branch", end_here)
     step = AdaptiveSteps(1e-2, end=end * shortest).step(work, first)
     (corner,) = ended
     assert step.arrived == (doublings is not None)
@@ -139,7 +141,7 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
     else:
         assert tried[-2:] == [2.0 * corner.length, 4.0 * corner.length]
         assert step.state.cycle == step.length == 2.0**doublings * corner.length
-        assert step.error > 0.0
+        assert step.volume_error(work.area) > 0.0
 
 
 def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):

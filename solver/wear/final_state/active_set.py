@@ -28,8 +28,8 @@ from solver.model import BoolArray, FloatArray
 from solver.newton.options import NEWTON
 from solver.options import COMMON
 from solver.structure.joint import Joint
-from solver.wear.euler import held_wear
 from solver.wear.state import Reached, WearState
+from solver.wear.step import held_wear
 from solver.wear.wearing_joint import WearingJoint
 
 

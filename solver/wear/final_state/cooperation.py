@@ -30,10 +30,10 @@ from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import FloatArray, IntArray
 from solver.newton.run import Run
 from solver.structure.joint import Joint
-from solver.wear.euler import held_wear
 from solver.wear.final_state.active_set import WornOff, grazing_depth, least_rate, without
 from solver.wear.options import WEAR
 from solver.wear.state import WearState
+from solver.wear.step import held_wear
 from solver.wear.wearing_joint import WearingJoint
 
 
