@@ -39,14 +39,16 @@ class Kind:
     why: str
 
 
-_AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
+def _other_axes(*axes: str) -> tuple[str, ...]:
+    return tuple(name for name in AxesSection.model_fields if name not in (*axes, *SOLVER_AXES))
+
+
+_AXES = _other_axes("modal_amplitude", "mode")
 _OF_MODES = ("mode", "sweep")
-_OF_MISSIONS = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
+_OF_MISSIONS = _other_axes("modal_amplitude", "mode", "step", "scheme")
 
-
-def _other_axes(axes: tuple[str, ...], *more: str) -> tuple[str, ...]:
-    return tuple(name for name in AxesSection.model_fields if name not in (*axes, *more, *SOLVER_AXES))
-
+NUMBERS = tuple(name for name in _OF_MISSIONS if name != "sweep")
+"""Axes that hold numbers of the joint and of its excitation, which may scatter."""
 
 WEAR = Kind("wear histories", _AXES, ASKED, KEPT, USUAL, OF_SAMPLES, {}, "")
 MODES = Kind(
@@ -57,7 +59,7 @@ MODES = Kind(
     tuple(OF_MODES),
     tuple(OF_MODES),
     {
-        "axes": _other_axes(_OF_MODES, "modal_amplitude"),
+        "axes": _other_axes(*_OF_MODES, "modal_amplitude"),
         "slow_time": tuple(SlowTimeSection.model_fields),
         "wear": tuple(WearSection.model_fields),
         "outputs": ("loops",),
@@ -72,7 +74,7 @@ MISSIONS = Kind(
     OF_MISSIONS_BY_DEFAULT,
     OF_SAMPLED_MISSIONS,
     {
-        "axes": _other_axes(_OF_MISSIONS),
+        "axes": _other_axes(*_OF_MISSIONS),
         "slow_time": ("cycles", "final_share", "largest_depth"),
         "outputs": ("loops",),
     },

@@ -12,9 +12,6 @@ from studyrunner.study.sections import AxesSection
 from studyrunner.user_error import UserError
 from studyrunner.values import Positive, Section, Wrong
 
-OWN_AXES = ("frequency", "excitation_amplitude")
-"""Axes of a study that a block may give a value of its own."""
-
 _PASSAGE = ("start", "stop", "rate")
 _NO_KEYS = ("model", "worn", "mesh")
 
@@ -102,6 +99,10 @@ class MissionBlock(Section):
         """The block as the study file has it."""
         own = {name: value for name, value in self.model_dump(mode="json").items() if value is not None}
         return {**own, **self.parameters}
+
+
+OWN_AXES = tuple(name for name in AxesSection.model_fields if name in MissionBlock.model_fields)
+"""Axes of a study that a block may give a value of its own."""
 
 
 def read_blocks(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,6 @@ from studyrunner.values import Section, Wrong
 Checked = TypeVar("Checked", bound=BaseModel)
 
 _SINGLE = ("float_type", "int_type", "bool_type", "string_type")
-_NO_UNITS = (", -", ", 1")
 
 
 class Mistakes:
@@ -105,7 +105,8 @@ def wrong_keys(
         of_keys.setdefault(key, []).append(details)
     # of a key that takes several kinds of values, the kinds that fit as far as can be
     deepest = {key: max(len(each["loc"]) for each in found) for key, found in of_keys.items()}
-    meant = {_nearest_key(kind, each, others) for found in of_keys.values() for each in found}
+    wrong = [each for found in of_keys.values() for each in found if each["type"] == "extra_forbidden"]
+    meant = {".".join((*each["places"][:-1], _nearest(kind, each["places"], others))) for each in wrong}
     for key, found in of_keys.items():
         if any(other.startswith((f"{key}.", f"{key}[")) for other in of_keys):
             continue
@@ -116,16 +117,13 @@ def wrong_keys(
 
 def _wrong(kind: type[BaseModel], key: str, found: Sequence[Mapping[str, Any]], others: Sequence[str]) -> Wrong:
     details = found[0]
-    *parents, name = details["places"] or [""]
-    fields = _fields(kind, parents)
     # a key without a description of its own is part of one with a description
-    names = [*parents, name]
+    names = details["places"]
     described = [_fields(kind, names[:depth]).get(each) for depth, each in enumerate(names)]
     description = next((field.description for field in reversed(described) if field and field.description), None)
-    unit = f" ({_without_unit_one(description)})" if description else ""
+    unit = f" ({re.sub(', [-1]$', '', description)})" if description else ""
     if details["type"] == "extra_forbidden":
-        known = [*fields, *(others if not parents else ())]
-        return Wrong(key, details["input"], f"unknown key, give {nearest_name(name, known)}")
+        return Wrong(key, details["input"], f"unknown key, give {_nearest(kind, details['places'], others)}")
     if details["type"] == "missing":
         if isinstance(details["loc"][-1], int):
             return Wrong(key, details["input"], f"give more values{unit}")
@@ -175,20 +173,11 @@ def _places(table: object, details: Mapping[str, Any]) -> list[str | int]:
     return places
 
 
-def _nearest_key(kind: type[BaseModel], details: Mapping[str, Any], others: Sequence[str]) -> str:
-    """The dotted key that is meant by an unknown one, empty for another mistake."""
-    if details["type"] != "extra_forbidden":
-        return ""
-    *parents, name = details["places"]
-    known = [*_fields(kind, parents), *(others if not parents else ())]
-    return ".".join((*parents, nearest_name(name, known)))
-
-
 def _fields(kind: type[BaseModel], names: Sequence[str]) -> Mapping[str, FieldInfo]:
     """Keys of the table that `names` lead to, none where it is no table with keys of its own."""
     tables = [kind]
     for name in names:
-        tables = [inner for each in tables for inner in _tables(_annotation(each, name))]
+        tables = [inner for each in tables for inner in tables_in(_annotation(each, name))]
     return {name: field for each in tables for name, field in each.model_fields.items()}
 
 
@@ -198,21 +187,20 @@ def _annotation(kind: type[BaseModel], name: str) -> object:
     return kind.EXTRA if issubclass(kind, Section) else None
 
 
-def _tables(annotation: object) -> list[type[BaseModel]]:
+def tables_in(annotation: object) -> list[type[BaseModel]]:
     """All classes of tables that a type names."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [found for each in get_args(annotation) for found in _tables(each)]
+    return [found for each in get_args(annotation) for found in tables_in(each)]
 
 
 def _below(prefix: str, wrong: Wrong) -> Wrong:
     return wrong._replace(key=".".join(filter(None, (prefix, wrong.key))))
 
 
-def _without_unit_one(description: str) -> str:
-    for unit in _NO_UNITS:
-        description = description.removesuffix(unit)
-    return description
+def _nearest(kind: type[BaseModel], names: Sequence[str], others: Sequence[str]) -> str:
+    """What is meant by an unknown key, the last of the names; the others are those of the tables around it."""
+    return nearest_name(names[-1], [*_fields(kind, names[:-1]), *(others if len(names) == 1 else ())])
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:

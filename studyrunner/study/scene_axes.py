@@ -9,11 +9,11 @@ import math
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from pydantic import BaseModel
 
-from studyrunner.study.mistakes import Mistakes, wrong_keys
+from studyrunner.study.mistakes import Mistakes, tables_in, wrong_keys
 from studyrunner.study.sections import AxesSection, WearSection
 from studyrunner.values import Section, Wrong, read_axis
 
@@ -55,7 +55,6 @@ def take_scene_axes(
     tables: of the study file. scene, wear: what [scene] of this model and [wear] consist of.
     """
     axes: list[SceneAxis] = []
-    kinds: tuple[tuple[Literal["scene", "wear"], type[BaseModel]], ...] = (("scene", scene), ("wear", wear))
     known: dict[Literal["scene", "wear"], Collection[str]] = {"scene": scene.model_fields, "wear": wear.AXES}
     for name in [name for name in tables["axes"] if name not in AxesSection.model_fields]:
         table = next((table for table, keys in known.items() if name in keys), None)
@@ -75,7 +74,7 @@ def take_scene_axes(
                 for wrong in wrong_keys(error, AxesSection, {}):
                     found.add(f"axes.{dotted}{wrong.key}", values if wrong.value is None else wrong.value, wrong.remedy)
                 continue
-            units, meaning = describe_key(dict(kinds)[table], *key)
+            units, meaning = describe_key(scene if table == "scene" else wear, *key)
             axes.append(SceneAxis("_".join(key), table, key, of_axis, units, meaning))
     n_combinations = math.prod(len(axis.values) for axis in axes)
     if n_combinations > _MOST_COMBINATIONS:
@@ -90,13 +89,12 @@ def take_scene_axes(
 def _wrong_place(table: Mapping[str, Any], name: str, key: Sequence[str], values: object) -> Wrong | None:
     """What is wrong with an axis of this key, where its table has the key, or no place for it."""
     dotted, given = ".".join(key), table
-    for depth, part in enumerate(key):
+    for part in key:
         given = only_table(given)
         if not isinstance(given, Mapping):
-            if depth and isinstance(given, str | int | float):
-                return Wrong(f"{name}.{key[0]}", given, f"give it once, here or as axes.{key[0]}")
-            remedy = f"leave it out, or give a table of the other keys: axes.{dotted} gives one of them"
-            return Wrong(f"{name}.{key[0]}", given, remedy)
+            return Wrong(
+                f"{name}.{key[0]}", given, f"give it once, here or as axes.{key[0]}; a table of other keys here"
+            )
         if part not in given:
             break
         given = given[part]
@@ -124,11 +122,8 @@ def keys_as_given(scene_axes: Sequence[SceneAxis]) -> Iterator[None]:
 
 def combinations(sections: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> Iterator[dict[str, Table]]:
     """The tables of a study with each combination of values in [scene] and [wear], the last axis fastest."""
-    names = {axis.key[0] for axis in scene_axes}
-    axes = {name: value for name, value in sections["axes"].items() if name not in names}
     for values in itertools.product(*(axis.values for axis in scene_axes)):
         tables = {name: copy.copy(table) for name, table in sections.items()}
-        tables["axes"] = axes
         for axis, value in zip(scene_axes, values, strict=True):
             table = tables.setdefault(axis.table, {})
             if axis.key == ("worn",):
@@ -192,7 +187,7 @@ def describe_key(kind: type[BaseModel], name: str, inner: str = "") -> tuple[str
     inner: key in the table that the key holds, or a surface.
     """
     field = kind.model_fields[name]
-    for table in _tables_in(field.annotation):
+    for table in tables_in(field.annotation):
         if inner in table.model_fields:
             units, _ = describe_key(table, inner)
             return units, f"{inner.replace('_', ' ')} of {name.replace('_', ' ')}"
@@ -201,11 +196,3 @@ def describe_key(kind: type[BaseModel], name: str, inner: str = "") -> tuple[str
     parts = [part for part in text.partition("; ")[0].split(", ") if part != units]
     meaning = ", ".join(parts) or name.replace("_", " ")
     return _UNITS.get(units) or units, f"{meaning}, {inner}" if inner else meaning
-
-
-def _tables_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Classes of tables in the type of a key."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _tables_in(part)

@@ -14,6 +14,7 @@ from solver.settings import FOLLOWED, TARGETS
 from studyrunner.coordinates import SCENE
 from studyrunner.mission_variables import OF_MISSIONS
 from studyrunner.mode_variables import OF_MODES
+from studyrunner.scatter.section import ScatterSection
 from studyrunner.study.mistakes import nearest_name
 from studyrunner.user_error import WrongValueError
 from studyrunner.values import (
@@ -275,6 +276,18 @@ class LoadingSection(Section):
     between: Annotated[tuple[float, float], Field(strict=False), BeforeValidator(_check_range)] = Field(
         description='Hz, [lowest, highest] frequency of the excitation with axes.frequency = "resonance" or "peak"'
     )
+
+
+SECTIONS: dict[str, type[Section]] = {
+    "study": StudySection,
+    "axes": AxesSection,
+    "wear": WearSection,
+    "slow_time": SlowTimeSection,
+    "solver": SolverSection,
+    "outputs": OutputsSection,
+    "scatter": ScatterSection,
+    "loading": LoadingSection,
+}
 
 
 def names_model(model: str) -> bool:

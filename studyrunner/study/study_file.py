@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from solver.settings import FOLLOWED, FollowedFrequency
 from studies.hdf5 import is_hdf5
-from studyrunner.scatter.section import ScatterSection, flat_table
+from studyrunner.scatter.section import flat_table
 from studyrunner.study.kinds import (
     IDLE_FREQUENCY,
     MODES,
@@ -40,14 +40,12 @@ from studyrunner.study.scene_axes import (
 from studyrunner.study.scene_section import Origin, check_scene, parameters_of
 from studyrunner.study.sections import (
     DEFAULT,
+    SECTIONS,
     SOLVER_AXES,
     VARIABLES,
     AxesSection,
     LoadingSection,
     OutputsSection,
-    SlowTimeSection,
-    SolverSection,
-    StudySection,
     WearSection,
 )
 from studyrunner.study.study import Study
@@ -56,19 +54,9 @@ from studyrunner.study.toml_text import format_toml, read_toml, read_toml_file
 from studyrunner.study.worn import AXIS as WORN_AXIS
 from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError
-from studyrunner.values import Section
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
-_SECTIONS: dict[str, type[Section]] = {
-    "study": StudySection,
-    "axes": AxesSection,
-    "wear": WearSection,
-    "slow_time": SlowTimeSection,
-    "solver": SolverSection,
-    "outputs": OutputsSection,
-    "scatter": ScatterSection,
-    "loading": LoadingSection,
-}
+_MOST_WRONG_PARTS = 20
 _ON_REQUEST = ("scatter", "loading", "mission")
 _TABLES = ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", *_ON_REQUEST)
 
@@ -147,9 +135,11 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     moved = _move_solver_axes(tables, found)
     axes, blocks = _axes_and_blocks(tables, origin, found)
     parts, renamed = [], {**moved, **keys_below_axes(axes)}
-    for part in combinations(tables, axes) if axes else [tables]:
+    for number, part in enumerate(combinations(tables, axes) if axes else [tables]):
         with found.collecting(renamed):
             parts.append(_check_part(part, origin, blocks, found))
+        if number - len(parts) > _MOST_WRONG_PARTS:
+            break
     found.raise_any(table)
     study = parts[0]
     if axes:
@@ -246,11 +236,11 @@ def _check_part(
     if "scene" not in before:
         with found.collecting():
             parts["scene"] = check_scene(tables["scene"], origin)
-    if "mission" in tables:
-        parts |= {"mission": blocks, "block_studies": _block_studies(tables, blocks, origin, before, found)}
+    if "mission" in tables and (of_blocks := _block_studies(tables, blocks, origin, before, found)):
+        parts |= {"mission": blocks, "block_studies": of_blocks}
     parts["follow"] = _take_followed(tables, found)
-    filled, wrong = with_idle_values(tables), {name for name in ("scene", "axes") if name in before}
-    for name, kind in _SECTIONS.items():
+    filled = with_idle_values(tables)
+    for name, kind in SECTIONS.items():
         if name in filled and name not in before:
             others = _keys_of_axes(tables, origin) if name == "axes" else ()
             with found.collecting():
@@ -258,9 +248,7 @@ def _check_part(
     if "outputs" in parts:
         parts["outputs"] = _with_usual_variables(parts, tables)
     study = Study.model_construct(**parts)
-    wrong |= {name for name in ("scene", *filled) if name not in parts} - {"mission"}
-    if "mission" in tables and not parts["block_studies"]:
-        wrong |= {"mission"}
+    wrong = [name for name in filled if name not in parts]
     for name in wrong:
         # a rule that asks for it is left out
         vars(study).pop(name, None)
