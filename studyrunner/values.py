@@ -6,7 +6,7 @@ By hand: `linspace` of numpy rounds more than once, and values of `geomspace` di
 from __future__ import annotations
 
 import decimal
-from collections.abc import Hashable, Iterable, Iterator
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from fractions import Fraction as Rational
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar, cast
@@ -19,6 +19,9 @@ T = TypeVar("T", bound=Hashable)
 
 LONGEST_AXIS = 100_000
 """Values of an axis: the effective study, which lists them, is to be read again."""
+
+
+_LARGEST_WHOLE = 2.0**53
 
 
 class Wrong(NamedTuple):
@@ -46,9 +49,14 @@ class Section(BaseModel):
 
 
 def _no_text(value: object) -> object:
-    if isinstance(value, bool | str):
+    if isinstance(value, bool | str) or (isinstance(value, float) and abs(value) > _LARGEST_WHOLE):
         raise ValueError("give a whole number")
     return value
+
+
+def listed(value: object) -> Sequence[Any]:
+    """The values of a list, or the only value."""
+    return value if isinstance(value, list | tuple) else [value]
 
 
 def once(values: Iterable[T]) -> tuple[T, ...]:

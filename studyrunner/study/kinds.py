@@ -10,6 +10,7 @@ from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS, OF_MISSIONS
 from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.study.mistakes import Mistakes
 from studyrunner.study.sections import SOLVER_AXES, AxesSection, SlowTimeSection, WearSection
+from studyrunner.values import listed
 from studyrunner.variables import ASKED, KEPT, OF_SAMPLES, USUAL, Variable
 
 Tables = dict[str, Any]
@@ -59,7 +60,7 @@ MODES = Kind(
     tuple(OF_MODES),
     tuple(OF_MODES),
     {
-        "axes": _other_axes(*_OF_MODES, "modal_amplitude"),
+        "axes": (*_other_axes(*_OF_MODES, "modal_amplitude"), *WearSection.AXES),
         "slow_time": tuple(SlowTimeSection.model_fields),
         "wear": tuple(WearSection.model_fields),
         "outputs": ("loops",),
@@ -93,13 +94,13 @@ def take_unused(tables: Tables, found: Mistakes) -> None:
     for name, keys in kind.unused.items():
         for key in [key for key in keys if key in tables[name]]:
             value = tables[name].pop(key)
-            if value != []:
+            if (name, value) != ("outputs", []):
                 found.add(f"{name}.{key}", value, kind.why)
     if kind is not MODES and "mode" in axes:
         found.add("axes.mode", axes.pop("mode"), "give axes.modal_amplitude as well: mode is that of a nonlinear mode")
-    if kind is MODES and "ramp" in _listed(axes.get("sweep")):
+    if kind is MODES and "ramp" in listed(axes.get("sweep")):
         found.add("axes.sweep", axes.pop("sweep"), 'give "up" or "down": the modal amplitude is raised or lowered')
-    words = [each for each in _listed(axes.get("frequency")) if isinstance(each, str)]
+    words = [each for each in listed(axes.get("frequency")) if isinstance(each, str)]
     if kind is MISSIONS and (words or "loading" in tables):
         key, value = ("loading", tables.pop("loading", None)) if not words else ("axes.frequency", axes["frequency"])
         found.add(key, value, "give frequencies in Hz: blocks of a mission follow no resonance")
@@ -110,10 +111,6 @@ def take_unused(tables: Tables, found: Mistakes) -> None:
     if kind is not MISSIONS and "missions" in slow_time:
         remedy = "give blocks under [[mission]], which are flown so often, or slow_time.cycles in its place"
         found.add("slow_time.missions", slow_time.pop("missions"), remedy)
-
-
-def _listed(value: object) -> list[Any]:
-    return value if isinstance(value, list) else [value]
 
 
 def with_idle_values(tables: Tables) -> Tables:

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, Field
 from studyrunner.study.mistakes import Mistakes, check_table
 from studyrunner.study.sections import AxesSection
 from studyrunner.user_error import UserError
-from studyrunner.values import Positive, Section, Wrong
+from studyrunner.values import Positive, Section, Wrong, listed
 
 _PASSAGE = ("start", "stop", "rate")
 _NO_KEYS = ("model", "worn", "mesh")
@@ -160,7 +160,7 @@ def _wrong_beside(before: MissionBlock, block: MissionBlock, axes: Mapping[str, 
         if changed:
             remedy = f'give "ramp": a block that continues has the {changed[0]} of the block before, {before.name}'
             yield Wrong("begin", block.begin, remedy)
-    elif block.begin == "sweep" and not block.is_passage and "ramp" in axes.get("sweep", "up"):
+    elif block.begin == "sweep" and not block.is_passage and "ramp" in listed(axes.get("sweep")):
         yield Wrong("begin", block.begin, 'give "ramp", or axes.sweep = "up" or "down": a sweep has a direction')
 
 

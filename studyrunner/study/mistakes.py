@@ -178,7 +178,7 @@ def _fields(kind: type[BaseModel], names: Sequence[str]) -> Mapping[str, FieldIn
     tables = [kind]
     for name in names:
         tables = [inner for each in tables for inner in tables_in(_annotation(each, name))]
-    return {name: field for each in tables for name, field in each.model_fields.items()}
+    return {name: field for each in tables for name, field in each.model_fields.items() if not field.exclude}
 
 
 def _annotation(kind: type[BaseModel], name: str) -> object:

@@ -33,6 +33,7 @@ from studyrunner.values import (
     Whole,
     Wrong,
     ascending,
+    listed,
     once,
 )
 from studyrunner.variables import ASKED, KEPT
@@ -62,7 +63,7 @@ def _check_name(value: str) -> str:
 
 def _check_word(value: object) -> object:
     """A word in place of a frequency is one of those of a followed resonance, which `take_followed` takes."""
-    for word in value if isinstance(value, list | tuple) else [value]:
+    for word in listed(value):
         if isinstance(word, str):
             raise WrongValueError(word, "give a number in Hz, or " + " or ".join(f'"{each}"' for each in FOLLOWED))
     return value

@@ -54,6 +54,7 @@ from studyrunner.study.toml_text import format_toml, read_toml, read_toml_file
 from studyrunner.study.worn import AXIS as WORN_AXIS
 from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError
+from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
 _MOST_WRONG_PARTS = 20
@@ -294,10 +295,10 @@ def _block_studies(
 def _take_followed(tables: Tables, found: Mistakes) -> FollowedFrequency | None:
     """What the frequency follows, None where it is given; the axis then gets the middle of the range."""
     given, loading = tables["axes"].get("frequency"), tables.get("loading")
-    words = [each for each in (given if isinstance(given, list) else [given]) if isinstance(each, str)]
+    words = [each for each in listed(given) if isinstance(each, str)]
     if not words and loading is not None:
         remedy = 'leave it out, or give axes.frequency = "resonance" or "peak", which is followed in this range'
-        found.add("loading", loading, remedy)
+        found.add("loading", tables.pop("loading"), remedy)
     if not words or words[0] not in FOLLOWED:
         return None
     if len(words) > 1:

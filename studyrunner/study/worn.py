@@ -15,7 +15,7 @@ from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.study_of_result import check_result_file
 from studyrunner.system.progress import count as counted
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
-from studyrunner.values import NotNegative, Section, Wrong, once
+from studyrunner.values import NotNegative, Section, Wrong, listed, once
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,7 +25,7 @@ AXIS = "worn_cycle"
 
 
 def _listed(value: object) -> object:
-    return tuple(value) if isinstance(value, list | tuple) else (value,)
+    return tuple(listed(value))
 
 
 def _states(value: object) -> object:

@@ -153,6 +153,7 @@ WRONG = [
     (MISSIONS, "slow_time.outputs=[0, 1.5]", "slow_time.outputs = [0.0, 1.5]: .. whole numbers"),
     (MISSIONS, "slow_time.until={frequency_shift = 0.1}", "slow_time.until = {frequency_shift = 0.1}: .. wear_depth"),
     (MISSIONS, "axes.scheme=explicit", 'axes.scheme = "explicit": leave it out'),
+    (MISSIONS, "axes.sweep=3", 'axes.sweep = 3: .. "up"'),
     (MISSIONS, ("axes.frequency=peak", "loading.between=[1, 2]"), 'axes.frequency = "peak": .. no resonance'),
     (
         MISSIONS,
@@ -279,6 +280,7 @@ VALUES = (
 )
 LINES = sorted({line for text in (SLIDER, MODES, FOLLOWED, SAMPLES, MISSIONS) for line in text.splitlines()})
 CHANGES = st.one_of(
+    st.tuples(st.just("value"), st.integers(0, 99), st.sampled_from(VALUES)),
     st.tuples(st.just("value"), st.integers(0, 99), st.sampled_from(VALUES)),
     st.tuples(st.just("insert"), st.integers(0, 99), st.sampled_from(LINES)),
     st.tuples(st.just("text"), st.integers(0, 99), st.text(max_size=9)),
