@@ -140,7 +140,7 @@ def answers(made: Path, seed: int, numbers: range, kinds: tuple[str, ...]) -> li
     """What another process, with a folder of its own, says of the inputs of these numbers."""
     folder = made / f"{numbers.start}"
     folder.mkdir()
-    for name in (*set(FILES.values()), "deck.toml"):
+    for name in (*set(FILES.values()), "study", "deck.toml"):
         shutil.copy(made / name, folder)
     given = [str(folder), str(seed), str(numbers.start), str(numbers.stop), *kinds]
     command = [sys.executable, "-m", __name__, *given]

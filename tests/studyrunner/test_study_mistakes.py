@@ -92,6 +92,9 @@ WRONG = [
     (SLIDER.replace('model = "sdof_slider"\n', ""), "", "scene.model: missing"),
     (SLIDER.replace("frequency = [150.0]\n", ""), "", "axes.frequency: missing"),
     (SLIDER.replace("[slow", "harmonics = [1, 3]\n[slow"), "", "solver.harmonics = 5: .. axes.harmonics"),
+    (SLIDER + '"\\u001b]0;x\\u0007" = 1\n', "", r"solver.\x1b]0;x\x07 = 1: unknown key"),
+    (SLIDER.replace("[150.0]", "1e999999999"), "", "axes.frequency = inf: .. finite"),
+    (SLIDER, "scene.model=./s.toml", "model: .. no HDF5 file"),
     # axes that are keys of [scene] or [wear]
     (SLIDER, "axes.friction_coefficient={}", "axes.friction_coefficient = {}: .. a list"),
     (SLIDER, "axes.friction_coefficient=[0.3, nan]", "axes.friction_coefficient = nan: .. finite"),
@@ -256,7 +259,9 @@ def test_each_mistake_is_a_line_and_nothing_is_computed(row, folder, capsys):
     assert sorted(folder.iterdir()) == before
 
 
-@pytest.mark.parametrize("content", [b"[study\n", b"\xff", b"a = 1979-13-27", b"[" * 10_000, b"#" * 2_700_000])
+@pytest.mark.parametrize(
+    "content", [b"[study\n", b"\xff" * 100_000, b"a = 1979-13-27", b"a=" + b"[" * 100_000, b"#" * 3_000_000]
+)
 def test_a_file_that_is_no_toml(content, folder, capsys):
     Path("s.toml").write_bytes(content)
     assert main(["s.toml"]) == 2
@@ -288,6 +293,7 @@ CHANGES = st.one_of(
 )
 
 
+@pytest.mark.slow
 @given(st.sampled_from([SLIDER, MODES, FOLLOWED, SAMPLES, MISSIONS]), st.lists(CHANGES, min_size=1, max_size=4))
 def test_any_text_is_a_study_that_can_be_written_or_mistakes(tmp_path_factory, text, changes):
     lines = text.splitlines()
