@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field
 
-from studyrunner.study.mistakes import check_table
+from studyrunner.study.mistakes import Mistakes, check_table
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.study_of_result import check_result_file
 from studyrunner.system.progress import count as counted
@@ -115,26 +115,29 @@ def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence
     """Depths (n_states, n_contact), m, of a point of a result at cycle counts."""
     if "wear_depth" not in dataset:
         raise UserError(source, "scene.worn.result", None, "give a result with wear_depth among its variables")
-    depths = dataset["wear_depth"]
+    depths, found = dataset["wear_depth"], Mistakes(source)
     axes = [str(name) for name in depths.dims[:-2]]
-    for name in point:
-        if name not in axes:
-            remedy = f"unknown key, give result, cycle, depth or an axis of the result: {', '.join(axes)}"
-            raise UserError(source, f"scene.worn.{name}", point[name], remedy)
+    for name in point.keys() - set(axes):
+        remedy = f"unknown key, give result, cycle, depth or an axis of the result: {', '.join(axes)}"
+        found.add(f"scene.worn.{name}", point[name], remedy)
+    places: dict[str, Any] = {}
     for name in axes:
         values = dataset[name].values.tolist()
         if name not in point and len(values) > 1:
             remedy = f"missing: give one of the values {', '.join(map(str, values[:10]))} of the result"
-            raise UserError(source, f"scene.worn.{name}", None, remedy)
-        depths = depths.isel({name: _place(f"scene.worn.{name}", values, point.get(name, values[0]), source)})
-    counts = dataset["cycle"].values.tolist()
-    depths = depths.isel(cycle=[_place("scene.worn.cycle", counts, count, source) for count in cycle])
-    found = np.asarray(depths.values, dtype=np.float64)
-    for count, row in zip(cycle, found, strict=True):
+            found.add(f"scene.worn.{name}", None, remedy)
+        with found.collecting():
+            places[name] = _place(f"scene.worn.{name}", values, point.get(name, values[0]), source)
+    with found.collecting():
+        counts = dataset["cycle"].values.tolist()
+        places["cycle"] = [_place("scene.worn.cycle", counts, count, source) for count in cycle]
+    found.raise_any()
+    chosen = np.asarray(depths.isel(places).values, dtype=np.float64)
+    for count, row in zip(cycle, chosen, strict=True):
         if not np.isfinite(row).all():
             remedy = "give an earlier cycle count: the result does not hold the depths of this one"
             raise UserError(source, "scene.worn.cycle", count, remedy)
-    return found
+    return chosen
 
 
 def _place(key: str, values: Sequence[Any], wanted: Any, source: str) -> int:

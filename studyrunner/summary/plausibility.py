@@ -60,7 +60,7 @@ def _on_speed(study: Study) -> str:
     if not slow:
         return ""
     radians, hertz = 30.0 / math.pi * min(slow), 60.0 * min(slow)
-    units = f"in rad/s (then it is {radians:.4g} rpm) or in revolutions per second (then it is {hertz:.4g} rpm)"
+    units = f"in rad/s (then it is {radians:.5g} rpm) or in revolutions per second (then it is {hertz:.5g} rpm)"
     return f"rotation_speed {min(slow):.4g} rpm is slow: is it {units}?"
 
 

@@ -45,7 +45,7 @@ def test_bundled_studies_are_plausible(name):
     [
         ({"scene.friction_coefficient": 50}, "friction_coefficient 50 ", "in percent (then it is 0.5)"),
         ({"axes.friction_coefficient": [0.5, 2.5]}, "friction_coefficient 2.5 ", "is it meant"),
-        ({"scene.rotation_speed": 314}, "rotation_speed 314 rpm ", "in rad/s (then it is 2998 rpm)"),
+        ({"scene.rotation_speed": 314}, "rotation_speed 314 rpm ", "in rad/s (then it is 2998.5 rpm)"),
         ({"axes.frequency": [0.2, 0.21]}, "frequency 0.21 Hz", "in kHz (then it is 210 Hz)"),
         ({"axes.frequency": 1e-4}, "frequency 0.0001 Hz", "is it meant"),
     ],
