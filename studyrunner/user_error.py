@@ -48,9 +48,9 @@ class UserError(Exception):
     def _line(self) -> str:
         key = _cut(show_text(self.key), _LONGEST_KEY)
         # a sentence stands for itself, a value stands behind its key
-        told = isinstance(self.value, Verbatim) and (" " in self.value or self.value == "missing")
-        told = told and str(self.value)[0].isalpha()
-        shown = key if self.value is None else f"{key}{':' if told else ' ='} {show_value(self.value)}"
+        is_sentence = isinstance(self.value, Verbatim) and (" " in self.value or self.value == "missing")
+        is_sentence = is_sentence and str(self.value)[0].isalpha()
+        shown = key if self.value is None else f"{key}{':' if is_sentence else ' ='} {show_value(self.value)}"
         remedy = _cut(show_text(self.remedy), _LONGEST_REMEDY)
         return " ".join(f"{show_text(self.place)}: {shown}: {remedy}".split())
 

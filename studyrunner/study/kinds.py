@@ -107,9 +107,9 @@ def take_unused(tables: Tables, found: Mistakes) -> None:
         axes["frequency"] = IDLE_FREQUENCY if words else axes.get("frequency", IDLE_FREQUENCY)
         tables.pop("loading", None)
     if kind is MISSIONS and "missions" not in slow_time:
-        found.add("slow_time.missions", None, "missing: give how often the blocks are flown")
+        found.add("slow_time.missions", None, "missing: give the number of missions, how often the blocks are repeated")
     if kind is not MISSIONS and "missions" in slow_time:
-        remedy = "give blocks under [[mission]], which are flown so often, or slow_time.cycles in its place"
+        remedy = "give blocks under [[mission]], which are repeated so often, or slow_time.cycles in its place"
         found.add("slow_time.missions", slow_time.pop("missions"), remedy)
 
 

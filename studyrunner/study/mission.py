@@ -1,4 +1,4 @@
-"""[[mission]]: blocks of vibration in order, flown `slow_time.missions` times in place of one vibration."""
+"""[[mission]]: blocks of vibration in order, repeated `slow_time.missions` times in place of one vibration."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def _numbers_of(study: Study) -> list[str]:
 
 
 def block_of_input(study: Study, name: str) -> MissionBlock | None:
-    """The block of a mission for which the values of an input are told: the first one where each has a value of its
+    """The block of a mission for which the values of an input are shown: the first one where each has a value of its
     own; None where the values are around that of the study.
     """
     return study.mission[0] if study.mission and all(block.gives(name) for block in study.mission) else None

@@ -90,15 +90,15 @@ def _end(study: Study) -> Iterator[Wrong]:
 
 
 def _followed(study: Study) -> Iterator[Wrong]:
-    """A frequency that is followed is neither held nor given."""
+    """A frequency that is followed is neither fixed nor given."""
     if study.follow is None:
         return
     word = study.follow.of
     if "ramp" in study.axes.sweep:
-        remedy = f'give "up" or "down": a ramp holds the frequency, and axes.frequency = "{word}" seeks it'
+        remedy = f'give "up" or "down": a ramp has a fixed frequency, and axes.frequency = "{word}" seeks it'
         yield Wrong("axes.sweep", "ramp", remedy)
     if "final" in study.axes.scheme:
-        remedy = f'give "adaptive": the scheme "final" holds the frequency, and axes.frequency = "{word}" follows it'
+        remedy = f'give "adaptive": the scheme "final" has a fixed frequency, and axes.frequency = "{word}" follows it'
         yield Wrong("axes.scheme", "final", remedy)
     if "exact" in study.outputs.variables:
         remedy = f'leave it out: it is of given frequencies, and axes.frequency = "{word}" has none'

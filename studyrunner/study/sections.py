@@ -198,7 +198,7 @@ class SlowTimeSection(Section):
         100_000.0, description="cycles; 0 for the unworn states only, inf: until nothing wears any more"
     )
     missions: Annotated[Whole, Field(ge=1, le=10_000_000)] | None = Field(
-        None, description="how often the blocks under [[mission]] are flown, in place of cycles"
+        None, description="how often the blocks under [[mission]] are repeated, in place of cycles"
     )
     final_share: Fraction = Field(
         1e-4, description="of the largest wear rate of each pair: below it nothing wears any more, with cycles = inf"

@@ -155,7 +155,7 @@ class Study(Section):
 
     @property
     def missions_kept(self) -> tuple[int, ...]:
-        """Numbers of flown missions of the result, ascending; equally spaced but for rounding to whole numbers."""
+        """Numbers of missions of the result, ascending; equally spaced but for rounding to whole numbers."""
         missions, outputs = self.slow_time.missions, self.slow_time.outputs
         assert missions is not None
         if isinstance(outputs, tuple):
