@@ -136,7 +136,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
     except UserError as error:
         # Ctrl-C ends the processes that read files as well, which tells nothing of the files
         raise_ending()
-        print(f"run-study: {error}", file=sys.stderr)
+        print(*(f"run-study: {line}" for line in str(error).splitlines()), sep="\n", file=sys.stderr)
         status = BAD_INPUT
     except LauncherError as error:
         print(f"run-study: launcher: {error}", file=sys.stderr)
@@ -189,7 +189,7 @@ def _show_plan(study: Study) -> int:
     plan = build_tasks(study, planned.n_displacements, contacts, planned.scenes)
     seconds = time.process_time() + planned.seconds_left
     lines = [format_plan(study, planned.largest, plan, built_with, seconds, planned.describe())]
-    said = *remarks_of_study(study), *(("note", doubt) for doubt in doubts_of_study(study))
+    said = *remarks_of_study(study), *(("note", doubt) for doubt in doubts_of_study(study, planned.largest))
     print(*lines, *(f"{label:<10} {show_text(text)}" for label, text in said), sep="\n", flush=True)
     error = last_error(sys.stdout)
     if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough

@@ -29,7 +29,7 @@ examples:
 exit status:
   0  all points were computed to the end, each with its error; the last lines say how many are known to rtol
   1  unexpected failure
-  2  bad input, nothing was computed: one line says what is wrong
+  2  bad input, nothing was computed: a line for each mistake says what is wrong
   3  finished and saved, but some points failed, not computed to the end; their `outcome` says why
   130  ended by Ctrl-C, SIGTERM, SIGHUP or SIGUSR1; the file holds the points that were computed until then
 

@@ -229,7 +229,7 @@ def _prepare(
     # The software is described when the run begins: a checkout may have changed at the end of the run.
     software = describe_software(PACKAGES[0])
     kind = record_type(study, facts)
-    said = doubts_of_study(study)
+    said = doubts_of_study(study, facts)
     for note in (
         *store.notes,
         *_older(target.path),

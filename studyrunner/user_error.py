@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 _LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_KEY, _LONGEST_REMEDY = 80, 240, 120, 600
+_MOST_LINES = 20
 
 _REMEDIES = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room there"),
@@ -19,26 +20,37 @@ _REMEDIES = {
 
 
 class UserError(Exception):
-    """Bad input: ends a run with exit status 2 and one line, before anything is computed.
+    """Bad input: ends a run with exit status 2 and one line for each mistake, before anything is computed.
 
     place: the file (or the command line) that holds the mistake. key: dotted name of the key or option. value: what
-    stands there, None where nothing does. remedy: one clause that says what would be right.
+    stands there, None where nothing does. remedy: one clause that says what would be right. others: further mistakes.
     """
 
-    def __init__(self, place: str, key: str, value: object, remedy: str) -> None:
-        super().__init__(place, key, value, remedy)
+    def __init__(self, place: str, key: str, value: object, remedy: str, others: tuple[UserError, ...] = ()) -> None:
+        super().__init__(place, key, value, remedy, others)
         self.place = place
         self.key = key
         self.value = value
         self.remedy = remedy
+        self.others = others
+
+    @property
+    def mistakes(self) -> tuple[UserError, ...]:
+        """All mistakes, one by one."""
+        return (UserError(self.place, self.key, self.value, self.remedy), *self.others)
 
     def __str__(self) -> str:
-        """The line that the user reads."""
+        """The lines that the user reads, one for each mistake."""
+        lines = [mistake._line() for mistake in (self, *self.others)]
+        more = [f"and {len(lines) - _MOST_LINES} more"] if len(lines) > _MOST_LINES else []
+        return "\n".join(lines[:_MOST_LINES] + more)
+
+    def _line(self) -> str:
         key = _cut(show_text(self.key), _LONGEST_KEY)
         # a sentence stands for itself, a value stands behind its key
-        told = isinstance(self.value, Verbatim) and (" " in self.value or self.value == "missing")
-        told = told and str(self.value)[0].isalpha()
-        shown = key if self.value is None else f"{key}{':' if told else ' ='} {show_value(self.value)}"
+        is_sentence = isinstance(self.value, Verbatim) and (" " in self.value or self.value == "missing")
+        is_sentence = is_sentence and str(self.value)[0].isalpha()
+        shown = key if self.value is None else f"{key}{':' if is_sentence else ' ='} {show_value(self.value)}"
         remedy = _cut(show_text(self.remedy), _LONGEST_REMEDY)
         return " ".join(f"{show_text(self.place)}: {shown}: {remedy}".split())
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from studyrunner.scene.scene import harmonics_to_build
-from studyrunner.study.scene_errors import scene_errors
+from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, show_text
 

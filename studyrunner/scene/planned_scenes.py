@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene
 from studyrunner.scene.scene_set import SceneSet, find_scenes
+from studyrunner.scene.static_response import static_response
 from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study
 
@@ -71,6 +72,7 @@ def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
     for number in kinds.values():
         say(f"building scene {number + 1} of {len(scenes.studies)}")
         with keys_as_given(study.scene_axes):
-            facts[number] = describe_scene(build_study_scene(scenes.studies[number], say))
+            model = build_study_scene(scenes.studies[number], say)
+        facts[number] = replace(describe_scene(model), static_response=static_response(model))
     each_takes = (time.monotonic() - began) / len(facts)
     return PlannedScenes(scenes, facts, tuple(nearest), each_takes * (len(scenes.studies) - len(facts)))

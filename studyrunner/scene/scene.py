@@ -21,7 +21,7 @@ from studyrunner.scene.computed import Computed, InMemory, model_once, scene_par
 from studyrunner.scene.edge_pairs import edge_pairs
 from studyrunner.scene.static_response import StaticResponse
 from studyrunner.scene.variables import build_mesh, check_outputs
-from studyrunner.study.scene_errors import scene_errors
+from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError

@@ -1,47 +1,33 @@
-"""[[mission]]: blocks of vibration in order, flown `slow_time.missions` times in place of one vibration."""
+"""[[mission]]: blocks of vibration in order, repeated `slow_time.missions` times in place of one vibration."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, Field, TypeAdapter
+from pydantic import AfterValidator, BaseModel, Field
 
-from studyrunner.study.checked_table import check_table
-from studyrunner.study.similar_names import nearest_name
-from studyrunner.study.values import Positive, Section, read, words
-from studyrunner.user_error import UserError, WrongValueError
+from studyrunner.study.mistakes import Mistakes, check_table
+from studyrunner.study.sections import AxesSection
+from studyrunner.user_error import UserError
+from studyrunner.values import Positive, Section, Wrong, listed
 
-Begin = Literal["ramp", "sweep", "continue"]
-
-OWN_AXES = ("frequency", "excitation_amplitude")
-"""Axes of a study that a block may give a value of its own."""
-
-_POSITIVE = TypeAdapter(Positive)
 _PASSAGE = ("start", "stop", "rate")
-_FORM = "give a number in Hz, or {start = Hz, stop = Hz, rate = Hz/s} for a passage"
 _NO_KEYS = ("model", "worn", "mesh")
 
 
-def _read_frequency(value: object) -> object:
-    if not isinstance(value, dict):
-        return read(_POSITIVE, value)
-    if value.keys() != set(_PASSAGE):
-        raise WrongValueError(value, _FORM)
-    for name, each in value.items():
-        try:
-            read(_POSITIVE, each)
-        except WrongValueError as error:
-            raise WrongValueError(error.value, error.remedy, f"frequency.{name}") from None
-    if value["start"] == value["stop"]:
-        raise WrongValueError(value, "give a stop that differs from start: the frequency runs from one to the other")
-    return {name: float(value[name]) for name in _PASSAGE}
-
-
-def _read_name(value: object) -> str:
-    if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > 60 or "." in value:
-        raise WrongValueError(value, "give a name of at most 60 characters without a point, in quotes")
+def _check_name(value: str) -> str:
+    if not value.strip() or not value.isprintable() or len(value) > 60 or "." in value:
+        raise ValueError("give a name of at most 60 characters without a point, in quotes")
     return value
+
+
+def _check_passage(value: dict[str, float]) -> dict[str, float]:
+    if value.keys() != set(_PASSAGE):
+        raise ValueError("give {start = Hz, stop = Hz, rate = Hz/s} for a passage")
+    if value["start"] == value["stop"]:
+        raise ValueError("give a stop that differs from start: the frequency runs from one to the other")
+    return {name: value[name] for name in _PASSAGE}
 
 
 class MissionBlock(Section):
@@ -50,8 +36,8 @@ class MissionBlock(Section):
     parameters: keys of [scene] to which the block gives values of its own.
     """
 
-    name: Annotated[str, BeforeValidator(_read_name)] = Field(description="of the block, a coordinate of the result")
-    frequency: Annotated[float | dict[str, float] | None, BeforeValidator(_read_frequency)] = Field(
+    name: Annotated[str, AfterValidator(_check_name)] = Field(description="of the block, a coordinate of the result")
+    frequency: Positive | Annotated[dict[str, Positive], AfterValidator(_check_passage)] | None = Field(
         None, description="Hz; a number, or {start, stop, rate} of a passage, whose rate is in Hz/s"
     )
     engine_order: Positive | None = Field(
@@ -59,13 +45,29 @@ class MissionBlock(Section):
     )
     cycles: Positive | None = Field(None, description="cycles of steady vibration in one mission; or seconds")
     seconds: Positive | None = Field(None, description="duration of steady vibration in one mission, s; or cycles")
-    begin: Annotated[Begin, words("ramp", "sweep", "continue")] = Field(
+    begin: Literal["ramp", "sweep", "continue"] = Field(
         "ramp",
         description="how the block begins: by raising the excitation, by a sweep, or from the last state of the block"
         " before; a passage is a sweep",
     )
     excitation_amplitude: Positive | None = Field(None, description="N; that of [axes] where it is left out")
     parameters: dict[str, Any] = Field(default_factory=dict, exclude=True)
+
+    def rules(self) -> Iterator[Wrong]:
+        """A block has one frequency and one duration."""
+        if self.frequency is not None and self.engine_order is not None:
+            yield Wrong("engine_order", self.engine_order, "leave it out, or frequency: give one of both")
+        if not self.is_passage:
+            if self.cycles is None and self.seconds is None:
+                yield Wrong("cycles", None, "missing: give cycles or seconds, the duration of the block in one mission")
+            elif self.cycles is not None and self.seconds is not None:
+                yield Wrong("cycles", self.cycles, "leave it out, or seconds: give one, the duration of the block")
+            return
+        for key in ("cycles", "seconds"):
+            if getattr(self, key) is not None:
+                yield Wrong(key, getattr(self, key), "leave it out: a passage takes as long as its rate says")
+        if self.begin != "sweep":
+            yield Wrong("begin", self.begin, 'give "sweep", or leave it out: a passage is a sweep')
 
     @property
     def is_passage(self) -> bool:
@@ -99,105 +101,74 @@ class MissionBlock(Section):
         return {**own, **self.parameters}
 
 
+OWN_AXES = tuple(name for name in AxesSection.model_fields if name in MissionBlock.model_fields)
+"""Axes of a study that a block may give a value of its own."""
+
+
 def read_blocks(
-    given: object, sections: Mapping[str, Any], scene: type[BaseModel], axes: type[BaseModel], source: str
+    given: object, axes: Mapping[str, Any], scene: type[BaseModel], found: Mistakes
 ) -> tuple[MissionBlock, ...]:
-    """The blocks of a study file, checked one by one and against each other.
+    """The blocks of a study file, checked one by one and against each other; none where one of them is wrong.
 
-    Parameters
-    ----------
-    given
-        What stands under `mission`.
-    sections
-        Tables of the study file.
-    scene, axes
-        What [scene] of this model and [axes] consist of.
-    source
-        File of the study, as the user named it.
-
-    Raises
-    ------
-    UserError
-        Where a block is wrong.
+    given: what stands under `mission`. axes: table of the study file. scene: what [scene] of this model consists of.
     """
     if not isinstance(given, list) or not given or not all(isinstance(block, dict) for block in given):
-        raise UserError(source, "mission", given, "give blocks in order, each under a line [[mission]]")
+        found.add("mission", given, "give blocks in order, each under a line [[mission]]")
+        return ()
     blocks: list[MissionBlock] = []
     for number, table in enumerate(given):
         name = table.get("name")
-        if name is None:
-            raise UserError(source, f"mission.{number}.name", None, "missing: give each block a name")
-        try:
-            _read_name(name)
-        except WrongValueError as error:
-            raise UserError(source, f"mission.{number}.name", name, error.remedy) from None
-        block = _read_block(table, scene, axes, source)
-        if block.name in [before.name for before in blocks]:
-            raise UserError(source, "mission.name", name, "give each block a name of its own")
-        blocks.append(block)
+        place = f"mission.{name if isinstance(name, str) and name.isprintable() and name else number}"
+        with found.collecting():
+            blocks.append(_read_block(table, place, scene, found))
+            if name in [block.name for block in blocks[:-1]]:
+                found.add("mission.name", name, "give each block a name of its own")
+    if len(blocks) < len(given):
+        return ()
     for before, block in zip((blocks[-1], *blocks), blocks, strict=False):
-        _check_block(before, block, sections, source)
+        for key, value, remedy in _wrong_beside(before, block, axes):
+            found.add(f"mission.{block.name}.{key}", value, remedy)
     return tuple(blocks)
 
 
-def _read_block(table: Mapping[str, Any], scene: type[BaseModel], axes: type[BaseModel], source: str) -> MissionBlock:
-    own = [name for name in MissionBlock.model_fields if name != "parameters"]
-    place = f"mission.{table['name']}"
+def _read_block(table: Mapping[str, Any], place: str, scene: type[BaseModel], found: Mistakes) -> MissionBlock:
+    """A block; its parameters are looked at with those of the scene. Raises UserError."""
+    of_scene = [name for name in scene.model_fields if name not in _NO_KEYS]
+    own: dict[str, Any] = {"begin": "sweep"} if isinstance(table.get("frequency"), dict) else {}
     parameters = {}
     for key, value in table.items():
-        if key in own:
-            continue
-        if key not in scene.model_fields or key in _NO_KEYS:
-            if key == "sweep":
-                remedy = 'give begin = "sweep": its direction is that of axes.sweep'
-            elif key in axes.model_fields or key in _NO_KEYS:
-                remedy = "leave it out: it is the same in all blocks"
-            else:
-                known = [*own, *(name for name in scene.model_fields if name not in _NO_KEYS)]
-                remedy = f"unknown key, give {nearest_name(key, known)}"
-            raise UserError(source, f"{place}.{key}", value, remedy)
-        if isinstance(value, list) or (isinstance(value, dict) and {"start", "stop", "num"} & value.keys()):
-            raise UserError(source, f"{place}.{key}", value, "give one value: a block has one")
-        parameters[key] = value
-    given: dict[str, object] = {key: value for key, value in table.items() if key in own}
-    if isinstance(table.get("frequency"), dict):
-        given.setdefault("begin", "sweep")
-    try:
-        return check_table(MissionBlock, {**given, "parameters": parameters}, source, place)
-    except UserError as error:
-        if error.key.startswith(place):
-            raise
-        raise UserError(source, f"{place}.{error.key}", error.value, error.remedy) from None
+        if key in of_scene:
+            if isinstance(value, list) or (isinstance(value, dict) and {"start", "stop", "num"} & value.keys()):
+                found.add(f"{place}.{key}", value, "give one value: a block has one")
+            parameters[key] = value
+        elif key == "sweep":
+            found.add(f"{place}.{key}", value, 'give begin = "sweep": its direction is that of axes.sweep')
+        elif key in _NO_KEYS or (key in AxesSection.model_fields and key not in OWN_AXES):
+            found.add(f"{place}.{key}", value, "leave it out: it is the same in all blocks")
+        else:
+            own[key if key != "parameters" else "parameter"] = value
+    return check_table(MissionBlock, {**own, "parameters": parameters}, found.source, place, of_scene)
 
 
-def _check_block(before: MissionBlock, block: MissionBlock, sections: Mapping[str, Any], source: str) -> None:
-    """Raises UserError where keys of a block do not go together. before: the block before."""
-    place = f"mission.{block.name}"
-
-    def refuse(key: str, value: object, remedy: str) -> UserError:
-        return UserError(source, f"{place}.{key}", value, remedy)
-
-    if block.frequency is not None and block.engine_order is not None:
-        raise refuse("engine_order", block.engine_order, "leave it out, or frequency: give one of both")
-    if block.is_passage:
-        for key in ("cycles", "seconds"):
-            if getattr(block, key) is not None:
-                raise refuse(key, getattr(block, key), "leave it out: a passage takes as long as its rate says")
-        if block.begin != "sweep":
-            raise refuse("begin", block.begin, 'give "sweep", or leave it out: a passage is a sweep')
-    elif (block.cycles is None) == (block.seconds is None):
-        what = "missing: give cycles or seconds" if block.cycles is None else "leave it out, or seconds: give one"
-        raise refuse("cycles", block.cycles, f"{what}, the duration of the block in one mission")
-    if not block.has_frequency and "frequency" not in sections["axes"]:
-        raise refuse("frequency", None, "missing: give it here, or as axes.frequency for all blocks without one")
+def _wrong_beside(before: MissionBlock, block: MissionBlock, axes: Mapping[str, Any]) -> Iterator[Wrong]:
+    """What of a block does not fit to the block before and to [axes]."""
+    if not block.has_frequency and "frequency" not in axes:
+        yield Wrong("frequency", None, "missing: give it here, or as axes.frequency for all blocks without one")
     if block.begin == "continue":
         theirs, ours = before.parameters, block.parameters
         changed = [key for key in {**theirs, **ours} if theirs.get(key) != ours.get(key)]
         if changed:
             remedy = f'give "ramp": a block that continues has the {changed[0]} of the block before, {before.name}'
-            raise refuse("begin", block.begin, remedy)
-    elif block.begin == "sweep" and not block.is_passage and "ramp" in sections["axes"].get("sweep", "up"):
-        raise refuse("begin", block.begin, 'give "ramp", or axes.sweep = "up" or "down": a sweep has a direction')
+            yield Wrong("begin", block.begin, remedy)
+    elif block.begin == "sweep" and not block.is_passage and "ramp" in listed(axes.get("sweep")):
+        yield Wrong("begin", block.begin, 'give "ramp", or axes.sweep = "up" or "down": a sweep has a direction')
+
+
+def check_used_axes(axes: Sequence[str], blocks: Sequence[MissionBlock], found: Mistakes) -> None:
+    """Notes where all blocks give values of their own to an axis. axes: that the study file gives."""
+    for name in axes:
+        if blocks and all(block.gives(name) for block in blocks):
+            found.add(f"axes.{name}", None, f"leave it out: every block under [[mission]] gives its own {name}")
 
 
 def engine_frequency(block: MissionBlock, parameters: BaseModel, source: str) -> float:
@@ -205,10 +176,8 @@ def engine_frequency(block: MissionBlock, parameters: BaseModel, source: str) ->
     assert block.engine_order is not None
     speed = dict(parameters).get("rotation_speed")
     if not isinstance(speed, int | float) or speed <= 0.0:
-        remedy = (
-            "give rotation_speed above 0, rpm, or a frequency: the frequency of an engine order is order times speed"
-        )
-        if speed is None:
-            remedy = "give a frequency: the scene has no rotation_speed"
+        remedy = "give a frequency: the scene has no rotation_speed"
+        if speed is not None:
+            remedy = "give rotation_speed above 0, rpm, which the engine order multiplies, or a frequency"
         raise UserError(source, f"mission.{block.name}.engine_order", block.engine_order, remedy)
     return block.engine_order * float(speed) / 60.0

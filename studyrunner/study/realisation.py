@@ -15,14 +15,14 @@ from pydantic import BaseModel
 
 from studyrunner.scatter.drawn_values import Drawn, ScatteredPairs, drawn
 from studyrunner.scatter.section import OF_PAIRS, Scattered, ScatterSection
+from studyrunner.study.kinds import NUMBERS
 from studyrunner.study.mission import MissionBlock
-from studyrunner.study.mission_tables import with_room_of_all
-from studyrunner.study.room_for_wear import with_room_for_wear
-from studyrunner.study.similar_names import nearest_name
+from studyrunner.study.mistakes import nearest_name
+from studyrunner.study.room_for_wear import with_room_for_wear, with_room_of_all
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, WrongValueError
+from studyrunner.values import Wrong
 
-_OF_AXES = ("frequency", "wear_coefficient", "excitation_amplitude")
 _NO_PAIRS = ScatteredPairs(("",), np.full((1, 3), np.nan))
 
 
@@ -67,7 +67,7 @@ def draw_inputs(study: Study) -> dict[str, NDArray[np.float64]]:
     own: dict[str, ArrayLike] = {name: _own_value(study, name) for name in section.inputs}
     found = _draw(study, section, own, _NO_PAIRS)
     return {
-        name: np.array([each.apply(value) for value in np.ravel(own[name])]).squeeze(axis=() if name in _OF_AXES else 0)
+        name: np.array([each.apply(value) for value in np.ravel(own[name])]).squeeze(axis=() if name in NUMBERS else 0)
         for name, each in found.items()
         if not is_of_pairs(name, section.inputs[name])
     }
@@ -96,50 +96,43 @@ def is_of_pairs(name: str, scattered: Scattered) -> bool:
     return name in OF_PAIRS and (name != "friction_coefficient" or scattered.of != "all pairs")
 
 
-def check_scatter(study: Study) -> None:
-    """Raises UserError where an input of [scatter] is unknown or cannot scatter."""
+def wrong_scatter(study: Study) -> Iterator[Wrong]:
+    """What is wrong with inputs of [scatter] beside the other tables: unknown ones, and those that cannot scatter."""
     section = study.scatter
     if section is None:
         return
     of_pairs = [name for name, each in section.inputs.items() if is_of_pairs(name, each)]
     if of_pairs and "exact" in study.outputs.variables:
         remedy = f"leave it out: the closed form knows nothing of the {of_pairs[0]} that [scatter] draws for each pair"
-        raise UserError(study.source, "outputs.variables", "exact", remedy)
-    numbers = [*(() if study.has_modes else _OF_AXES), *OF_PAIRS, *_numbers_of(study)]
+        yield Wrong("outputs.variables", "exact", remedy)
+    known = [*(() if study.has_modes else NUMBERS), *OF_PAIRS, *_numbers_of(study)]
     for name, scattered in section.inputs.items():
-        if name not in numbers:
-            remedy = f"unknown input, give {nearest_name(name, dict.fromkeys(numbers))}"
-            raise UserError(study.source, f"scatter.{name}", None, remedy)
+        key, drawn, absolute = f"scatter.{name}", scattered.distribution, scattered.distribution.kind == "value"
+        if name not in known:
+            yield Wrong(key, None, f"unknown input, give {nearest_name(name, known)}")
         if name == "frequency" and study.follow is not None:
             remedy = f'leave it out: with axes.frequency = "{study.follow.of}" each sample finds its own frequency'
-            raise UserError(study.source, "scatter.frequency", None, remedy)
-        several = name in _OF_AXES and len(getattr(study.axes, name)) > 1
-        several = several or any(axis.name == name for axis in study.scene_axes)
-        if several and scattered.distribution.kind == "value":
+            yield Wrong(key, None, remedy)
+        several = name in NUMBERS and len(getattr(study.axes, name)) > 1
+        if absolute and (several or any(axis.name == name for axis in study.scene_axes)):
             remedy = f"give one value of axes.{name}, or a distribution around the study's own values, as {{std = ...}}"
-            raise UserError(study.source, f"scatter.{name}", scattered.distribution.model_dump(), remedy)
-    _check_blocks(study, section)
-    for variant in study.variants or (study,):
-        for name, values in draw_inputs(variant).items():
-            if name not in (*_OF_AXES, *study.wear.numbers):
-                # other parameters of the scene may not fit to one that is drawn
-                for extreme in (values.min(), values.max()):
-                    _with_parameters(variant, {name: float(extreme)})
-
-
-def _check_blocks(study: Study, section: ScatterSection) -> None:
-    """Raises UserError where an input of [scatter] has no effect on blocks of a mission, or replaces what they give."""
-    for name, scattered in section.inputs.items():
+            yield Wrong(key, drawn.model_dump(), remedy)
         for block in study.mission:
-            if not block.gives(name):
-                continue
-            if name == "frequency":
+            if name == "frequency" and block.gives(name):
                 remedy = f"leave it out: the block {block.name} has a frequency of its own"
-            elif scattered.distribution.kind == "value":
+                yield Wrong(key, drawn.model_dump(), remedy)
+            elif absolute and block.gives(name):
                 remedy = f"give a distribution around own values, as {{std = ...}}: the block {block.name} gives one"
-            else:
-                continue
-            raise UserError(study.source, f"scatter.{name}", scattered.distribution.model_dump(), remedy)
+                yield Wrong(key, drawn.model_dump(), remedy)
+
+
+def check_draws(study: Study) -> None:
+    """Raises UserError where a sample draws a value that is none. study: without axes of [scene] or [wear]."""
+    for name, values in draw_inputs(study).items():
+        if name not in (*NUMBERS, *study.wear.numbers):
+            # other parameters of the scene may not fit to one that is drawn
+            for extreme in (values.min(), values.max()):
+                _with_parameters(study, {name: float(extreme)})
 
 
 def _numbers_of(study: Study) -> list[str]:
@@ -150,7 +143,7 @@ def _numbers_of(study: Study) -> list[str]:
 
 
 def block_of_input(study: Study, name: str) -> MissionBlock | None:
-    """The block of a mission for which the values of an input are told: the first one where each has a value of its
+    """The block of a mission for which the values of an input are shown: the first one where each has a value of its
     own; None where the values are around that of the study.
     """
     return study.mission[0] if study.mission and all(block.gives(name) for block in study.mission) else None
@@ -160,7 +153,7 @@ def _own_value(study: Study, name: str) -> ArrayLike:
     """The study's own value of an input; 1, for any, where the contact pairs have their own."""
     if block_of_input(study, name) is not None:
         return _own_value(study.block_studies[0], name)
-    if name in _OF_AXES:
+    if name in NUMBERS:
         return np.array(getattr(study.axes, name))[:, None]
     value = {**dict(study.scene.parameters), **study.wear.numbers}.get(name)
     if isinstance(value, float | int):
@@ -200,9 +193,9 @@ def _drawn_studies(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
     """The study with what each sample draws."""
     assert study.scatter is not None
     values = draw_inputs(study)
-    axes = [name for name in values if name in _OF_AXES]
+    axes = [name for name in values if name in NUMBERS]
     of_wear = [name for name in values if name in study.wear.numbers]
-    of_scene = [name for name in values if name not in (*_OF_AXES, *of_wear)]
+    of_scene = [name for name in values if name not in (*NUMBERS, *of_wear)]
     for sample in range(study.scatter.realisations):
         update: dict[str, object] = {"scatter": None}
         if axes:

@@ -33,6 +33,28 @@ def with_room_for_wear(study: Study) -> Study:
     return study.model_copy(update={"scene": scene.model_copy(update={"parameters": parameters})})
 
 
+def with_room_of_all(study: Study) -> Study:
+    """A study of missions whose blocks have room for the wear of all of them, in equal pairs."""
+    cycles = study.missions_kept[-1] * sum(
+        block.cycles_at(max(of_block.axes.frequency))
+        for block, of_block in zip(study.mission, study.block_studies, strict=True)
+    )
+    ends = {"cycles": cycles, "until": study.slow_time.until}
+    wearing = [
+        with_room_for_wear(each.model_copy(update={"slow_time": each.slow_time.model_copy(update=ends)}))
+        for each in study.block_studies
+    ]
+    parameters = [each.scene.parameters for each in wearing]
+    widths = [width for each in parameters if isinstance(width := dict(each).get("half_width"), float)]
+    if len(set(widths)) > 1:
+        parameters = [each.model_copy(update={"half_width": max(widths)}) for each in parameters]
+    found = tuple(
+        each.model_copy(update={"scene": each.scene.model_copy(update={"parameters": of_block})})
+        for each, of_block in zip(wearing, parameters, strict=True)
+    )
+    return study.model_copy(update={"block_studies": found})
+
+
 def expected_wear(study: Study) -> ExpectedWear:
     """The most that any of its points wears, of samples up to `_FAR`."""
 

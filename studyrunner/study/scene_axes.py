@@ -7,20 +7,19 @@ import copy
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from pydantic import BaseModel
 
-from studyrunner.study.similar_names import nearest_name
-from studyrunner.study.values import read_axis
-from studyrunner.user_error import UserError, WrongValueError
+from studyrunner.study.mistakes import Mistakes, tables_in, wrong_keys
+from studyrunner.study.sections import AxesSection, WearSection
+from studyrunner.values import Section, Wrong, read_axis
 
 Table = dict[str, Any]
 AxisValue = float | int | bool | str
 
-_IN_WEAR = ("threshold", "surfaces")
 _MOST_COMBINATIONS = 10_000  # each of them is checked, which takes 0.2 ms
 _UNITS = {"-": "1", "1": "1", "degrees": "degree", "rpm": "rpm"}
 _UNITS |= dict.fromkeys(("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N/m3", "N s/m", "kg", "kg/m3", "J/m2"), "")
@@ -49,79 +48,82 @@ class SceneAxis:
 
 
 def take_scene_axes(
-    sections: Mapping[str, Any], own: Sequence[str], scene: type[BaseModel], wear: type[BaseModel], source: str
+    tables: Mapping[str, Any], scene: type[BaseModel], wear: type[Section], found: Mistakes
 ) -> tuple[SceneAxis, ...]:
-    """Axes in the table [axes] that are keys of [scene] or [wear].
+    """Axes that are keys of [scene] or [wear], which are taken out of the table [axes].
 
-    Parameters
-    ----------
-    sections
-        Tables of the study file.
-    own
-        Keys that [axes] has of itself.
-    scene, wear
-        What [scene] of this model and [wear] consist of.
-    source
-        File of the study, as the user named it.
-
-    Raises
-    ------
-    UserError
-        Where a key is unknown, is given twice, or a value can be no value of an axis.
+    tables: of the study file. scene, wear: what [scene] of this model and [wear] consist of.
     """
-    found: list[SceneAxis] = []
-    kinds: tuple[tuple[Literal["scene", "wear"], type[BaseModel]], ...] = (("scene", scene), ("wear", wear))
-    for name, value in sections["axes"].items():
-        if name in own:
+    axes: list[SceneAxis] = []
+    known: dict[Literal["scene", "wear"], Collection[str]] = {"scene": scene.model_fields, "wear": wear.AXES}
+    for name in [name for name in tables["axes"] if name not in AxesSection.model_fields]:
+        table = next((table for table, keys in known.items() if name in keys), None)
+        if table is None:
             continue
-        table = next((table for table, kind in kinds if name in kind.model_fields), None)
-        if table is None or (table == "wear" and name not in _IN_WEAR):
-            known = [*own, *scene.model_fields, *_IN_WEAR]
-            raise UserError(source, f"axes.{name}", value, f"unknown key, give {nearest_name(name, known)}")
-        each = value.items() if is_table(value) else [(None, value)]
-        for inner, values in each:
+        value = tables["axes"].pop(name)
+        for inner, values in value.items() if is_table(value) else [(None, value)]:
             key = (name,) if inner is None else (name, str(inner))
             dotted = ".".join(key)
-            _check_once(sections.get(table, {}), table, key, source)
-            given = only_table(sections.get(table, {}).get(name, {}))
-            if inner is not None and not isinstance(given, Mapping):
-                remedy = f"leave it out, or give a table of the other keys: axes.{dotted} gives one of them"
-                raise UserError(source, f"{table}.{name}", given, remedy)
-            if not "_".join(key).isidentifier():
-                remedy = "give a surface whose name consists of letters, digits and _: a dimension has the name"
-                raise UserError(source, f"axes.{dotted}", values, remedy)
+            wrong = _wrong_place(tables[table], table, key, values)
+            if wrong is not None:
+                found.add(*wrong)
+                continue
             try:
                 of_axis = read_axis(values)
-            except WrongValueError as error:
-                raise UserError(source, f"axes.{dotted}", error.value, error.remedy) from None
-            units, meaning = describe_key(dict(kinds)[table], *key)
-            found.append(SceneAxis("_".join(key), table, key, of_axis, units, meaning))
-    n_combinations = math.prod(len(axis.values) for axis in found)
+            except ValueError as error:
+                for wrong in wrong_keys(error, AxesSection, {}):
+                    found.add(f"axes.{dotted}{wrong.key}", values if wrong.value is None else wrong.value, wrong.remedy)
+                continue
+            units, meaning = describe_key(scene if table == "scene" else wear, *key)
+            axes.append(SceneAxis("_".join(key), table, key, of_axis, units, meaning))
+    n_combinations = math.prod(len(axis.values) for axis in axes)
     if n_combinations > _MOST_COMBINATIONS:
-        longest = max(found, key=lambda axis: len(axis.values))
+        longest = max(axes, key=lambda axis: len(axis.values))
         remedy = f"give fewer values: there are {n_combinations} combinations of keys of [scene] and [wear], at most "
         remedy += f"{_MOST_COMBINATIONS} are possible; [scatter] takes more samples"
-        raise UserError(source, f"axes.{longest.dotted}", len(longest.values), remedy)
-    return tuple(found)
+        found.add(f"axes.{longest.dotted}", len(longest.values), remedy)
+        return ()
+    return tuple(axes)
+
+
+def _wrong_place(table: Mapping[str, Any], name: str, key: Sequence[str], values: object) -> Wrong | None:
+    """What is wrong with an axis of this key, where its table has the key, or no place for it."""
+    dotted, given = ".".join(key), table
+    for part in key:
+        given = only_table(given)
+        if not isinstance(given, Mapping):
+            return Wrong(
+                f"{name}.{key[0]}", given, f"give it once, here or as axes.{key[0]}; a table of other keys here"
+            )
+        if part not in given:
+            break
+        given = given[part]
+    else:
+        return Wrong(f"{name}.{dotted}", given, f"give it once, here or as axes.{dotted}")
+    if not "_".join(key).isidentifier():
+        remedy = "give a surface whose name consists of letters, digits and _: a dimension has the name"
+        return Wrong(f"axes.{dotted}", values, remedy)
+    return None
+
+
+def keys_below_axes(scene_axes: Sequence[SceneAxis]) -> dict[str, str]:
+    """For keys of [scene] or [wear] whose values stand under [axes]: the keys there."""
+    return {f"{axis.table}.{name}": f"axes.{name}" for axis in scene_axes for name in (axis.key[0], axis.dotted)}
 
 
 @contextlib.contextmanager
 def keys_as_given(scene_axes: Sequence[SceneAxis]) -> Iterator[None]:
     """A UserError on a key of [scene] or [wear] whose values stand under [axes] names the key there."""
-    given = {f"{axis.table}.{name}": f"axes.{name}" for axis in scene_axes for name in (axis.key[0], axis.dotted)}
-    try:
+    found = Mistakes("")
+    with found.collecting(keys_below_axes(scene_axes)):
         yield
-    except UserError as error:
-        raise UserError(error.place, given.get(error.key, error.key), error.value, error.remedy) from None
+    found.raise_any()
 
 
 def combinations(sections: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> Iterator[dict[str, Table]]:
     """The tables of a study with each combination of values in [scene] and [wear], the last axis fastest."""
-    names = {axis.key[0] for axis in scene_axes}
-    axes = {name: value for name, value in sections["axes"].items() if name not in names}
     for values in itertools.product(*(axis.values for axis in scene_axes)):
         tables = {name: copy.copy(table) for name, table in sections.items()}
-        tables["axes"] = axes
         for axis, value in zip(scene_axes, values, strict=True):
             table = tables.setdefault(axis.table, {})
             if axis.key == ("worn",):
@@ -133,14 +135,11 @@ def combinations(sections: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -
         yield tables
 
 
-def scene_with_axes(scene: Mapping[str, Any], axes: Mapping[str, Any], own: Sequence[str]) -> Table:
-    """[scene] of a result that holds its scene, with the only value of each axis that is a key of [scene].
-
-    own: keys that [axes] has of itself.
-    """
+def scene_with_axes(scene: Mapping[str, Any], axes: Mapping[str, Any]) -> Table:
+    """[scene] of a result that holds its scene, with the only value of each axis that is a key of [scene]."""
     found = dict(scene)
     for name, values in axes.items():
-        if name in (*own, *_IN_WEAR):
+        if name in (*AxesSection.model_fields, *WearSection.AXES):
             continue
         if not is_table(values):
             found[name] = only_table(values)
@@ -182,28 +181,13 @@ def is_table(value: object) -> bool:
     return isinstance(value, dict) and bool(value) and not {"start", "stop", "num"} & value.keys()
 
 
-def _check_once(table: Mapping[str, Any], name: str, key: Sequence[str], source: str) -> None:
-    """Raises UserError where the table has the key of an axis."""
-    given: Any = table
-    for depth, part in enumerate(key):
-        given = only_table(given)
-        if not isinstance(given, Mapping):
-            key = key[:depth]
-            break
-        if part not in given:
-            return
-        given = given[part]
-    dotted = ".".join(key)
-    raise UserError(source, f"{name}.{dotted}", given, f"give it once, here or as axes.{dotted}")
-
-
 def describe_key(kind: type[BaseModel], name: str, inner: str = "") -> tuple[str, str]:
     """Unit and meaning in the description of a key: parts between commas, of which one is the unit.
 
     inner: key in the table that the key holds, or a surface.
     """
     field = kind.model_fields[name]
-    for table in _tables_in(field.annotation):
+    for table in tables_in(field.annotation):
         if inner in table.model_fields:
             units, _ = describe_key(table, inner)
             return units, f"{inner.replace('_', ' ')} of {name.replace('_', ' ')}"
@@ -212,11 +196,3 @@ def describe_key(kind: type[BaseModel], name: str, inner: str = "") -> tuple[str
     parts = [part for part in text.partition("; ")[0].split(", ") if part != units]
     meaning = ", ".join(parts) or name.replace("_", " ")
     return _UNITS.get(units) or units, f"{meaning}, {inner}" if inner else meaning
-
-
-def _tables_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Classes of tables in the type of a key."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _tables_in(part)

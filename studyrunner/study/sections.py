@@ -1,26 +1,28 @@
-"""The tables of a study file: their keys, what each key takes, and its default."""
+"""The tables of a study file but [scene], [scatter] and [[mission]]: their keys, what each key takes, its default."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final, Literal
 
-from pydantic import BaseModel, BeforeValidator, Field, SerializeAsAny, TypeAdapter
+from pydantic import AfterValidator, BeforeValidator, Field
 
-from solver.settings import TARGETS
-from studies.contact_compliance import ContactStiffness
-from studies.fe_models.model_files import ModelFiles
+from solver.contact.wear_law import WearLaw, WearTable
+from solver.settings import FOLLOWED, TARGETS
 from studyrunner.coordinates import SCENE
 from studyrunner.mission_variables import OF_MISSIONS
 from studyrunner.mode_variables import OF_MODES
-from studyrunner.study.similar_names import nearest_name
-from studyrunner.study.values import (
+from studyrunner.scatter.section import ScatterSection
+from studyrunner.study.mistakes import nearest_name
+from studyrunner.user_error import WrongValueError
+from studyrunner.values import (
     Axis,
     Cycles,
     Fraction,
     Harmonics,
+    Listed,
     Mode,
     NotNegative,
     Positive,
@@ -28,64 +30,51 @@ from studyrunner.study.values import (
     Scheme,
     Section,
     Sweep,
-    Switch,
-    Text,
+    Whole,
+    Wrong,
+    ascending,
+    listed,
     once,
-    read,
-    whole,
 )
-from studyrunner.study.worn import Worn
-from studyrunner.user_error import WrongValueError
-from studyrunner.variables import ASKED, KEPT, USUAL
+from studyrunner.variables import ASKED, KEPT
 
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
 
-SOLVER_AXES = ("harmonics", "samples", "tolerance", "rtol")
-AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")
-AXES_OF_MODES = ("mode", "sweep")
-"""Axes of a study of nonlinear modes, beside modal_amplitude."""
-AXES_OF_MISSIONS = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
-"""Axes of a study of missions; those that every block gives a value of its own are none."""
-
-_MISSIONS = whole(1, 10_000_000)
-_N_OUTPUTS = TypeAdapter(Annotated[int, whole(1, 1_000_000)])
-_COUNT = TypeAdapter(NotNegative)
-_TARGET = TypeAdapter(Positive)
-_PAIR = TypeAdapter(Annotated[int, whole(0, 1_000_000)])
-
 DEFAULT: Final = "default"
 """In a list of variables: those that cost little, which is what a study without such a list asks for."""
 
+SOLVER_AXES = ("harmonics", "samples", "tolerance", "rtol")
 
-def _read_name(value: object) -> str:
-    if not isinstance(value, str) or not value.strip() or value.startswith(".") or not value.isprintable():
-        raise WrongValueError(value, "give a name that can be a file name")
+VARIABLES = tuple(dict.fromkeys((*ASKED, *SCENE, *OF_MODES, *OF_MISSIONS)))
+"""All that `outputs.variables` may name, in the order of the result."""
+
+_OF_SURFACE = "surfaces_"
+_MOST_KNOTS = 1000
+
+
+def _check_name(value: str) -> str:
+    if not value.strip() or value.startswith(".") or not value.isprintable():
+        raise ValueError("give a name that can be a file name")
     if "/" in value or "\\" in value or len(value) > 100:
-        raise WrongValueError(value, "give a name of at most 100 characters without a slash")
+        raise ValueError("give a name of at most 100 characters without a slash")
     return value
 
 
-def _read_outputs(value: object) -> int | tuple[float, ...]:
-    if not isinstance(value, list | tuple):
-        n_outputs: int = read(_N_OUTPUTS, value)
-        return n_outputs
-    counts = tuple(read(_COUNT, item) for item in value)
-    if not counts or any(later <= earlier for earlier, later in pairwise(counts)):
-        raise WrongValueError(value, "give a number of outputs or an ascending list of cycle counts")
-    return counts
+def _check_word(value: object) -> object:
+    """A word in place of a frequency is one of those of a followed resonance, which `take_followed` takes."""
+    for word in listed(value):
+        if isinstance(word, str):
+            raise WrongValueError(word, "give a number in Hz, or " + " or ".join(f'"{each}"' for each in FOLLOWED))
+    return value
 
 
-def _read_variables(value: object) -> tuple[str, ...]:
-    if not isinstance(value, list | tuple):
-        raise WrongValueError(value, "give a list of names of result variables")
-    names_of_all = tuple(dict.fromkeys((*ASKED, *SCENE, *OF_MODES, *OF_MISSIONS)))
-    known = (*names_of_all, *KEPT)
-    for name in value:
+def _check_variables(value: object) -> object:
+    known = (*VARIABLES, *KEPT)
+    for name in value if isinstance(value, list | tuple) else ():
         if name != DEFAULT and name not in known:
             raise WrongValueError(name, f'give "{DEFAULT}" or {_similar(str(name), known)}')
-    names = once(value)
-    return tuple(name for name in names_of_all if name in names)
+    return value
 
 
 def _similar(name: str, known: Sequence[str]) -> str:
@@ -94,29 +83,33 @@ def _similar(name: str, known: Sequence[str]) -> str:
     return f"one of {', '.join(holding)}" if holding else nearest_name(name, known)
 
 
-def _read_loops(value: object) -> tuple[int, ...]:
-    if not isinstance(value, list | tuple):
-        raise WrongValueError(value, "give a list of contact indices")
-    return tuple(sorted(once(read(_PAIR, item) for item in value)))
+def _check_target(value: dict[str, float]) -> dict[str, float]:
+    if len(value) != 1 or next(iter(value)) not in TARGETS:
+        raise ValueError("give one of " + ", ".join(f"{{{name} = ...}}" for name in TARGETS))
+    return value
 
 
-def _read_target(value: object) -> dict[str, float]:
-    if not isinstance(value, dict) or len(value) != 1 or next(iter(value)) not in TARGETS:
-        raise WrongValueError(value, "give one of " + ", ".join(f"{{{name} = ...}}" for name in TARGETS))
-    return {name: read(_TARGET, item) for name, item in value.items()}
+def _check_range(value: object) -> object:
+    numbers = isinstance(value, list | tuple) and all(type(each) in (int, float) for each in value)
+    if not numbers or len(value) != 2 or not 0.0 < value[0] < value[1] < float("inf"):  # type: ignore[arg-type,index]
+        raise ValueError("give the lowest and the highest frequency in Hz, as [205, 215]")
+    return value
+
+
+_Knots = Annotated[Listed[float], Field(min_length=1, max_length=_MOST_KNOTS), AfterValidator(ascending)]
 
 
 class StudySection(Section):
     """[study]: name and title of the study."""
 
-    name: Annotated[str, BeforeValidator(_read_name)] = Field(description="name of the study and of its result file")
-    title: Text = Field("", description="goes into the result")
+    name: Annotated[str, AfterValidator(_check_name)] = Field(description="name of the study and of its result file")
+    title: str = Field("", description="goes into the result")
 
 
 class AxesSection(Section):
     """[axes]: every axis becomes a dimension of the result, in the order of the values given here."""
 
-    frequency: Axis[Positive] = Field(
+    frequency: Annotated[Axis[Positive], BeforeValidator(_check_word)] = Field(
         description='Hz; a number, a list or {start, stop, num}; or "resonance" or "peak", see [loading]'
     )
     wear_coefficient: Axis[NotNegative] = Field((1.1e-11,), description="1/Pa")
@@ -138,24 +131,87 @@ class AxesSection(Section):
     )
 
 
+class WearSection(Section):
+    """[wear]: which law, what it takes, and how surfaces differ."""
+
+    AXES: ClassVar = ("threshold", "surfaces")
+    TAKEN: ClassVar = {"threshold": ("threshold",), "table": ("pressure", "depth", "factor")}
+    """Keys of the laws that take any, beside `surfaces`, which all take."""
+
+    law: Literal["archard", "energy", "threshold", "table"] = Field(
+        "archard", description="what of the slip work wears"
+    )
+    threshold: NotNegative | None = Field(
+        None, description="J/m2, slip work per area in a cycle below which nothing wears"
+    )
+    pressure: _Knots | None = Field(None, description="Pa, mean over a period, of the rows of the table")
+    depth: _Knots | None = Field(None, description="m, worn depth, of the columns of the table")
+    factor: Listed[Listed[NotNegative]] | None = Field(
+        None, description="of wear_coefficient, a list of rows of the table, one for each pressure"
+    )
+    surfaces: dict[str, NotNegative] | None = Field(
+        None, description="factor of wear_coefficient on each surface of the scene, as {flat = 1.0, cylinder = 0.5}"
+    )
+
+    def rules(self) -> Iterator[Wrong]:
+        """Each law takes its own keys, and a table has a factor for each pressure and depth."""
+        for law, keys in self.TAKEN.items():
+            for key in keys:
+                value = getattr(self, key)
+                if law == self.law and value is None:
+                    yield Wrong("law", law, f"give wear.{key} beside it")
+                if law != self.law and value is not None:
+                    yield Wrong(key, value, f'leave it out: only the law "{law}" takes it')
+        if self.pressure is not None and self.depth is not None and self.factor is not None:
+            n_rows, n_columns = len(self.pressure), len(self.depth)
+            if len(self.factor) != n_rows or any(len(row) != n_columns for row in self.factor):
+                remedy = f"give a row for each of {n_rows} pressures, with a number for each of {n_columns} depths"
+                yield Wrong("factor", self.factor, remedy)
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Numbers that may scatter, named as dimensions: the threshold, and `surfaces_flat` of a surface flat."""
+        own = {} if self.threshold is None else {"threshold": self.threshold}
+        factors = {f"{_OF_SURFACE}{label}": factor for label, factor in (self.surfaces or {}).items()}
+        return own | {name: factor for name, factor in factors.items() if name.isidentifier()}
+
+    def with_numbers(self, values: Mapping[str, float]) -> WearSection:
+        """With other values of `numbers`."""
+        table = {f"{_OF_SURFACE}{label}": (label, factor) for label, factor in (self.surfaces or {}).items()}
+        surfaces = {label: values.get(name, factor) for name, (label, factor) in table.items()} or None
+        return self.model_copy(update={"threshold": values.get("threshold", self.threshold), "surfaces": surfaces})
+
+    @property
+    def wear_law(self) -> WearLaw:
+        """As the solver takes it."""
+        table = None
+        if self.pressure is not None and self.depth is not None and self.factor is not None:
+            table = WearTable(self.pressure, self.depth, self.factor)
+        surfaces = () if self.surfaces is None else tuple(self.surfaces.items())
+        return WearLaw(self.law, self.threshold or 0.0, table, surfaces)
+
+
 class SlowTimeSection(Section):
     """[slow_time]: end of the histories, and cycle counts of the output."""
 
     cycles: Cycles = Field(
         100_000.0, description="cycles; 0 for the unworn states only, inf: until nothing wears any more"
     )
-    missions: Annotated[int, _MISSIONS] | None = Field(
-        None, description="how often the blocks under [[mission]] are flown, in place of cycles"
+    missions: Annotated[Whole, Field(ge=1, le=10_000_000)] | None = Field(
+        None, description="how often the blocks under [[mission]] are repeated, in place of cycles"
     )
     final_share: Fraction = Field(
         1e-4, description="of the largest wear rate of each pair: below it nothing wears any more, with cycles = inf"
     )
-    outputs: Annotated[int | tuple[float, ...], BeforeValidator(_read_outputs)] = Field(
+    outputs: (
+        Annotated[Whole, Field(ge=1, le=1_000_000)]
+        | Annotated[Listed[NotNegative], Field(min_length=1), AfterValidator(ascending)]
+    ) = Field(
         101,
         description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts; with"
         " cycles = inf their number, spaced evenly in worn volume and cycles",
     )
-    until: Annotated[dict[str, float] | None, BeforeValidator(_read_target)] = Field(
+    until: Annotated[dict[str, Positive], AfterValidator(_check_target)] | None = Field(
         None,
         description="wear at which a point ends, {wear_depth = m of the deepest pair}, {worn_volume = m3}, or"
         " {frequency_shift = relative change of the resonance of the vibration}",
@@ -163,6 +219,25 @@ class SlowTimeSection(Section):
     largest_depth: Positive | None = Field(
         None, description="m; the explicit scheme then wears no pair deeper than this in a step, Eq. (22), for any h"
     )
+
+    def rules(self) -> Iterator[Wrong]:
+        """The outputs lie on the way to the end."""
+        missions, cycles, outputs = self.missions, self.cycles, self.outputs
+        counts = outputs if isinstance(outputs, tuple) else ()
+        if missions is not None:
+            if counts and (counts[-1] > missions or any(count != round(count) for count in counts)):
+                remedy = f"give whole numbers of missions, at most slow_time.missions = {missions}"
+                yield Wrong("outputs", outputs, remedy)
+            if self.until is not None and "frequency_shift" in self.until:
+                remedy = "give wear_depth or worn_volume: blocks of a mission have frequencies of their own"
+                yield Wrong("until", self.until, remedy)
+        elif counts and cycles == math.inf:
+            remedy = "give their number: with slow_time.cycles = inf they are spaced evenly in worn volume and cycles"
+            yield Wrong("outputs", outputs, remedy)
+        elif counts and counts[-1] > cycles:
+            yield Wrong("outputs", counts[-1], f"give cycle counts of at most slow_time.cycles = {cycles:g}")
+        elif outputs == 1 and cycles > 0.0:
+            yield Wrong("outputs", outputs, "give at least 2: cycle 0 and the last one")
 
 
 class SolverSection(Section):
@@ -172,7 +247,7 @@ class SolverSection(Section):
     samples: Samples = Field(AUTO, description="time samples in a period")
     tolerance: Fraction = Field(1e-8, description="of the scaled residual")
     rtol: Fraction = Field(1e-2, description="relative error that automatic settings and adaptive steps aim at")
-    shortcuts: Switch = Field(
+    shortcuts: bool = Field(
         True, description="whether points with the same history share one; false: every point is computed on its own"
     )
     time_limit: Positive | None = Field(
@@ -183,47 +258,37 @@ class SolverSection(Section):
 class OutputsSection(Section):
     """[outputs]: variables of the result; `outcome` and the totals of a point are always there."""
 
-    variables: Annotated[tuple[str, ...], BeforeValidator(_read_variables)] = Field(
-        USUAL, description="names of result variables"
+    variables: Annotated[Listed[str], BeforeValidator(_check_variables), AfterValidator(once)] = Field(
+        (DEFAULT,), description="list of names of result variables"
     )
-    loops: Annotated[tuple[int, ...], BeforeValidator(_read_loops)] = Field(
-        (), description="indices of the contact pairs whose fretting loops are kept"
-    )
-    scene: Switch = Field(
+    loops: Annotated[
+        Listed[Annotated[Whole, Field(ge=0, le=1_000_000)]],
+        AfterValidator(once),
+        AfterValidator(lambda loops: tuple(sorted(loops))),
+    ] = Field((), description="list of the indices of the contact pairs whose fretting loops are kept")
+    scene: bool = Field(
         False, description="whether the reduced model of a bundled scene is kept, as that of a scene file always is"
     )
 
 
-class SceneFileParameters(Section):
-    """[scene] of a scene file: the friction coefficient only, if the file has none for each pair."""
+class LoadingSection(Section):
+    """[loading]: range of a frequency that is followed."""
 
-    friction_coefficient: NotNegative | None = Field(None, description="a number, 0 or more")
-    contact_stiffness: ContactStiffness = None
+    between: Annotated[tuple[float, float], Field(strict=False), BeforeValidator(_check_range)] = Field(
+        description='Hz, [lowest, highest] frequency of the excitation with axes.frequency = "resonance" or "peak"'
+    )
 
 
-class SceneSection(Section):
-    """[scene]: model, and parameters of this model.
-
-    parameters: checked object of the class of the scene, with `friction_coefficient` at least.
-    worn: wear that the joint begins with.
-    path: file of the scene; None for a scene that is built.
-    group: group of the scene in this file; empty in a scene file.
-    files: files of a finite-element model; None for other scenes.
-    offers: names in `outputs.variables` that this scene knows and not every scene knows.
-    """
-
-    model: Text
-    parameters: SerializeAsAny[BaseModel]
-    worn: Worn | None = None
-    path: Path | None = Field(None, exclude=True)
-    group: str = Field("", exclude=True)
-    files: ModelFiles | None = Field(None, exclude=True)
-    offers: tuple[str, ...] = Field((), exclude=True)
-
-    @property
-    def is_bundled(self) -> bool:
-        """Whether the scene is a bundled one; a result may hold the model that it was built to."""
-        return not (names_file(self.model) or names_model(self.model))
+SECTIONS: dict[str, type[Section]] = {
+    "study": StudySection,
+    "axes": AxesSection,
+    "wear": WearSection,
+    "slow_time": SlowTimeSection,
+    "solver": SolverSection,
+    "outputs": OutputsSection,
+    "scatter": ScatterSection,
+    "loading": LoadingSection,
+}
 
 
 def names_model(model: str) -> bool:

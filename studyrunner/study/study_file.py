@@ -1,74 +1,65 @@
-"""Reads a study: finds the file, applies the overrides, checks all of it; and writes the effective study as TOML.
-
-By hand: `tomli_w` gives each value of a list a line of its own, and axes have up to 100 000 values.
-"""
+"""Reads a study: finds the file, applies the overrides, checks all of it; and writes the effective study as TOML."""
 
 from __future__ import annotations
 
-import json
-import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from pydantic import ValidationError
 
+from solver.settings import FOLLOWED, FollowedFrequency
 from studies.hdf5 import is_hdf5
-from studyrunner.study.checked_table import check_table
-from studyrunner.study.followed import take_followed
-from studyrunner.study.mission import OWN_AXES, MissionBlock, read_blocks
-from studyrunner.study.mission_tables import (
-    asks_for_missions,
-    block_studies,
-    check_mission_tables,
-    check_used_axes,
-    with_room_of_all,
+from studyrunner.scatter.section import flat_table
+from studyrunner.study.kinds import (
+    IDLE_FREQUENCY,
+    MODES,
+    Tables,
+    kind_of,
+    take_unused,
+    with_idle_values,
+    without_idle_values,
 )
-from studyrunner.study.mission_tables import with_idle_keys as with_idle_keys_of_missions
-from studyrunner.study.mission_tables import without_idle_keys as without_idle_keys_of_missions
-from studyrunner.study.mode_tables import (
-    asks_for_modes,
-    check_mode_tables,
-    check_worn_counts,
-    with_idle_keys,
-    without_idle_keys,
-)
-from studyrunner.study.realisation import check_scatter
-from studyrunner.study.room_for_wear import with_room_for_wear
+from studyrunner.study.mission import OWN_AXES, MissionBlock, check_used_axes, engine_frequency, read_blocks
+from studyrunner.study.mistakes import Mistakes, check_table, nearest_name
+from studyrunner.study.overrides import override
+from studyrunner.study.realisation import check_draws, wrong_scatter
+from studyrunner.study.room_for_wear import with_room_for_wear, with_room_of_all
+from studyrunner.study.rules import check_rules, size_of_result
 from studyrunner.study.scene_axes import (
     SceneAxis,
     as_checked,
     combinations,
-    is_table,
-    keys_as_given,
+    keys_below_axes,
     only_table,
     scene_with_axes,
     take_scene_axes,
 )
-from studyrunner.study.scene_errors import scene_errors
-from studyrunner.study.scene_table import check_scene, parameters_of
-from studyrunner.study.sections import SOLVER_AXES, AxesSection
-from studyrunner.study.similar_names import nearest_name
-from studyrunner.study.study import Study, check_axes
-from studyrunner.study.study_of_result import Archived, read_archived
-from studyrunner.study.toml_text import read_toml, read_toml_file
-from studyrunner.study.wear_section import WearSection
+from studyrunner.study.scene_section import Origin, check_scene, parameters_of
+from studyrunner.study.sections import (
+    DEFAULT,
+    SECTIONS,
+    SOLVER_AXES,
+    VARIABLES,
+    AxesSection,
+    LoadingSection,
+    OutputsSection,
+    WearSection,
+)
+from studyrunner.study.study import Study
+from studyrunner.study.study_of_result import read_archived
+from studyrunner.study.toml_text import format_toml, read_toml, read_toml_file
 from studyrunner.study.worn import AXIS as WORN_AXIS
 from studyrunner.study.worn import read_worn, worn_axis
-from studyrunner.user_error import UserError, WrongValueError
+from studyrunner.user_error import UserError
+from studyrunner.values import listed
+from studyrunner.variables import FOLLOWED_FREQUENCY
 
-Table = dict[str, object]
-
-_BARE_WORD = re.compile(r"[^\s\"'\[\]{}=,#]+")
-_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-_SECTIONS = tuple(
-    name
-    for name in Study.model_fields
-    if name not in ("follow", "source", "folder", "archived", "scene_axes", "variants", "block_studies")
-)
+_MOST_WRONG_PARTS = 20
+_ON_REQUEST = ("scatter", "loading", "mission")
+_TABLES = ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", *_ON_REQUEST)
 
 
 def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Study:
@@ -90,29 +81,22 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
     Raises
     ------
     UserError
-        Where there is no such study or something in it is wrong: one line that says what would be right.
+        Where there is no such study or something in it is wrong: for each mistake a line that says what would be right.
     """
     argument = str(study)
     path = _study_path(argument)
-    archived, own = None, tuple(AxesSection.model_fields)
+    archived = None
     try:
         if is_hdf5(path):
             archived = read_archived(path, argument)
             table = read_toml(archived.study.encode(), argument)
-            archived = replace(archived, scene=scene_with_axes(_section(table, "scene"), _section(table, "axes"), own))
+            archived = replace(archived, scene=scene_with_axes(_dict(table, "scene"), _dict(table, "axes")))
         else:
             table = read_toml_file(path, argument)
     except OSError as error:
         raise UserError(argument, "the file", None, f"give a file that can be read: {error.strerror}") from None
-    if isinstance(overrides, Mapping):
-        for key, value in overrides.items():
-            _set_key(table, key, _plain(value), "overrides", key)
-    else:
-        for text in [overrides] if isinstance(overrides, str) else overrides:
-            _override(table, text)
-    found = check_study(table, argument, path, archived)
-    check_worn_counts(found)
-    return found
+    override(table, overrides)
+    return _check_study(table, Origin(argument, path, archived, _dict(table, "outputs").get("scene") is True))
 
 
 def bundled_studies() -> tuple[str, ...]:
@@ -121,134 +105,259 @@ def bundled_studies() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in files if file.suffix == ".toml"))
 
 
-def check_study(
-    table: Mapping[str, object], source: str, path: Path, archived: Archived | None = None, *, room: bool = True
-) -> Study:
-    """The study in a table as TOML has it, every default filled in.
-
-    source: the file as the user named it. path: where it is; relative paths start in its folder. archived: what it says
-    of the result that it holds. room: whether scenes get room for what wears. Raises UserError.
-    """
-    sections = dict(table)
-    for name, section in sections.items():
-        if name not in _SECTIONS:
-            raise UserError(source, name, section, f"unknown table, give {nearest_name(name, _SECTIONS)}")
-        if not isinstance(section, dict) and name != "mission":
-            raise UserError(source, name, section, f"give a table [{name}] with keys")
-    if asks_for_missions(sections):
-        # each block may give its own values
-        sections.setdefault("axes", {})
-    for name in ("study", "scene", "axes"):
-        if name not in sections:
-            raise UserError(source, name, None, f"missing: give a table [{name}]")
-    twice = [key for key in SOLVER_AXES if key in _section(table, "axes") and key in _section(table, "solver")]
-    if twice:
-        value = _section(table, "solver")[twice[0]]
-        raise UserError(source, f"solver.{twice[0]}", value, f"give it once, here or as axes.{twice[0]}")
-    worn = _section(table, "scene").get("worn")
-    if worn is not None:
-        sections["scene"] = {**_section(table, "scene"), "worn": read_worn(worn, source, path.parent)}
-    check_mode_tables(sections, source)
-    check_mission_tables(sections, source)
-    scene_axes = _take_scene_axes(sections, source)
-    blocks = _read_blocks(sections, source)
-    if scene_axes:
-        check_used_axes([axis.name for axis in scene_axes], blocks, source)
-        return _with_variants(sections, scene_axes, source, path, archived)
-    of_blocks = block_studies(
-        sections, blocks, source, lambda tables: check_study(tables, source, path, archived, room=False)
-    )
-    # only what was kept on request takes the place of what a bundled scene builds
-    kept = archived if _section(table, "outputs").get("scene") is True else None
-    sections["scene"] = check_scene(_section(table, "scene"), source, path, archived, kept)
-    follow = take_followed(sections, source)
-    moved = _move_solver_axes(sections)
-    given = {"source": source, "folder": path.parent, "archived": archived, "follow": follow}
-    if blocks:
-        given |= {"mission": blocks, "block_studies": of_blocks}
+def _study_path(argument: str) -> Path:
+    path = Path(argument)
     try:
-        filled = with_idle_keys_of_missions(with_idle_keys(sections))
-        study = check_table(Study, {**filled, **given}, source, "")
-        if blocks:
-            same = {"block_studies": tuple(each.model_copy(update={"outputs": study.outputs}) for each in of_blocks)}
-            study = study.model_copy(update=same)
-        if room:
-            study = with_room_of_all(study) if blocks else with_room_for_wear(study)
-        check_scatter(study)
-        return study
-    except UserError as error:
-        if error.key in moved:
-            raise UserError(error.place, moved[error.key], error.value, error.remedy) from None
-        raise
+        if path.is_dir():
+            raise UserError(argument, "the study", None, "give a TOML file: this is a folder")
+        if path.is_file():
+            return path
+    except OSError as error:
+        raise UserError(argument, "the study", None, f"give a file that can be read: {error.strerror}") from None
+    if path.suffix == ".toml" or "/" in argument or "\\" in argument:
+        raise UserError(argument, "the study", None, "there is no such file: give a TOML file or a bundled study")
+    if argument not in bundled_studies():
+        names = ", ".join(bundled_studies())
+        raise UserError(argument, "the study", None, f"there is none of this name: give a TOML file or one of {names}")
+    return Path(str(resources.files("studies").joinpath(f"{argument}.toml")))
 
 
-def _read_blocks(sections: Table, source: str) -> tuple[MissionBlock, ...]:
-    """The blocks of a study of missions; none of another study."""
-    if not asks_for_missions(sections):
-        return ()
-    with scene_errors(source, None):
-        kind = parameters_of(_section(sections, "scene").get("model"))
-    blocks = read_blocks(sections["mission"], sections, kind, AxesSection, source)
-    check_used_axes([name for name in OWN_AXES if name in _section(sections, "axes")], blocks, source)
-    return blocks
+def _dict(table: Mapping[str, object], name: str) -> dict[str, Any]:
+    section = table.get(name, {})
+    return section if isinstance(section, dict) else {}
 
 
-def _take_scene_axes(sections: Table, source: str) -> tuple[SceneAxis, ...]:
-    """Axes of the study that are keys of [scene] or [wear]."""
-    name = "cycle" if asks_for_modes(sections) else WORN_AXIS
-    of_worn = worn_axis(_section(_section(sections, "scene"), "worn"), name)
-    if all(name in AxesSection.model_fields for name in _section(sections, "axes")):
-        return of_worn
-    with scene_errors(source, None):
-        kind = parameters_of(_section(sections, "scene").get("model"))
-    return (*take_scene_axes(sections, tuple(AxesSection.model_fields), kind, WearSection, source), *of_worn)
-
-
-def _with_variants(
-    sections: Table, scene_axes: Sequence[SceneAxis], source: str, path: Path, archived: Archived | None
-) -> Study:
-    """A study with axes that are keys of [scene] or [wear]."""
-    with keys_as_given(scene_axes):
-        variants = [check_study(tables, source, path, archived) for tables in combinations(sections, scene_axes)]
-    study = variants[0].model_copy(update={"scene_axes": as_checked(scene_axes, variants), "variants": tuple(variants)})
-    try:
-        check_axes(study)
-    except WrongValueError as error:
-        raise UserError(source, error.key or "axes", error.value, error.remedy) from None
-    check_scatter(study)
+def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
+    """The study in a table as TOML has it, every default filled in. Raises UserError with all that is wrong."""
+    found = Mistakes(origin.source)
+    tables = _known_tables(table, found)
+    take_unused(tables, found)
+    _take_worn(tables, origin, found)
+    moved = _move_solver_axes(tables, found)
+    axes, blocks = _axes_and_blocks(tables, origin, found)
+    parts, renamed = [], {**moved, **keys_below_axes(axes)}
+    for number, part in enumerate(combinations(tables, axes) if axes else [tables]):
+        with found.collecting(renamed):
+            parts.append(_check_part(part, origin, blocks, found))
+        if number - len(parts) > _MOST_WRONG_PARTS:
+            break
+    found.raise_any(table)
+    study = parts[0]
+    if axes:
+        study = study.model_copy(update={"scene_axes": as_checked(axes, parts), "variants": tuple(parts)})
+        for wrong in (*size_of_result(study), *wrong_scatter(study)):
+            found.add(*wrong)
+        found.raise_any()
     return study
+
+
+def _known_tables(table: Mapping[str, object], found: Mistakes) -> Tables:
+    """The tables of a study file, those that may be missing as empty ones; copies, in which keys may be changed."""
+    tables: Tables = {name: {} for name in _TABLES if name not in _ON_REQUEST}
+    needed = ["study", "scene", "axes"] if "mission" not in table else ["study", "scene"]
+    for name, section in table.items():
+        if name not in _TABLES:
+            meant = nearest_name(name, _TABLES)
+            found.add(name, section, f"unknown table, give {meant}")
+            needed = [each for each in needed if each != meant]
+        elif name == "mission":
+            tables[name] = section
+        elif not isinstance(section, dict):
+            found.add(name, section, f"give a table [{name}] with keys")
+        else:
+            tables[name] = flat_table(section) if name == "scatter" else dict(section)
+    for name in needed:
+        if name not in table:
+            found.add(name, None, f"missing: give a table [{name}]")
+    return tables
+
+
+def _take_worn(tables: Tables, origin: Origin, found: Mistakes) -> None:
+    """Reads the depths of a worn joint into its table."""
+    worn = tables["scene"].pop("worn", None)
+    if worn is None:
+        return
+    with found.collecting():
+        tables["scene"]["worn"] = read_worn(worn, origin.source, origin.path.parent)
+        if kind_of(tables) is MODES and not tables["scene"]["worn"]["cycle"]:
+            remedy = "missing: give the cycle count of each depth, which is the coordinate cycle of the modes"
+            found.add("scene.worn.cycle", None, remedy)
+
+
+def _move_solver_axes(tables: Tables, found: Mistakes) -> dict[str, str]:
+    """Makes axes of the solver keys that hold several values; a list of one value is that value.
+
+    Returns for each of these axes the key that it was given as.
+    """
+    solver, axes, moved = tables["solver"], tables["axes"], {}
+    for key in SOLVER_AXES:
+        value = solver.get(key)
+        if key in solver and key in axes:
+            found.add(f"solver.{key}", solver.pop(key), f"give it once, here or as axes.{key}")
+        elif isinstance(value, list) and len(value) == 1:
+            solver[key] = value[0]
+        elif isinstance(value, list | dict):
+            axes[key] = solver.pop(key)
+            moved[f"axes.{key}"] = f"solver.{key}"
+    return moved
+
+
+def _axes_and_blocks(
+    tables: Tables, origin: Origin, found: Mistakes
+) -> tuple[tuple[SceneAxis, ...], tuple[MissionBlock, ...]]:
+    """Axes that are keys of [scene] or [wear], taken out of the tables, and the blocks of a study of missions."""
+    axes: tuple[SceneAxis, ...] = ()
+    blocks: tuple[MissionBlock, ...] = ()
+    try:
+        kind = parameters_of(tables["scene"].get("model"), origin.source)
+    except UserError:
+        # said where the scene is checked, and nobody knows its keys
+        for name in tables["axes"].keys() - AxesSection.model_fields.keys():
+            del tables["axes"][name]
+        return axes, blocks
+    own = [name for name in tables["axes"] if name in OWN_AXES]
+    axes = take_scene_axes(tables, kind, WearSection, found)
+    if "mission" in tables:
+        blocks = read_blocks(tables["mission"], tables["axes"], kind, found)
+        check_used_axes([*own, *(axis.name for axis in axes)], blocks, found)
+    name = "cycle" if kind_of(tables) is MODES else WORN_AXIS
+    return (*axes, *worn_axis(tables["scene"].get("worn", {}), name)), blocks
+
+
+def _check_part(
+    tables: Tables, origin: Origin, blocks: tuple[MissionBlock, ...], before: Mistakes, *, room: bool = True
+) -> Study:
+    """A study without axes that are keys of [scene] or [wear].
+
+    before: mistakes because of which the study is not complete. room: whether scenes get room for what wears. Raises
+    UserError.
+    """
+    found, tables = Mistakes(origin.source), dict(tables)
+    parts: dict[str, Any] = {"source": origin.source, "folder": origin.path.parent, "archived": origin.archived}
+    if "scene" not in before:
+        with found.collecting():
+            parts["scene"] = check_scene(tables["scene"], origin)
+    if "mission" in tables and (of_blocks := _block_studies(tables, blocks, origin, before, found)):
+        parts |= {"mission": blocks, "block_studies": of_blocks}
+    parts["follow"] = _take_followed(tables, found)
+    filled = with_idle_values(tables)
+    for name, kind in SECTIONS.items():
+        if name in filled and name not in before:
+            others = _keys_of_axes(tables, origin) if name == "axes" else ()
+            with found.collecting():
+                parts[name] = check_table(kind, filled[name], origin.source, name, others)
+    if "outputs" in parts:
+        parts["outputs"] = _with_usual_variables(parts, tables)
+    study = Study.model_construct(**parts)
+    wrong = [name for name in filled if name not in parts]
+    for name in wrong:
+        # a rule that asks for it is left out
+        vars(study).pop(name, None)
+    check_rules(study, found, complete=not wrong)
+    found.raise_any()
+    if before:
+        return study
+    if "mission" in tables:
+        outputs = {"outputs": study.outputs}
+        same = tuple(each.model_copy(update=outputs) for each in study.block_studies)
+        study = study.model_copy(update={"block_studies": same})
+    if room:
+        study = with_room_of_all(study) if study.mission else with_room_for_wear(study)
+    check_draws(study)
+    return study
+
+
+def _block_studies(
+    tables: Tables, blocks: Sequence[MissionBlock], origin: Origin, before: Mistakes, found: Mistakes
+) -> tuple[Study, ...]:
+    """For each block a study of this block alone, with its scene and its axes, without room for wear.
+
+    None at all where a parameter of a block is wrong.
+    """
+    studies: list[Study] = []
+    for block in blocks:
+        own = {name: getattr(block, name) for name in OWN_AXES if isinstance(getattr(block, name), float)}
+        alone = {name: table for name, table in tables.items() if name != "mission"}
+        alone["scene"] = {**tables["scene"], **block.parameters}
+        alone["axes"] = {"frequency": IDLE_FREQUENCY, **tables["axes"], **own}
+        alone["slow_time"] = {}
+        alone["outputs"] = {key: value for key, value in tables["outputs"].items() if key == "scene"}
+        renamed = {f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}
+        with found.collecting(renamed):
+            study = _check_part(alone, origin, (), before, room=False)
+            if block.engine_order is not None:
+                frequency = engine_frequency(block, study.scene.parameters, origin.source)
+                study = study.model_copy(update={"axes": study.axes.model_copy(update={"frequency": (frequency,)})})
+            studies.append(study)
+    return tuple(studies) if len(studies) == len(blocks) else ()
+
+
+def _take_followed(tables: Tables, found: Mistakes) -> FollowedFrequency | None:
+    """What the frequency follows, None where it is given; the axis then gets the middle of the range."""
+    given, loading = tables["axes"].get("frequency"), tables.get("loading")
+    words = [each for each in listed(given) if isinstance(each, str)]
+    if not words and loading is not None:
+        remedy = 'leave it out, or give axes.frequency = "resonance" or "peak", which is followed in this range'
+        found.add("loading", tables.pop("loading"), remedy)
+    if not words or words[0] not in FOLLOWED:
+        return None
+    if len(words) > 1:
+        found.add("axes.frequency", given, f'give "{words[0]}" alone, and another study for the other')
+    elif given not in (words[0], words):
+        found.add("axes.frequency", given, f'give "{words[0]}" alone: every point has the frequency that it finds')
+    tables["axes"] = {**tables["axes"], "frequency": IDLE_FREQUENCY}
+    tables.setdefault("loading", {})
+    try:
+        low, high = LoadingSection.model_validate(tables["loading"]).between
+    except ValidationError:
+        # said with the other tables
+        return None
+    tables["axes"]["frequency"] = 0.5 * low + 0.5 * high
+    return FollowedFrequency(words[0], low, high)
+
+
+def _keys_of_axes(tables: Tables, origin: Origin) -> tuple[str, ...]:
+    """Keys of [scene] and [wear] that may stand under [axes]."""
+    try:
+        return (*parameters_of(tables["scene"].get("model"), origin.source).model_fields, *WearSection.AXES)
+    except UserError:
+        return ()
+
+
+def _with_usual_variables(parts: Mapping[str, Any], tables: Tables) -> OutputsSection:
+    """[outputs] with variables in their order, the usual ones of such a study for the word that stands for them."""
+    outputs: OutputsSection = parts["outputs"]
+    names, kind = set(outputs.variables), kind_of(tables)
+    if DEFAULT in names:
+        names |= {*(kind.usual if tables.get("scatter") is None else kind.of_samples)}
+        names |= {*(FOLLOWED_FREQUENCY if parts["follow"] is not None else ())}
+        names |= {"mesh"} & {*(parts["scene"].offers if "scene" in parts else ())}
+    return outputs.model_copy(update={"variables": tuple(name for name in VARIABLES if name in names)})
 
 
 def format_study(study: Study) -> str:
     """The effective study, every default filled in, as TOML; read again it is the same study."""
-    sections = study.model_dump(mode="json")
-    scene = sections["scene"]
+    tables = study.model_dump(mode="json")
+    scene, axes = tables["scene"], tables["axes"]
     chosen = _chosen_by_scenes(study)
     kept = {key: value for key, value in scene["parameters"].items() if key not in chosen}
-    sections["scene"] = {"model": scene["model"], **kept, "worn": _worn_states(study)}
+    tables["scene"] = {"model": scene["model"], **kept, "worn": _worn_states(study)}
     if study.follow is not None:
-        sections["axes"]["frequency"] = study.follow.of
+        axes["frequency"] = study.follow.of
     for axis in study.scene_axes:
         if axis.key == ("worn",):
             continue
-        given, axes = sections[axis.table], sections["axes"]
+        given, place = tables[axis.table], axes
         for name in axis.key[:-1]:
-            given, axes = only_table(given[name]), axes.setdefault(name, {})
+            given, place = only_table(given[name]), place.setdefault(name, {})
         del given[axis.key[-1]]
-        axes[axis.key[-1]] = list(axis.values)
+        place[axis.key[-1]] = list(axis.values)
     for key in SOLVER_AXES:
-        if sections["axes"][key] is not None:
-            del sections["solver"][key]
-    lines = []
-    for name, section in without_idle_keys_of_missions(without_idle_keys(sections), study).items():
-        if not section:
-            continue
-        for table in section if isinstance(section, list) else [section]:
-            lines.append(f"[[{name}]]" if table is not section else f"[{name}]")
-            lines.extend(
-                f"{_toml_key(key)} = {_toml_value(value)}" for key, value in table.items() if value is not None
-            )
-    return "\n".join(lines) + "\n"
+        if axes[key] is not None:
+            del tables["solver"][key]
+    if study.mission:
+        tables["mission"] = [block.as_table() for block in study.mission]
+    return format_toml(without_idle_values(tables, study.kind, study.idle_axes))
 
 
 def _chosen_by_scenes(study: Study) -> set[str]:
@@ -270,123 +379,3 @@ def _worn_states(study: Study) -> dict[str, object] | None:
     # the axis of worn states is the last one
     depths = [variant.scene.worn.depth[0] for variant in study.variants[: len(counts)] if variant.scene.worn]
     return {"cycle": counts, "depth": [list(each) for each in depths], "result": worn.result}
-
-
-def _study_path(argument: str) -> Path:
-    path = Path(argument)
-    try:
-        if path.is_dir():
-            raise UserError(argument, "the study", None, "give a TOML file: this is a folder")
-        if path.is_file():
-            return path
-    except OSError as error:
-        raise UserError(argument, "the study", None, f"give a file that can be read: {error.strerror}") from None
-    if path.suffix == ".toml" or "/" in argument or "\\" in argument:
-        raise UserError(argument, "the study", None, "there is no such file: give a TOML file or a bundled study")
-    if argument not in bundled_studies():
-        names = ", ".join(bundled_studies())
-        raise UserError(argument, "the study", None, f"there is none of this name: give a TOML file or one of {names}")
-    return Path(str(resources.files("studies").joinpath(f"{argument}.toml")))
-
-
-def _override(table: Table, text: str) -> None:
-    key, equals, value_text = text.partition("=")
-    if not equals or not all(key.strip().split(".")):
-        raise UserError("command line", "--set", text, "give KEY=VALUE with the dotted name of a key")
-    value = _override_value(key.strip(), value_text.strip())
-    _set_key(table, key.strip(), value, "command line", f"--set {key.strip()}")
-
-
-def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> None:
-    """Sets the key of a dotted name. source, shown: where the user gave it, and how it is called there."""
-    names = key.split(".")
-    place: Table = table
-    if names[0] == "mission" and len(names) > 1 and isinstance(table.get("mission"), list):
-        place, names = _block_called(table["mission"], names, value, source, shown), names[2:]
-    for name in names[:-1]:
-        inner = place.setdefault(name, {})
-        if not isinstance(inner, dict):
-            raise UserError(source, shown, value, f"{name} holds a value and no keys: give all of it")
-        place = inner
-    place[names[-1]] = value
-    # the last place where a key is given counts, here or under [axes]
-    of_solver = names[-1] in AxesSection.model_fields
-    tables = ("solver",) if of_solver else ("scene", "wear")
-    others = {"axes": tables, **dict.fromkeys(tables, ("axes",))}
-    if len(names) == 2 and not is_table(place[names[1]]):
-        for other in others.get(names[0], ()):
-            if not is_table(_section(table, other).get(names[1])):
-                _section(table, other).pop(names[1], None)
-
-
-def _block_called(blocks: Any, names: Sequence[str], value: object, source: str, shown: str) -> Table:
-    """The block of a mission that a dotted name begins with, by its name or its number from 0 on."""
-    if len(names) < 3:
-        raise UserError(source, shown, value, "give mission.NAME.KEY with the name of a block")
-    for number, block in enumerate(blocks):
-        if isinstance(block, dict) and names[1] in (block.get("name"), str(number)):
-            return block
-    called = [str(block.get("name")) for block in blocks if isinstance(block, dict)]
-    raise UserError(source, shown, value, f"there is no such block: give one of {', '.join(called)}")
-
-
-def _override_value(key: str, text: str) -> object:
-    try:
-        parsed = read_toml(f"value = {text}".encode(), "")
-    except UserError:
-        if _BARE_WORD.fullmatch(text):
-            return text
-        remedy = "give a TOML value or a bare word"
-        if text[:1] in ("[", "{"):
-            remedy = f'give a list or table of TOML: words in it stand in quotes, as --set \'{key}=["up", "down"]\''
-        raise UserError("command line", f"--set {key}", text, remedy) from None
-    if set(parsed) != {"value"}:
-        raise UserError("command line", f"--set {key}", text, "give one TOML value")
-    return parsed["value"]
-
-
-def _plain(value: object) -> object:
-    """A value as TOML has it: numpy's numbers and arrays, tuples and paths are none of its types."""
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
-    return str(value) if isinstance(value, Path) else value
-
-
-def _section(table: Mapping[str, object], name: str) -> Table:
-    section = table.get(name, {})
-    return section if isinstance(section, dict) else {}
-
-
-def _move_solver_axes(sections: Table) -> dict[str, str]:
-    """Makes axes of the solver keys that hold several values; a list of one value is that value.
-
-    Returns for each of these axes the key that it was given as.
-    """
-    solver, axes, moved = dict(_section(sections, "solver")), dict(_section(sections, "axes")), {}
-    for key in SOLVER_AXES:
-        value = solver.get(key)
-        if isinstance(value, list) and len(value) == 1:
-            solver[key] = value[0]
-        elif isinstance(value, list | dict):
-            axes[key] = solver.pop(key)
-            moved[f"axes.{key}"] = f"solver.{key}"
-    if "solver" in sections:
-        sections["solver"], sections["axes"] = solver, axes
-    return moved
-
-
-def _toml_key(key: str) -> str:
-    """A key, in quotes where it is no bare one: labels of surfaces are any text."""
-    return key if _BARE_KEY.fullmatch(key) else json.dumps(key, ensure_ascii=False)
-
-
-def _toml_value(value: object) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_toml_key(key)} = {_toml_value(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
-    return "inf" if value == math.inf else json.dumps(value, ensure_ascii=False)

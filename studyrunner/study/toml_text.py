@@ -1,12 +1,21 @@
-"""Text of a study file -> table; what is wrong in one sentence."""
+"""Text of a study file -> table, with what is wrong in one sentence, and tables -> text.
+
+By hand: `tomli_w` gives each value of a list a line of its own, and axes have up to 100 000 values.
+"""
 
 from __future__ import annotations
 
+import json
+import math
+import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from studyrunner.user_error import UserError
 
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _LARGEST = 5 * 2**19  # bytes: an axis of 100 000 values
 
 
@@ -41,3 +50,26 @@ def read_toml(content: bytes, source: str) -> dict[str, object]:
     except ValueError as error:
         # whole numbers of thousands of digits, dates that no calendar has
         raise wrong(f"give valid TOML: {error}") from None
+
+
+def format_toml(tables: Mapping[str, Any]) -> str:
+    """Tables, or lists of tables, as TOML, without empty tables and without keys that are None."""
+    lines = []
+    for name, section in tables.items():
+        for table in section if isinstance(section, list | tuple) else [section] if section else []:
+            lines.append(f"[[{name}]]" if table is not section else f"[{name}]")
+            lines += [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None]
+    return "\n".join(lines) + "\n"
+
+
+def _key(key: str) -> str:
+    """A key, in quotes where it is no bare one: labels of surfaces are any text."""
+    return key if _BARE_KEY.fullmatch(key) else json.dumps(key, ensure_ascii=False)
+
+
+def _value(value: object) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    return "inf" if value == math.inf else json.dumps(value, ensure_ascii=False)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field, TypeAdapter, model_validator
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field
 
-from studyrunner.study.checked_table import check_table
+from studyrunner.study.mistakes import Mistakes, check_table
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.study_of_result import check_result_file
-from studyrunner.study.values import NotNegative, Section, Text, read
 from studyrunner.system.progress import count as counted
 from studyrunner.user_error import UserError, Verbatim, WrongValueError
+from studyrunner.values import NotNegative, Section, Wrong, listed, once
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,27 +23,19 @@ if TYPE_CHECKING:
 AXIS = "worn_cycle"
 """Name of the axis of several worn states."""
 
-_DEPTH = TypeAdapter(NotNegative)
-_OWN_KEYS = ("result", "cycle", "depth")
+
+def _listed(value: object) -> object:
+    return tuple(listed(value))
 
 
-def _read_depths(value: object) -> tuple[tuple[float, ...], ...]:
+def _states(value: object) -> object:
     """Depths of all pairs, one number or one for each, of one state or of a list of states."""
-    states = value if isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple) else [value]
-    found = tuple(
-        tuple(read(_DEPTH, depth) for depth in (state if isinstance(state, list | tuple) else [state]))
-        for state in states
-    )
-    if not all(found):
-        raise WrongValueError(value, "give a depth in m, or a list with a depth of each pair")
-    return found
+    several = isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple)
+    return tuple(_listed(state) for state in value) if several else (_listed(value),)  # type: ignore[attr-defined]
 
 
-def _read_counts(value: object) -> tuple[float, ...]:
-    counts = tuple(read(_DEPTH, count) for count in (value if isinstance(value, list | tuple) else [value]))
-    if len(set(counts)) < len(counts) or not counts:
-        raise WrongValueError(value, "give cycle counts, each once")
-    return counts
+_Depths = Annotated[tuple[NotNegative, ...], Field(min_length=1, strict=False)]
+_Counts = Annotated[tuple[NotNegative, ...], BeforeValidator(_listed), AfterValidator(once)]
 
 
 class Worn(Section):
@@ -53,21 +45,18 @@ class Worn(Section):
     the depths are given. result: file that the depths are from.
     """
 
-    depth: Annotated[tuple[tuple[float, ...], ...], BeforeValidator(_read_depths)] = Field(
+    depth: Annotated[tuple[_Depths, ...], BeforeValidator(_states)] = Field(
         description="m, of each pair or of all pairs"
     )
-    cycle: Annotated[tuple[float, ...], BeforeValidator(_read_counts)] = Field(
-        (), description="cycle counts of the result"
-    )
-    result: Text = Field("", description="result file")
+    cycle: _Counts = Field((), description="cycle counts of the result")
+    result: str = Field("", description="result file")
 
-    @model_validator(mode="after")
-    def _check_states(self) -> Worn:
+    def rules(self) -> Iterator[Wrong]:
+        """Each state has a cycle count, or none where there is one state."""
         if len(self.depth) != max(1, len(self.cycle)):
             found = Verbatim(f"{len(self.depth)} states with {len(self.cycle)} cycle counts")
             remedy = "give one cycle count in scene.worn.cycle for each state, or one state without a count"
-            raise WrongValueError(found, remedy, "scene.worn.depth")
-        return self
+            yield Wrong("depth", found, remedy)
 
     def depths(self, n_contact: int) -> tuple[float, ...]:
         """Depths (n_contact,), m, of the only state. Raises WrongValueError where there are others than pairs."""
@@ -76,6 +65,15 @@ class Worn(Section):
             remedy = f"give one depth, or one for each pair: the scene has {counted(n_contact, 'contact pair')}"
             raise WrongValueError(Verbatim(f"there are {counted(len(depth), 'depth')}"), remedy)
         return depth * n_contact if len(depth) == 1 else depth
+
+
+class _OfResult(Section):
+    """The table `worn` with a result file; other keys select a point of the result by values of its axes."""
+
+    model_config = ConfigDict(extra="allow")
+
+    result: str = Field(description="path of a result file; or depth in place of a result")
+    cycle: Annotated[_Counts, Field(min_length=1)] = Field(description="cycle counts of the result")
 
 
 def read_worn(table: object, source: str, folder: Path) -> dict[str, Any]:
@@ -95,58 +93,51 @@ def read_worn(table: object, source: str, folder: Path) -> dict[str, Any]:
         remedy = 'give {result = "OUT.nc", cycle = [...]} with the axes of a point, or {depth = ...}'
         raise UserError(source, "scene.worn", table, remedy)
     if "depth" in table:
-        given = check_table(Worn, table, source, "scene.worn")
-        return {"depth": [list(each) for each in given.depth], "cycle": list(given.cycle), "result": given.result}
-    for key in ("result", "cycle"):
-        if key not in table:
-            raise UserError(source, f"scene.worn.{key}", None, "missing: give it, or depth in place of a result")
-    name = table["result"]
-    if not isinstance(name, str):
-        raise UserError(source, "scene.worn.result", name, "give the path of a result file, in quotes")
-    path = folder / name
+        worn = check_table(Worn, table, source, "scene.worn")
+        return {"depth": [list(each) for each in worn.depth], "cycle": list(worn.cycle), "result": worn.result}
+    given = check_table(_OfResult, table, source, "scene.worn")
+    path = folder / given.result
     if not path.exists():
         remedy = "there is no such file: give a result file of run-study, relative to the study file"
-        raise UserError(source, "scene.worn.result", name, remedy)
+        raise UserError(source, "scene.worn.result", given.result, remedy)
     check_result_file(path, str(path))
     try:
-        cycle = _read_counts(table["cycle"])
-    except WrongValueError as error:
-        raise UserError(source, "scene.worn.cycle", error.value, error.remedy) from None
-    point = {key: value for key, value in table.items() if key not in _OWN_KEYS}
-    try:
         with xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False) as dataset:
-            depth = _depths_in(dataset, point, cycle, source)
+            depth = _depths_in(dataset, given.model_extra or {}, given.cycle, source)
     except (OSError, RuntimeError, ValueError, TypeError, KeyError, IndexError):
         # what the libraries raise where a file is no result, or damaged
         remedy = "give a result file of run-study that is whole"
         raise UserError(str(path), "the file", Verbatim("damaged"), remedy) from None
-    return {"depth": depth.tolist(), "cycle": list(cycle), "result": name}
+    return {"depth": depth.tolist(), "cycle": list(given.cycle), "result": given.result}
 
 
 def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence[float], source: str) -> Any:
     """Depths (n_states, n_contact), m, of a point of a result at cycle counts."""
     if "wear_depth" not in dataset:
         raise UserError(source, "scene.worn.result", None, "give a result with wear_depth among its variables")
-    depths = dataset["wear_depth"]
+    depths, found = dataset["wear_depth"], Mistakes(source)
     axes = [str(name) for name in depths.dims[:-2]]
-    for name in point:
-        if name not in axes:
-            remedy = f"unknown key, give result, cycle, depth or an axis of the result: {', '.join(axes)}"
-            raise UserError(source, f"scene.worn.{name}", point[name], remedy)
+    for name in point.keys() - set(axes):
+        remedy = f"unknown key, give result, cycle, depth or an axis of the result: {', '.join(axes)}"
+        found.add(f"scene.worn.{name}", point[name], remedy)
+    places: dict[str, Any] = {}
     for name in axes:
         values = dataset[name].values.tolist()
         if name not in point and len(values) > 1:
             remedy = f"missing: give one of the values {', '.join(map(str, values[:10]))} of the result"
-            raise UserError(source, f"scene.worn.{name}", None, remedy)
-        depths = depths.isel({name: _place(f"scene.worn.{name}", values, point.get(name, values[0]), source)})
-    counts = dataset["cycle"].values.tolist()
-    depths = depths.isel(cycle=[_place("scene.worn.cycle", counts, count, source) for count in cycle])
-    found = np.asarray(depths.values, dtype=np.float64)
-    for count, row in zip(cycle, found, strict=True):
+            found.add(f"scene.worn.{name}", None, remedy)
+        with found.collecting():
+            places[name] = _place(f"scene.worn.{name}", values, point.get(name, values[0]), source)
+    with found.collecting():
+        counts = dataset["cycle"].values.tolist()
+        places["cycle"] = [_place("scene.worn.cycle", counts, count, source) for count in cycle]
+    found.raise_any()
+    chosen = np.asarray(depths.isel(places).values, dtype=np.float64)
+    for count, row in zip(cycle, chosen, strict=True):
         if not np.isfinite(row).all():
             remedy = "give an earlier cycle count: the result does not hold the depths of this one"
             raise UserError(source, "scene.worn.cycle", count, remedy)
-    return found
+    return chosen
 
 
 def _place(key: str, values: Sequence[Any], wanted: Any, source: str) -> int:

@@ -28,11 +28,70 @@ _UNITS = {"1/MPa or mm2/N": 1e-6, "mm3/(N m) or mm3/J": 1e-9}
 """What else wear coefficients are given in, and how much of 1/Pa it is."""
 
 
-def doubts_of_study(study: Study) -> tuple[str, ...]:
-    """Lines on wear coefficients far off, before anything is computed; the one farthest off speaks for all."""
+_LARGEST_FRICTION = 2.0
+"""Coulomb friction coefficients that are not asked about: dry metals in air stay below 1.5."""
+
+_SLOWEST = 1000.0
+"""rpm; rotation speeds below it are asked about: machines whose blades wear turn faster, and 314 rad/s is 3000 rpm."""
+
+_FAR_BELOW = 30.0
+"""Times the frequency of an excitation, below the first resonance, from which on it is asked about."""
+
+
+def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str, ...]:
+    """Lines on values far off, before anything is computed, one for a key: the value farthest off speaks for all.
+
+    facts: of the scene, where it is built.
+    """
+    asked = (_on_wear(study), _on_friction(study), _on_speed(study), _on_low_frequencies(study, facts))
+    return tuple(line for line in asked if line)
+
+
+def _on_friction(study: Study) -> str:
+    largest = max(_numbers(study, "friction_coefficient"), default=0.0)
+    if largest <= _LARGEST_FRICTION:
+        return ""
+    asked = f"is it in percent (then it is {largest / 100.0:.3g})" if largest >= 5.0 else "is it meant"
+    return f"friction_coefficient {largest:.3g} is more than dry metals have, 0.1 to 1.5: {asked}?"
+
+
+def _on_speed(study: Study) -> str:
+    slow = [speed for speed in _numbers(study, "rotation_speed") if 0.0 < speed < _SLOWEST]
+    if not slow:
+        return ""
+    radians, hertz = 30.0 / math.pi * min(slow), 60.0 * min(slow)
+    units = f"in rad/s (then it is {radians:.5g} rpm) or in revolutions per second (then it is {hertz:.5g} rpm)"
+    return f"rotation_speed {min(slow):.4g} rpm is slow: is it {units}?"
+
+
+def _on_low_frequencies(study: Study, facts: SceneFacts | None) -> str:
+    static = None if facts is None else facts.static_response
+    highest = max((max(each.axes.frequency) for each in study.block_studies or (study,)), default=0.0)
+    passed = [block.frequency for block in study.mission if isinstance(block.frequency, dict)]
+    highest = max(highest, *(max(each["start"], each["stop"]) for each in passed)) if passed else highest
+    if study.has_modes or static is None or not _FAR_BELOW * highest < static.frequency < math.inf:
+        return ""
+    ratio = static.frequency / highest
+    kilohertz = 1000.0 * highest
+    meant = _FAR_BELOW * kilohertz > static.frequency and kilohertz < _FAR_BELOW * static.frequency
+    asked = f"is it in kHz (then it is {kilohertz:.4g} Hz)" if meant else "is it meant"
+    text = f"frequency {highest:.4g} Hz, the highest, is 1/{ratio:.0f} of that of the first resonance, near"
+    return f"{text} {static.frequency:.4g} Hz: {asked}?"
+
+
+def _numbers(study: Study, name: str) -> list[float]:
+    """Numbers under a key of [scene], of all variants and blocks."""
+    variants = study.variants or (study,)
+    studies = (*variants, *(block for each in variants for block in each.block_studies))
+    values = [dict(each.scene.parameters).get(name) for each in studies]
+    values += [each for value in values if isinstance(value, dict) for each in value.values()]
+    return [float(value) for value in values if isinstance(value, int | float)]
+
+
+def _on_wear(study: Study) -> str:
     off = [value for value in _coefficients(study) if not _is_plausible(value)]
     if not off:
-        return ()
+        return ""
     worst = max(off, key=lambda value: abs(math.log(value / OF_THE_PAPER)))
     what = "wear_coefficient" if study.wear_law.table is None else "wear_coefficient times wear.factor"
     times, side = (worst / OF_THE_PAPER, "larger") if worst > OF_THE_PAPER else (OF_THE_PAPER / worst, "smaller")
@@ -42,7 +101,7 @@ def doubts_of_study(study: Study) -> tuple[str, ...]:
         for name, factor in _UNITS.items()
         if worst > OF_THE_PAPER and _is_plausible(worst * factor)
     ]
-    return (f"{text}: is it {' or '.join(units)}?" if units else text,)
+    return f"{text}: is it {' or '.join(units)}?" if units else text
 
 
 def wears_too_fast(study: Study) -> bool:
@@ -67,6 +126,7 @@ class Doubts:
 
     def __init__(self, study: Study, facts: SceneFacts) -> None:
         self._study = study
+        self._on_low = _on_low_frequencies(study, facts)
         names = list(study.dimensions)
         self._amplitude = names.index("excitation_amplitude")
         self._static = facts.static_response
@@ -103,9 +163,10 @@ class Doubts:
     def format(self) -> tuple[str, ...]:
         """Lines on loads; none while points are missing or have failed, as these may be those that move."""
         study = self._study
+        low = (self._on_low,) if self._on_low else ()
         if self._n_complete < math.prod(len(values) for values in study.dimensions.values()):
-            return ()
-        return (*self._on_frequencies(), *self._on_amplitudes())
+            return low
+        return (*low, *self._on_frequencies(), *self._on_amplitudes())
 
     def _on_frequencies(self) -> tuple[str, ...]:
         if self._above_static:

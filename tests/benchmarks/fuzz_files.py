@@ -1,10 +1,10 @@
-"""Mutated inputs of six kinds, and what comes of them: no traceback and no hang is wanted.
+"""Mutated inputs of five kinds, and what comes of them: no traceback and no hang is wanted.
 
     python -m tests.benchmarks.fuzz_files [COUNT [SEED [FIRST [KIND ...]]]]
 
-The kinds: `text` a study file and `scene` its scene file under `run-study --plan`, `result` a result file there, `deck`
-a deck under `run-study --check`, `report` a result under `study-report`, `reader` one that is opened and asked whatever
-the accessor answers. Bytes are changed, and in the last two also whole attributes, values, types and dimensions. An
+The kinds: `scene` the scene file of a study under `run-study --plan`, `result` a result file there, `deck` a deck under
+`run-study --check`, `report` a result under `study-report`, `reader` one that is opened and asked whatever the accessor
+answers. Bytes are changed, and in the last two also whole attributes, values, types and dimensions. An
 input is known by its seed, its number and the kinds: COUNT 1 with its number for FIRST has it again. Prints what is
 wrong; status 1 where anything is. Random bytes in an HDF5 file may crash the library, which nothing here prevents:
 these are counted apart.

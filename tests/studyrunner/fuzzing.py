@@ -1,6 +1,6 @@
 """Mutations of valid study, scene, result and deck files, and what the commands make of each, in a copy of a process.
 
-Kinds: "text" a study file, "scene" its scene file, "result" a result file, all under `run-study --plan`; "deck" the
+Kinds: "scene" the scene file of a study, "result" a result file, both under `run-study --plan`; "deck" the
 deck of a finite-element model under `run-study --check`; "report" a result file under `study-report`; "reader" one that
 is opened and asked whatever it can be asked.
 """
@@ -53,12 +53,6 @@ time_limit = 10.0
 variables = ["default", "outcome"]
 loops = [0]
 """
-NASTY = (
-    *("nan", "-inf", "1e308", "-5e-324", "0", "-1", "9" * 400, "0x" + "f" * 300, "1e400", "true", "1979-05-27", "[]"),
-    *("{}", "[[1]]", '""', '"auto"', '"\\u001b[2J"', "'../../x'", "[1, 'a']", "{start = 1, stop = 2, num = 1e9}", "="),
-    *('"default"', "[" * 60 + "]" * 60, "1e9", '"adaptive"', "[nan]", "{start = nan, stop = 2, num = 3}", "\x00", "]"),
-    *('"', "#"),
-)
 NODES = "1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n"
 UPPER = "".join(f"{10 + n},{x},{y},{1 + z}\n" for n, x, y, z in (map(int, row.split(",")) for row in NODES.split()))
 DECK = f"""*NODE
@@ -110,7 +104,6 @@ excitation_amplitude = 1.0
 cycles = 0
 """
 FILES = {
-    "text": "study",
     "scene": "scene.h5",
     "result": "result",
     "deck": "deck.inp",
@@ -147,7 +140,7 @@ def answers(made: Path, seed: int, numbers: range, kinds: tuple[str, ...]) -> li
     """What another process, with a folder of its own, says of the inputs of these numbers."""
     folder = made / f"{numbers.start}"
     folder.mkdir()
-    for name in (*set(FILES.values()), "deck.toml"):
+    for name in (*set(FILES.values()), "study", "deck.toml"):
         shutil.copy(made / name, folder)
     given = [str(folder), str(seed), str(numbers.start), str(numbers.stop), *kinds]
     command = [sys.executable, "-m", __name__, *given]
@@ -155,25 +148,6 @@ def answers(made: Path, seed: int, numbers: range, kinds: tuple[str, ...]) -> li
     done = subprocess.run(command, env=environment, cwd=_ROOT, stdout=subprocess.PIPE, text=True, check=True)
     shutil.rmtree(folder)
     return [Answer(*json.loads(line)) for line in done.stdout.splitlines()]
-
-
-def mutate_text(text: str, chance: random.Random) -> bytes:
-    """A study file with values, lines or bytes changed."""
-    lines = text.splitlines()
-    for _ in range(chance.choice([1, 1, 2, 4])):
-        place = chance.randrange(len(lines))
-        way = chance.randrange(6)
-        if way <= 2 and "=" in lines[place]:
-            lines[place] = lines[place].split("=")[0] + "= " + chance.choice(NASTY)
-        elif way == 3:
-            lines.insert(place, chance.choice(lines))
-        elif way == 4 and len(lines) > 1:
-            del lines[place]
-        else:
-            at = chance.randrange(len(lines[place]) + 1)
-            lines[place] = lines[place][:at] + chance.choice(NASTY) + lines[place][at:]
-    content = "\n".join(lines).encode("utf-8", "surrogatepass")
-    return mutate_bytes(content, chance) if chance.random() < 0.2 else content
 
 
 def mutate_bytes(content: bytes, chance: random.Random) -> bytes:
@@ -201,9 +175,7 @@ def _mutate(kind: str, whole: Mapping[str, bytes], chance: random.Random) -> Non
     for name, content in whole.items():
         Path(name).write_bytes(content)
     mutated = Path(FILES[kind])
-    if kind == "text":
-        mutated.write_bytes(mutate_text(whole["study"].decode(), chance))
-    elif kind == "deck":
+    if kind == "deck":
         mutated.write_bytes(mutate(whole["deck.inp"], chance.randrange(2**31)))
     # what stands in a result is taken for what it was; under run-study only its study and scene are read
     elif kind not in ("report", "reader") or chance.random() < 0.4:
@@ -272,8 +244,10 @@ def _answer(kind: str, name: str) -> Answer:
             status = 1
             traceback.print_exc()
     lines = said.getvalue().splitlines()
-    right = (status == 2 and len(lines) == 1 and lines[0].isprintable()) or (status == 0 and not lines)
-    right = right and len("".join(lines)) <= 2000 and "\x1b" not in printed.getvalue()
+    right = (
+        bool(lines) and all(line.isprintable() and len(line) <= 2000 for line in lines) if status == 2 else not lines
+    )
+    right = right and status in (0, 2) and "\x1b" not in printed.getvalue()
     return Answer(f"{kind} {status}", "" if right else f"{name}: status {status}: {said.getvalue()[-1500:]}")
 
 

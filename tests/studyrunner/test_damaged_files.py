@@ -102,26 +102,6 @@ def test_a_scene_that_is_none(change, sentence, folder, refused):
     assert sentence in line
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        np.random.default_rng(0).bytes(100_000),
-        b"#" * 3_000_000,
-        b"a = " + b"[" * 100_000,
-        STUDY.encode() + b'"\\u001b]0;x\\u0007" = 1\n',
-        STUDY.replace("[150.0]", "1e999999999").encode(),
-        STUDY.replace("scene.h5", "./study").encode(),
-        STUDY.replace(
-            "[150.0]", "{start = 1, stop = 2, num = 1000000}\nstep = {start = 1, stop = 2, num = 9}"
-        ).encode(),
-    ],
-    ids=["random bytes", "too long", "nested", "escape sequence", "huge exponent", "scene that is none", "many points"],
-)
-def test_a_study_that_is_none(text, folder, refused):
-    (folder / "study").write_bytes(text)
-    refused(["study", "--plan"])
-
-
 def test_names_of_files_do_not_reach_the_terminal_raw(folder, refused, capsys):
     name = "\x1b[2J\udcff.toml"
     Path(name).write_text("[study", encoding="utf-8")

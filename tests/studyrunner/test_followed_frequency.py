@@ -11,7 +11,6 @@ from studyrunner.report.drawing import Drawing
 from studyrunner.report.figures.excitation import draw_excitation
 from studyrunner.report.reading.result import Result
 from studyrunner.study.study_file import format_study, read_study
-from studyrunner.user_error import UserError
 from tests.studyrunner.test_scene_axes import arguments, compute
 
 pytestmark = pytest.mark.usefixtures("folder")
@@ -27,7 +26,6 @@ SLIDER = {
     "solver.harmonics": 3,
     "solver.samples": 64,
 }
-SAMPLES = {"scatter.frequency": {"scatter.samples": 3}}
 
 
 def words_of(**more):
@@ -117,30 +115,3 @@ def test_the_effective_study_is_the_same_study():
     again = read_study("again.toml")
     assert again.follow == study.follow
     assert format_study(again) == text
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "said"),
-    [
-        ("axes.frequency", "resonnance", '"resonnance": give a number in Hz, or "resonance" or "peak"'),
-        ("axes.frequency", ["resonance", 200.0], 'give "resonance" alone'),
-        ("axes.frequency", ["resonance", "peak"], "another study for the other"),
-        ("axes.frequency", 200.0, 'loading = {"between": [180.0, 230.0]}: leave it out'),
-        ("loading.between", [230.0, 180.0], "loading.between = [230.0, 180.0]: give the lowest and the highest"),
-        ("loading.between", [180.0], "loading.between"),
-        ("loading.between", 180.0, "loading.between = 180.0: give the lowest and the highest"),
-        ("loading.betwen", [1.0, 2.0], "loading.betwen = [1.0, 2.0]: unknown key, give between"),
-        ("axes.sweep", "ramp", 'axes.sweep = "ramp": give "up" or "down"'),
-        ("scatter.frequency", {"normal": {"std": 1.0}}, "each sample finds its own frequency"),
-        ("outputs.variables", ["exact"], "leave it out: it is of given frequencies"),
-    ],
-)
-def test_wrong_input_is_one_sentence(key, value, said):
-    with pytest.raises(UserError) as refused:
-        read_study("sdof_slider", {**SLIDER, key: value, **SAMPLES.get(key, {})})
-    assert said.replace('{"between": [180.0, 230.0]}', "{between = [180.0, 230.0]}") in str(refused.value)
-
-
-def test_a_word_without_a_range_names_what_is_missing():
-    with pytest.raises(UserError, match=r"loading\.between: missing"):
-        read_study("sdof_slider", {"axes.frequency": "peak"})

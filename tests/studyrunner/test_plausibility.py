@@ -10,7 +10,7 @@ import pytest
 from solver import build_model
 from studyrunner.cli import main
 from studyrunner.scene.static_response import StaticResponse, static_response
-from studyrunner.study.study_file import read_study
+from studyrunner.study.study_file import bundled_studies, read_study
 from studyrunner.summary.plausibility import Doubts, doubts_of_study
 from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.results_of import results_of, told
@@ -34,9 +34,28 @@ def test_one_over_megapascal_is_asked_about_by_name():
     assert "mm3/J (then it is 4.23e-14 1/Pa)" in on_wear(4.23e-5)[0]
 
 
-@pytest.mark.parametrize("name", ["dovetail", "work_precision"])
+@pytest.mark.parametrize("name", [name for name in bundled_studies() if name != "extremes"])
 def test_bundled_studies_are_plausible(name):
-    assert doubts_of_study(read_study(name)) == ()
+    facts = replace(FACTS, static_response=StaticResponse(np.array([1e-5]), 225.0 if "dove" in name else 0.25))
+    assert doubts_of_study(read_study(name), facts) == ()
+
+
+@pytest.mark.parametrize(
+    ("overrides", "start", "asked"),
+    [
+        ({"scene.friction_coefficient": 50}, "friction_coefficient 50 ", "in percent (then it is 0.5)"),
+        ({"axes.friction_coefficient": [0.5, 2.5]}, "friction_coefficient 2.5 ", "is it meant"),
+        ({"scene.rotation_speed": 314}, "rotation_speed 314 rpm ", "in rad/s (then it is 2998.5 rpm)"),
+        ({"axes.frequency": [0.2, 0.21]}, "frequency 0.21 Hz", "in kHz (then it is 210 Hz)"),
+        ({"axes.frequency": 1e-4}, "frequency 0.0001 Hz", "is it meant"),
+    ],
+)
+def test_other_units_are_asked_about_once(overrides, start, asked):
+    facts = replace(FACTS, static_response=StaticResponse(np.array([1e-5]), frequency=212.0))
+    (line,) = doubts_of_study(read_study("dovetail", overrides), facts)
+    assert line.startswith(start)
+    assert asked in line
+    assert line.count("?") == 1
 
 
 # --- frequencies and amplitudes ---

@@ -17,7 +17,7 @@ from studyrunner.statistics.study_statistics import worn_volume_statistics
 from studyrunner.study.realisation import draw_inputs, realise
 from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.fakes import FACTS
-from tests.studyrunner.test_scene_axes import CHEAP, compute, refused, same_values
+from tests.studyrunner.test_scene_axes import CHEAP, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
 FRICTION = "scatter.friction_coefficient={normal={std=0.03}}"
@@ -148,26 +148,6 @@ def test_gaps_of_samples_with_scenes_of_their_own_are_drawn_once(monkeypatch):
     assert len(calls) == 2
     assert changes[0] != changes[1]  # columns of the design are in the order of the names, those of pairs last
     assert len({one for change in changes for one in change}) == 32
-
-
-@pytest.mark.parametrize(
-    ("overrides", "expected"),
-    [
-        (["scatter.fricton_coefficient={normal={std=0.1}}"], "unknown input, give friction_coefficient"),
-        (["scatter.step={normal={std=0.1}}"], "scatter.step: unknown input"),
-        (["scatter.threshold={normal={mean=1, std=0.1}}"], "scatter.threshold: unknown input"),
-        (["wear.law=threshold", "wear.threshold=1", "scatter.threshold={normal={std=1}}"], "which threshold cannot be"),
-        (["scatter.mass={normal={std=1}}"], "scatter.mass = -1.76"),
-        (["axes.frequency=[1, 2]", "scatter.frequency={normal={mean=1, std=0.1}}"], "give one value of axes.frequency"),
-        (["scatter.gap={normal={std=1e-6}, of='each pair', correlation_length=1}"], "scatter.gap.correlation_length"),
-        (["scatter.area={normal={std=1e-6}}", "outputs.variables=['exact']"], "the closed form knows nothing of the"),
-        (["scatter.stiffness={normal={std=1}}", "outputs.scene=true"], "the study has 8 scenes"),
-        (["scatter.samples=1000000", FRICTION, "axes.frequency=[1, 2]"], "scatter.samples = 1000000: give fewer value"),
-        (["scatter.samples=1e7", FRICTION], "scatter.samples = 10000000.0: give a whole number"),
-    ],
-)
-def test_what_is_wrong_is_said_in_a_sentence(overrides, expected, capsys):
-    assert expected in refused("sdof_slider", ["axes.frequency=160", "scatter.samples=8", *overrides], capsys)
 
 
 # --- numbers of [wear] ---

@@ -199,51 +199,6 @@ def refused(study, overrides, capsys):
     return said[0].removeprefix(f"run-study: {study}: ")
 
 
-@pytest.mark.parametrize(
-    ("overrides", "expected"),
-    [
-        (["scene.friction_coefficient=[0.3, 0.4]"], "or the list as axes.friction_coefficient"),
-        (["axes.friction_coefficient={}"], "axes.friction_coefficient = {}: give a number, a list"),
-        (["axes.friction_coefficient={support=[0.3]}"], "scene.friction_coefficient = 0.5: give it once"),
-        (["axes.friction_coefficient=[0.3, nan]"], "axes.friction_coefficient = nan: give a number"),
-        (
-            ["axes.friction_coefficient=[0.3, -0.1]"],
-            "axes.friction_coefficient = -0.1: give a number that is 0 or more",
-        ),
-        (["axes.friction_coefficient=[0.3, 0.3]"], "axes.friction_coefficient = 0.3: give every value once"),
-        (["axes.friction_coefficient=[0.3, true]"], "give values of one kind"),
-        (["axes.frictioncoefficient=[0.3]"], "unknown key, give friction_coefficient"),
-        (["axes.half_width=[0.3]"], "axes.half_width = [0.3]: unknown key"),
-        (["axes.law=['archard', 'energy']"], "axes.law"),
-        (["axes.threshold=[1, 2]"], 'axes.threshold = 1.0: leave it out: only the law "threshold" takes it'),
-        (["wear.law=threshold", "axes.threshold=[-1, 2]"], "axes.threshold = -1"),
-        (["axes.surfaces=[1, 2]"], "axes.surfaces = 1"),
-        (["axes.surfaces={nosuch=[1, 2]}"], "axes.surfaces = {nosuch = 1.0}"),
-        (["axes.surfaces={'a b'=[1, 2]}"], "a dimension has the name"),
-        (["axes.surfaces={'<b>'=[1, 2]}"], "a dimension has the name"),
-        (["axes.surfaces={support=[-1, 2]}"], "axes.surfaces = -1"),
-        (["axes.stiffness={start=1e5, stop=2e5, num=10000000}"], "axes.stiffness = 10000000: give a whole number"),
-        (
-            ["axes.stiffness={start=1e5, stop=2e5, num=2000}", "axes.mass={start=1, stop=2, num=2001}"],
-            "axes.mass = 2001: give fewer values: there are 4002000 combinations",
-        ),
-        (
-            ["axes.stiffness={start=1e5, stop=2e5, num=200}", "axes.frequency={start=100, stop=200, num=6000}"],
-            "axes.frequency = 6000: give fewer values: there are 1.2e+06 points",
-        ),
-        (["axes.sample=[1, 2]"], "unknown key, give samples"),
-    ],
-)
-def test_what_is_wrong_with_an_axis_is_said_in_a_sentence(overrides, expected, capsys):
-    assert expected in refused("sdof_slider", ["axes.scheme=adaptive", *overrides], capsys)
-
-
-def test_two_dimensions_of_one_name_are_refused(capsys):
-    asked = ["axes.nodal_diameter=[0, 3]", "outputs.variables=['natural_frequency']"]
-    assert "outputs.variables" in (said := refused("dovetail", asked, capsys))
-    assert "it has a dimension nodal_diameter of its own" in said
-
-
 def test_friction_of_a_scene_file_with_its_own_is_refused_by_its_key(capsys):
     assert main(["sdof_slider", "--write-scene", "s.h5"]) == 0
     capsys.readouterr()

@@ -16,9 +16,9 @@ from studyrunner.scene import computed
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.scene.scene_variables import exact_answers
 from studyrunner.scene.variables import build_scene_variables
+from studyrunner.study.sections import WearSection
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
-from studyrunner.study.wear_section import WearSection
 from tests.studyrunner.dataset_twin import build_dataset, write_dataset
 from tests.studyrunner.fakes import FACTS, fake_completion, fake_histories
 

@@ -139,60 +139,6 @@ harmonics = 5
 
 LONG = ("--set", "slow_time.cycles=1e6", "--set", "slow_time.outputs=200000")
 
-WRONG_KEYS = {
-    "key in place of a table": ("slow_time=3", "slow_time", "3", "table"),
-    "variables in one word": ("outputs.variables=default", "outputs.variables", '"default"', "list of names"),
-    "target 0": ("slow_time.until={wear_depth = 0.0}", "slow_time.until", "0.0", "above 0"),
-    "half a harmonic in a list": ("solver.harmonics=[1, 1.5]", "solver.harmonics", "1.5", "whole"),
-    "half a harmonic in a list of one": ("solver.harmonics=[1.5]", "solver.harmonics", "1.5", "whole"),
-    "descending pressures": ("wear.pressure=[2.0, 1.0]", "wear.pressure", "[2.0, 1.0]", "ascending"),
-    "negative factor": ("wear.factor=[[-1.0]]", "wear.factor", "-1.0", "0 or more"),
-    "unknown key": ("axes.freqency=1", "axes.freqency", "1", "frequency"),
-    "unknown table": ("axis.frequency=1", "axis", "frequency", "axes"),
-    "a name of the literature": ("axes.k_w=1", "axes.k_w", "1", "unknown key, give wear_coefficient"),
-    "values for a key that is no axis": ("scene.mass=[1.0, 2.0]", "scene.mass", "[1.0, 2.0]", "the list as axes.mass"),
-    "wrong type": ("axes.frequency=fast", "axes.frequency", '"fast"', "number"),
-    "NaN": ("axes.wear_coefficient=nan", "axes.wear_coefficient", "nan", "finite"),
-    "negative area": ("scene.area=-1e-4", "scene.area", "-0.0001", "above 0"),
-    **{
-        f"contact stiffness {value}": (f"scene.contact_stiffness={value}", "scene.contact_stiffness", "", remedy)
-        for value, remedy in (("0", "above 0"), ("-1e12", "above 0"), ("1e23", "1e+22 or less"), ("soft", "number"))
-    },
-    "frequency 0": ("axes.frequency=0", "axes.frequency", "0", "above 0"),
-    "empty axis": ("axes.frequency=[]", "axes.frequency", "[]", "at least one"),
-    "duplicates": ("axes.frequency=[1, 2, 1.0]", "axes.frequency", "1.0", "once"),
-    "unfinished range": ("axes.frequency={start = 1, stop = 2}", "axes.frequency", "start", "{start, stop, num}"),
-    "huge range": ("axes.frequency={start = 1, stop = 2, num = 1e9}", "axes.frequency", "1000000000.0", "at most"),
-    "unknown word": ("axes.scheme=euler", "axes.scheme", '"euler"', "explicit"),
-    "word for shortcuts": ("solver.shortcuts=no", "solver.shortcuts", '"no"', "true or false"),
-    "word for harmonics": ("solver.harmonics=automatic", "solver.harmonics", '"automatic"', 'or "auto"'),
-    "half a harmonic": ("solver.harmonics=1.5", "solver.harmonics", "1.5", "whole"),
-    "too few samples": ("solver.samples=10", "solver.samples", "10", "at least 11"),
-    "tolerance 0": ("solver.tolerance=0", "solver.tolerance", "0", "between 0 and 1"),
-    "rtol 0": ("axes.rtol=[0, 0.1]", "axes.rtol", "0", "between 0 and 1"),
-    "negative cycles": ("slow_time.cycles=-1", "slow_time.cycles", "-1", "0 or more"),
-    "descending outputs": ("slow_time.outputs=[2, 1]", "slow_time.outputs", "[2, 1]", "ascending"),
-    "outputs beyond the end": ("slow_time.outputs=[0, 10]", "slow_time.outputs", "10.0", "at most"),
-    "unknown law": ("wear.law=reye", "wear.law", '"reye"', '"archard" or "energy" or "threshold" or "table"'),
-    "law without its key": ("wear.law=threshold", "wear.law", '"threshold"', "give wear.threshold beside it"),
-    "key of another law": ("wear.threshold=1.0", "wear.threshold", "1.0", 'only the law "threshold"'),
-    "factors in no rows": ("wear.factor=[1.0]", "wear.factor", "[1.0]", "rows"),
-    "factor of no surface": ("wear.surfaces={disk = 1.0}", "wear.surfaces", "disk", "of the surfaces support"),
-    "target of what is not": ("slow_time.until={hours = 1}", "slow_time.until", "hours", "{wear_depth = ...}"),
-    "two targets": ("slow_time.until={wear_depth = 1, worn_volume = 1}", "slow_time.until", "wear_depth", "one of"),
-    "unknown variable": ("outputs.variables=['wear']", "outputs.variables", '"wear"', "wear_depth"),
-    "a table among the variables": ("outputs.variables=[{a = 1}]", "outputs.variables", "{a = 1}", "default"),
-    "harmonics of no computer": ("solver.harmonics=1e9", "solver.harmonics", "1000000000.0", "at most 1000"),
-    "loops": ("outputs.loops=0", "outputs.loops", "0", "list of contact indices"),
-    "loops of a pair that is not there": ("outputs.loops=[0, 1]", "outputs.loops", "1", "from 0 to 0"),
-    "mesh of a scene without one": ("outputs.variables=['mesh']", "outputs.variables", '"mesh"', "has none"),
-    "frequencies of nothing": ("outputs.variables=['natural_frequency']", "outputs.variables", "", "nothing moves"),
-    "unknown scene": ("scene.model=turbine", "scene.model", "turbine", "dovetail_sector"),
-    "missing scene file": ("scene.model=missing.h5", "scene.model", "missing.h5", "no such file"),
-    "scene is a number": ("scene.model=3", "scene.model", "3", "in quotes"),
-    "name with a slash": ("study.name='a/b'", "study.name", "a/b", "slash"),
-}
-
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
@@ -213,39 +159,6 @@ def line_of(arguments, capsys):
     assert len(said) == 1
     assert {path: path.stat().st_mtime_ns for path in Path.cwd().iterdir()} == before
     return said[0]
-
-
-@pytest.mark.parametrize("case", WRONG_KEYS)
-def test_wrong_key(case, folder, capsys):
-    override, key, value, remedy = WRONG_KEYS[case]
-    line = line_of(["s.toml", "--set", override], capsys)
-    start, _, rest = line.partition(f"s.toml: {key} = ")
-    assert start == "run-study: "
-    shown, _, advice = rest.partition(": ")
-    assert value in shown
-    assert remedy in advice
-
-
-TWICE = STUDY.replace("[slow_time]", "harmonics = [1, 3]\n[slow_time]")
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (STUDY.replace("[study]\nname", "[other]\nname"), ("study",)),
-        (STUDY.replace('model = "sdof_slider"\n', ""), ("scene.model",)),
-        (STUDY.replace("frequency = [150.0]\n", ""), ("axes.frequency",)),
-        (TWICE, ("solver.harmonics = 5", "give it once, here or as axes.harmonics")),
-        (TWICE.replace("= 5", "= [5, 7]"), ("solver.harmonics = [5, 7]", "give it once, here or as axes.harmonics")),
-        ("[study\n", ("valid TOML",)),
-        ("\xff", ("UTF-8",)),
-        ("a = 1\n", ("unknown table",)),
-    ],
-)
-def test_wrong_file(text, words, folder, capsys):
-    (folder / "s.toml").write_bytes(text.encode("latin-1"))
-    line = line_of(["s.toml"], capsys)
-    assert all(word in line for word in ("s.toml", *words))
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner import UserError, open_result, run_study
+from studyrunner import open_result, run_study
 from studyrunner.accessor import join_results
 from studyrunner.plan.planning import build_tasks
 from studyrunner.report.reading.result import open_for_report
@@ -25,32 +25,6 @@ END = (
 
 def study_with(*overrides):
     return read_study("sdof_slider", (*END, "axes.scheme=adaptive", *overrides))
-
-
-@pytest.mark.parametrize(
-    ("override", "key", "remedy"),
-    [
-        ("axes.scheme=[adaptive, explicit]", "axes.scheme", 'give "adaptive" or "implicit"'),
-        ("slow_time.outputs=[0, 10]", "slow_time.outputs", "spaced evenly in worn volume and cycles"),
-        ("slow_time.outputs=1", "slow_time.outputs", "at least 2"),
-        ("slow_time.cycles=nan", "slow_time.cycles", "or inf"),
-        ("slow_time.cycles=-inf", "slow_time.cycles", "or inf"),
-        ("slow_time.final_share=1", "slow_time.final_share", "between 0 and 1"),
-        ("axes.scheme=final", "slow_time.cycles", "give inf"),
-        ("slow_time.until={wear_depth = 1e-5}", "slow_time.until", "has no way"),
-        ('outputs.variables=["default", "exact"]', "outputs.variables", "given cycle counts"),
-    ],
-)
-def test_what_does_not_go_with_it_is_one_sentence(override, key, remedy):
-    override = override.replace("[adaptive, explicit]", '["adaptive", "explicit"]')
-    others = {
-        "slow_time.until={wear_depth = 1e-5}": ("axes.scheme=final",),
-        "axes.scheme=final": ("slow_time.cycles=5",),
-    }
-    with pytest.raises(UserError) as caught:
-        study_with(override, *others.get(override, ()))
-    assert caught.value.key == key
-    assert remedy in caught.value.remedy
 
 
 @pytest.mark.slow

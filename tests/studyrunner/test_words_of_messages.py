@@ -11,7 +11,7 @@ from solver.outcome import Outcome
 from studyrunner.advice import Used, advise
 from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS
 from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
-from studyrunner.study.followed import LoadingSection
+from studyrunner.study.sections import LoadingSection
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, KEPT
 

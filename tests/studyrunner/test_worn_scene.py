@@ -75,14 +75,15 @@ def test_depths_may_be_given(tmp_path):
     [
         ({"frequency": 151.0}, "scene.worn.frequency = 151.0: the nearest value of the result is 150"),
         ({"cycle": [10]}, "scene.worn.cycle = 10.0: the nearest value of the result is 0"),
-        ({"cycle": [0, 0]}, "give cycle counts, each once"),
+        ({"cycle": [0, 0]}, "give every value once"),
         ({"freq": 150.0}, "scene.worn.freq = 150.0: unknown key"),
-        ({"scheme": "explicit"}, "give one of ['adaptive']"),
+        ({"scheme": "explicit", "sweep": "up"}, "give one of ['adaptive']"),
+        ({"scheme": "explicit", "frequency": 151.0}, "scene.worn.frequency = 151.0: the nearest value of the result"),
         ({"result": "none.nc"}, 'scene.worn.result = "none.nc": there is no such file'),
-        ({"depth": -1.0}, "scene.worn.depth = -1.0: give a finite number that is 0 or more"),
+        ({"depth": -1.0}, "scene.worn.depth = -1.0: give a number that is 0 or more"),
         ({"depth": [[1e-6], [2e-6], [3e-6]]}, "3 states with 2 cycle counts: give one cycle count"),
-        ({"depth": [[1e-6], [2e-6]], "cycle": ["a", 1]}, 'scene.worn.cycle = "a": give a finite number'),
-        ({"result": 3}, "give the path of a result file, in quotes"),
+        ({"depth": [[1e-6], [2e-6]], "cycle": ["a", 1]}, 'scene.worn.cycle = "a": give a number'),
+        ({"result": 3}, "scene.worn.result = 3: give a text in quotes"),
     ],
 )
 def test_what_is_wrong_is_said(changes, said, whole):

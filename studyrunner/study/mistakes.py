@@ -1,0 +1,212 @@
+"""What is wrong with the tables of a study: a sentence for each key that pydantic or a rule between keys refuses."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from studies.scene_error import SceneError, remedy_of
+from studyrunner.user_error import UserError, Verbatim, WrongValueError
+from studyrunner.values import Section, Wrong
+
+Checked = TypeVar("Checked", bound=BaseModel)
+
+_SINGLE = ("float_type", "int_type", "bool_type", "string_type")
+
+
+class Mistakes:
+    """Collects the mistakes of a study file, so that the user reads all of them at once. source: the file."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+        self._found: dict[str, UserError] = {}
+
+    def __bool__(self) -> bool:
+        """Whether there is a mistake."""
+        return bool(self._found)
+
+    def __contains__(self, key: str) -> bool:
+        """Whether there is a mistake under this key."""
+        return key in self._found
+
+    def add(self, key: str, value: object, remedy: str) -> None:
+        """One mistake; the first one counts of several under one key."""
+        self._found.setdefault(key, UserError(self.source, key, value, remedy))
+
+    @contextmanager
+    def collecting(self, renamed: Mapping[str, str] | None = None) -> Iterator[None]:
+        """The mistakes of a UserError that is raised inside. renamed: keys that the user gave at another place."""
+        try:
+            yield
+        except UserError as error:
+            for each in error.mistakes:
+                key = (renamed or {}).get(each.key, each.key)
+                self._found.setdefault(key, UserError(each.place, key, each.value, each.remedy))
+
+    def raise_any(self, tables: Iterable[str] = ()) -> None:
+        """Raises UserError with all mistakes, if there are any, by table in the order of the study file."""
+        if self._found:
+            order = {name: place for place, name in enumerate(tables)}
+            names = sorted(self._found, key=lambda key: order.get(key.partition(".")[0], -1))
+            first, *others = (self._found[name] for name in names)
+            raise UserError(first.place, first.key, first.value, first.remedy, tuple(others))
+
+
+@contextmanager
+def scene_errors(source: str, path: Path | None) -> Iterator[None]:
+    """SceneError and OSError become UserError. source: the study file. path: the scene file, None of bundled scenes."""
+    place, prefix = (source, "scene.") if path is None else (str(path), "")
+    try:
+        yield
+    except SceneError as error:
+        raise UserError(place, prefix + error.key, Verbatim(error.value), error.remedy) from None
+    except OSError as error:
+        raise UserError(place, "the scene file", None, f"give a file that can be read: {error.strerror}") from None
+
+
+def check_table(
+    kind: type[Checked], table: Mapping[str, object], source: str, prefix: str, others: Sequence[str] = ()
+) -> Checked:
+    """`kind` from the table, whose keys stand under `prefix`. others: known keys that are looked at elsewhere.
+
+    Raises UserError with all that is wrong in the table.
+    """
+    found = Mistakes(source)
+    # tables of scenes are made for other callers as well, and take this from their caller
+    strict = None if issubclass(kind, Section) else True
+    try:
+        checked = kind.model_validate(table, strict=strict)
+    except ValidationError as error:
+        for wrong in wrong_keys(error, kind, table, others):
+            found.add(*_below(prefix, wrong))
+    else:
+        for wrong in checked.rules() if isinstance(checked, Section) else ():
+            found.add(*_below(prefix, wrong))
+    found.raise_any()
+    return checked
+
+
+def wrong_keys(
+    error: ValueError, kind: type[BaseModel], table: Mapping[str, object], others: Sequence[str] = ()
+) -> Iterator[Wrong]:
+    """What is wrong in a table, once for each key, from what `kind` raises of it. Keys are those below the table."""
+    of_keys: dict[str, list[dict[str, Any]]] = {}
+    for details in _flat(error):
+        places = _places(table, details)
+        details["places"] = [place for place in places if isinstance(place, str)]
+        key = "".join(f"[{place}]" if isinstance(place, int) else f".{place}" for place in places)[1:]
+        of_keys.setdefault(key, []).append(details)
+    # of a key that takes several kinds of values, the kinds that fit as far as can be
+    deepest = {key: max(len(each["loc"]) for each in found) for key, found in of_keys.items()}
+    wrong = [each for found in of_keys.values() for each in found if each["type"] == "extra_forbidden"]
+    meant = {".".join((*each["places"][:-1], _nearest(kind, each["places"], others))) for each in wrong}
+    for key, found in of_keys.items():
+        if any(other.startswith((f"{key}.", f"{key}[")) for other in of_keys):
+            continue
+        if found[0]["type"] == "missing" and key in meant:
+            continue
+        yield _wrong(kind, key, [each for each in found if len(each["loc"]) == deepest[key]], others)
+
+
+def _wrong(kind: type[BaseModel], key: str, found: Sequence[Mapping[str, Any]], others: Sequence[str]) -> Wrong:
+    details = found[0]
+    # a key without a description of its own is part of one with a description
+    names = details["places"]
+    described = [_fields(kind, names[:depth]).get(each) for depth, each in enumerate(names)]
+    description = next((field.description for field in reversed(described) if field and field.description), None)
+    unit = f" ({re.sub(', [-1]$', '', description)})" if description else ""
+    if details["type"] == "extra_forbidden":
+        return Wrong(key, details["input"], f"unknown key, give {_nearest(kind, details['places'], others)}")
+    if details["type"] == "missing":
+        if isinstance(details["loc"][-1], int):
+            return Wrong(key, details["input"], f"give more values{unit}")
+        return Wrong(key, None, f"missing: give it{unit}")
+    cause = details.get("ctx", {}).get("error")
+    if isinstance(cause, WrongValueError):
+        return Wrong(cause.key or key, cause.value, cause.remedy + unit)
+    if isinstance(cause, SceneError):
+        return Wrong(cause.key or key, Verbatim(cause.value), cause.remedy + unit)
+    may_be_axis = key in (kind.AXES if issubclass(kind, Section) else kind.model_fields)
+    if isinstance(details["input"], list) and details["type"] in _SINGLE and may_be_axis:
+        return Wrong(key, details["input"], f"give one value here, or the list as axes.{key}{unit}")
+    remedies = dict.fromkeys(remedy_of(each).removeprefix("give ") for each in found)
+    return Wrong(key, details["input"], f"give {', or '.join(remedies)}{unit}")
+
+
+def _flat(error: ValueError, above: tuple[str | int, ...] = ()) -> Iterator[dict[str, Any]]:
+    """All that is wrong, with its way from the table, also in tables that were checked on the way."""
+    if not isinstance(error, ValidationError):
+        yield {"loc": above, "type": "value_error", "msg": str(error), "input": None, "ctx": {"error": error}}
+        return
+    for details in error.errors(include_url=False):
+        cause, way = details.get("ctx", {}).get("error"), (*above, *details["loc"])
+        if isinstance(cause, ValidationError):
+            yield from _flat(cause, way)
+        else:
+            yield {**details, "loc": way}
+
+
+def _places(table: object, details: Mapping[str, Any]) -> list[str | int]:
+    """Names and list places that lead to the error, without the kinds of value that were tried on the way.
+
+    A place in a list is kept where a name follows.
+    """
+    places: list[str | int] = []
+    inner: object = table
+    for number, part in enumerate(details["loc"], 1):
+        last = number == len(details["loc"])
+        if isinstance(inner, Mapping) and (part in inner or (last and details["type"] == "missing")):
+            places.append(part)
+            inner = inner.get(part)
+        elif isinstance(inner, list | tuple) and isinstance(part, int):
+            places.append(part)
+            inner = inner[part] if part < len(inner) else None
+    while places and isinstance(places[-1], int):
+        places.pop()
+    return places
+
+
+def _fields(kind: type[BaseModel], names: Sequence[str]) -> Mapping[str, FieldInfo]:
+    """Keys of the table that `names` lead to, none where it is no table with keys of its own."""
+    tables = [kind]
+    for name in names:
+        tables = [inner for each in tables for inner in tables_in(_annotation(each, name))]
+    return {name: field for each in tables for name, field in each.model_fields.items() if not field.exclude}
+
+
+def _annotation(kind: type[BaseModel], name: str) -> object:
+    if name in kind.model_fields:
+        return kind.model_fields[name].annotation
+    return kind.EXTRA if issubclass(kind, Section) else None
+
+
+def tables_in(annotation: object) -> list[type[BaseModel]]:
+    """All classes of tables that a type names."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [found for each in get_args(annotation) for found in tables_in(each)]
+
+
+def _below(prefix: str, wrong: Wrong) -> Wrong:
+    return wrong._replace(key=".".join(filter(None, (prefix, wrong.key))))
+
+
+def _nearest(kind: type[BaseModel], names: Sequence[str], others: Sequence[str]) -> str:
+    """What is meant by an unknown key, the last of the names; the others are those of the tables around it."""
+    return nearest_name(names[-1], [*_fields(kind, names[:-1]), *(others if len(names) == 1 else ())])
+
+
+def nearest_name(name: str, known: Iterable[str]) -> str:
+    """The known name that is meant by `name`, or all of them: "one of a, b"."""
+    names = list(dict.fromkeys(known))
+    # a longer name for the same, or a shorter one
+    parts = [key for key in names if len(name) > 3 and (name.lower() in key or key in name.lower())]
+    near = difflib.get_close_matches(name, names, n=1) or parts[:1]
+    return near[0] if near else "one of " + ", ".join(names)

@@ -1,0 +1,154 @@
+"""Types of the values in a study file, as pydantic checks them, and the values of axes.
+
+By hand: `linspace` of numpy rounds more than once, and values of `geomspace` differ between machines.
+"""
+
+from __future__ import annotations
+
+import decimal
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+from fractions import Fraction as Rational
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar, cast
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+
+from studyrunner.user_error import WrongValueError
+
+T = TypeVar("T", bound=Hashable)
+
+LONGEST_AXIS = 100_000
+"""Values of an axis: the effective study, which lists them, is to be read again."""
+
+
+_LARGEST_WHOLE = 2.0**53
+
+
+class Wrong(NamedTuple):
+    """What a rule between keys refuses: dotted key, the value that stands there, what would be right."""
+
+    key: str
+    value: object
+    remedy: str
+
+
+class Section(BaseModel):
+    """A table of the study file: frozen, unknown keys are errors, numbers are finite.
+
+    AXES: keys that may also stand under [axes]. EXTRA: class of the values of keys that are names of something.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    AXES: ClassVar[tuple[str, ...]] = ()
+    EXTRA: ClassVar[type[BaseModel] | None] = None
+
+    def rules(self) -> Iterator[Wrong]:
+        """Rules between the keys of the table, whose values are all right by themselves: what breaks them."""
+        return iter(())
+
+
+def _no_text(value: object) -> object:
+    if isinstance(value, bool | str) or (isinstance(value, float) and abs(value) > _LARGEST_WHOLE):
+        raise ValueError("give a whole number")
+    return value
+
+
+def listed(value: object) -> Sequence[Any]:
+    """The values of a list, or the only value."""
+    return value if isinstance(value, list | tuple) else [value]
+
+
+def once(values: Iterable[T]) -> tuple[T, ...]:
+    """The values in their order. Raises WrongValueError where one of them comes twice."""
+    seen: dict[T, None] = {}
+    for value in values:
+        if value in seen:
+            raise WrongValueError(value, "give every value once")
+        seen[value] = None
+    return tuple(seen)
+
+
+def ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    """The values. Raises ValueError where one is not above the value before it."""
+    if any(later <= earlier for earlier, later in pairwise(values)):
+        raise ValueError("give ascending numbers")
+    return values
+
+
+def spread(value: object) -> tuple[object, ...]:
+    """The values of an axis: one, a list of them or {start, stop, num}."""
+    if isinstance(value, dict):
+        if value.keys() - {"spacing"} != {"start", "stop", "num"}:
+            raise ValueError("give a number, a list or {start, stop, num}")
+        return Range.model_validate(value).values
+    if not isinstance(value, list | tuple):
+        return (value,)
+    if not value:
+        raise ValueError("give at least one value")
+    return tuple(value)
+
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Cycles = Annotated[float, Field(ge=0, allow_inf_nan=True)]
+Fraction = Annotated[float, Field(gt=0, lt=1)]
+Whole = Annotated[int, Field(strict=False), BeforeValidator(_no_text)]
+"""A whole number; 5.0 and 1e4 are whole numbers, too, true and "5" are not."""
+Mode = Annotated[Whole, Field(ge=1, le=1000)]
+Harmonics = Mode | Literal["auto"]
+Samples = Annotated[Whole, Field(ge=4, le=100_000)] | Literal["auto"]
+Scheme = Literal["implicit", "explicit", "adaptive", "final"]
+Sweep = Literal["up", "down", "ramp"]
+Listed = Annotated[tuple[T, ...], Field(strict=False)]
+"""A list."""
+Axis = Annotated[tuple[T, ...], BeforeValidator(spread), AfterValidator(once)]
+"""Values of an axis in the order in which they are given, at least one and each once."""
+
+
+class Range(Section):
+    """Values of an axis in a table: their differences are equal, or their ratios with spacing = "log"."""
+
+    start: float
+    stop: float
+    num: Annotated[Whole, Field(ge=1, le=LONGEST_AXIS)]
+    spacing: Literal["linear", "log"] = "linear"
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The values, each the number that a person would write: 212.8, not 212.79999999999998.
+
+        They are computed from the decimals of start and stop without round-off and rounded once, so that `sel` finds
+        them by the number written and a point is the same in a range and in a list. Raises WrongValueError.
+        """
+        start, stop, num = self.start, self.stop, self.num
+        if self.spacing == "log" and min(start, stop) <= 0.0:
+            raise WrongValueError(min(start, stop), 'give start and stop above 0 with spacing = "log"')
+        if num == 1:
+            return (start,)
+        if self.spacing == "log":
+            with decimal.localcontext(prec=40):
+                first, last = (decimal.Decimal(repr(value)).ln() for value in (start, stop))
+                between = (((num - 1 - place) * first + place * last) / (num - 1) for place in range(1, num - 1))
+                return (start, *(float(value.exp()) for value in between), stop)
+        one, other = Rational(repr(start)), Rational(repr(stop))
+        whole = one.denominator * other.denominator
+        low, high = int(one * whole), int(other * whole)
+        # the quotient of two whole numbers is rounded correctly, whatever their length
+        return tuple((low * (num - 1 - place) + high * place) / (whole * (num - 1)) for place in range(num))
+
+
+def read_axis(value: object) -> tuple[Any, ...]:
+    """Values of an axis of any kind: numbers, flags or names, each once. Raises ValueError.
+
+    A range between whole numbers whose values are whole numbers gives whole numbers.
+    """
+    values = spread(value)
+    for each in values:
+        if not isinstance(each, bool | int | float | str):
+            raise WrongValueError(each, "give a number, true, false or a name, a list of them or {start, stop, num}")
+    if isinstance(value, dict) and all(isinstance(value[key], int) for key in ("start", "stop")):
+        values = tuple(int(each) if each == int(each) else each for each in cast("tuple[float, ...]", values))
+    if len(values) > LONGEST_AXIS:
+        raise WrongValueError(len(values), f"give at most {LONGEST_AXIS} values")
+    return once(values)
