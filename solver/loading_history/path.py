@@ -22,6 +22,7 @@ from solver.loading_history.node_resolution import choose_resolution, resolution
 from solver.loading_history.options import LOADING
 from solver.loading_history.sweep import Step
 from solver.model import FloatArray
+from solver.newton.options import NEWTON
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution
@@ -61,6 +62,11 @@ class LoadingPath:
     def steps(self) -> tuple[float, float, float]:
         """Shortest and longest step over the scale, and the one at which a state is left to `rescue`."""
         return LOADING.shortest_sweep_step, LOADING.longest_sweep_step, LOADING.free_step
+
+    @property
+    def node_tolerance(self) -> float:
+        """As in Path."""
+        return max(self.case.settings.tolerance, NEWTON.forcing * self.case.settings.rtol)
 
     def ahead(self, parameter: float, length: float) -> float:
         """The parameter a step farther; length: over the scale, below 0 for a step down."""

@@ -25,7 +25,6 @@ from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.options import LOADING
 from solver.march.steps import Lengths, take_step
-from solver.newton.options import NEWTON
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
@@ -65,6 +64,10 @@ class Path(Protocol[S]):
     @property
     def steps(self) -> tuple[float, float, float]:
         """Shortest and longest step, and the one at which a state that is not found is left to `rescue`."""
+
+    @property
+    def node_tolerance(self) -> float:
+        """Tolerance of the scaled residual of a node; reported states are solved to that of the settings."""
 
     def ahead(self, parameter: float, length: float) -> float:
         """The parameter a step farther; length: below 0 for a step down."""
@@ -237,9 +240,7 @@ class Sweep(Generic[S]):
 
     def attempt(self, here: S, length: float) -> Step[S] | None:
         """As in Line."""
-        settings = self.path.case.settings
-        # states that are reported are solved to the tolerance of the settings
-        run = self.run.to(max(settings.tolerance, NEWTON.forcing * settings.rtol))
+        run = self.run.to(self.path.node_tolerance)
         found = self.path.solve(self.state.states, self._target(here, length), run)
         return None if found is None else Step(found)
 

@@ -39,6 +39,11 @@ class ModePath:
         shortest = math.log1p(LOADING.free_step)
         return shortest, math.log(COMMON.largest_step_ratio), shortest
 
+    @property
+    def node_tolerance(self) -> float:
+        """As in Path."""
+        return self.case.settings.tolerance
+
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path."""
         return parameter * math.exp(length)
