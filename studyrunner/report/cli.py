@@ -142,8 +142,8 @@ def _report(options: Options) -> int:
     from rich.markup import escape
 
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
+        from studyrunner.report.contents import draw_report
         from studyrunner.report.page.page import write_page
-        from studyrunner.report.page_contents import draw_report
         from studyrunner.report.reading.result import open_for_report
         from studyrunner.report.reading.schema_check import check_numbers, reading_errors
         from studyrunner.report.root.vtu import find_writer

@@ -30,16 +30,17 @@ _MOST_CLOSE_UPS = 2
 _MOST_NUMBERS = 120
 _MOST_PAIRS = 20_000
 _MOST_FACES = 60_000
-NO_DEPTH = 1e-15
+_TITLES = {"slip_fraction": "Where the joint slips", "open_fraction": "Where the joint opens"}
+_NO_DEPTH = 1e-15
 """m. A depth below this is round-off: it is far less than an atom."""
 
 
 def draw_root(result: Result) -> Iterator[Drawing | Missing]:
     """Worn shape of the shown point, numbers of the pairs, and the whole disk.
 
-    Nothing where `find_root` finds none.
+    Nothing where `_find_root` finds none.
     """
-    surface, views = find_root(result)
+    surface, views = _find_root(result)
     if surface is None:
         return
     state = _find_state(result)
@@ -52,7 +53,7 @@ def draw_root(result: Result) -> Iterator[Drawing | Missing]:
         yield disk
 
 
-def find_root(result: Result) -> tuple[RootSurface | None, tuple[View, ...]]:
+def _find_root(result: Result) -> tuple[RootSurface | None, tuple[View, ...]]:
     """The surface as it is drawn, and from where; None without positions, or with too many pairs to tell."""
     surface = read_root(result) if result.dataset.sizes["contact"] <= _MOST_PAIRS else None
     if surface is None:
@@ -86,17 +87,17 @@ def _find_state(result: Result) -> State | None:
         return None
     last = int(np.flatnonzero(held)[-1])
     depth = values["wear_depth"][last] if "wear_depth" in values else np.zeros(result.dataset.sizes["contact"])
-    name = "wear_depth" if float(depth.max()) > NO_DEPTH or "mean_pressure" not in values else "mean_pressure"
+    name = "wear_depth" if float(depth.max()) > _NO_DEPTH or "mean_pressure" not in values else "mean_pressure"
     return State(name, last, depth, values[name][last])
 
 
 def draw_state(result: Result, surface: RootSurface, views: Sequence[View], state: State) -> Drawing:
     """The mesh, and the contact surfaces of its outer body from close by, coloured, with the worn shape exaggerated."""
-    largest, worn = float(state.values.max()), float(state.depth.max()) > NO_DEPTH
+    largest, worn = float(state.values.max()), float(state.depth.max()) > _NO_DEPTH
     factor = surface.exaggeration(float(state.depth.max())) if worn else 1.0
     scale = scale_for("m" if state.name == "wear_depth" else "Pa", state.values)
     label = state.name.replace("_", " ")
-    figure = paint_state(surface, views, state, factor, scale, label)
+    figure = _paint_state(surface, views, state, factor, scale, label)
     pair = result.dataset["contact"].values[int(np.argmax(state.values))]
     text = as_sentences(
         f"{label.capitalize()} {result.when(state.cycle, 'after')} at {result.describe(result.shown_point())}",
@@ -115,7 +116,7 @@ def _close_ups(views: Sequence[View]) -> list[View]:
     return [view for view in views if view.flank >= 0 and view.body == views[0].body][:_MOST_CLOSE_UPS]
 
 
-def paint_state(
+def _paint_state(
     surface: RootSurface, views: Sequence[View], state: State, factor: float, scale: Scale, label: str
 ) -> Figure:
     """The root and close-ups, coloured with the values of a state. factor: by which worn depths are exaggerated."""
@@ -141,7 +142,7 @@ def _paint(
     colours = rgb(body_colours(surface.bodies), surface.body[view.faces])
     colours[own] = mpl.colormaps[MAP](norm(scale(at_nodes[faces[own]].mean(axis=1))))[:, :3]
     paint_faces(panel, worn, faces, colours, view)
-    if view.flank >= 0 and float(state.depth.max()) > NO_DEPTH:
+    if view.flank >= 0 and float(state.depth.max()) > _NO_DEPTH:
         looked_at = view.faces & (surface.contact.flank == view.flank)
         paint_edges(panel, surface.nodes, surface.faces[looked_at], view)
     if view.leading is not None:
@@ -250,3 +251,33 @@ def _mark_directions(panel: Axes, nodes: NDArray[np.float64], view: View) -> Non
     panel.margins(0.02)
     panel.set_xlim(low[0] - 0.12 * size, high[0] + 0.12 * size)
     panel.set_ylim(low[1] - 0.1 * size, high[1] + 0.05 * size)
+
+
+def draw_mode_fractions(result: Result) -> Iterator[Drawing | Missing]:
+    """Fractions of the period in which pairs slip and are open, at the shown point: a large amplitude.
+
+    Nothing where `_find_root` finds none.
+    """
+    surface, views = _find_root(result)
+    if surface is None:
+        return
+    point = result.shown_point()
+    for name, title in _TITLES.items():
+        if not result.has(name):
+            yield Missing(name, title, result.lacks(name))
+            continue
+        values = np.asarray(result.at(name, point).values, dtype=float)
+        if not np.isfinite(values).all():
+            yield Missing(name, title, "No point has a state.")
+            continue
+        label = f"fraction of the period {'in slip' if name == 'slip_fraction' else 'open'}"
+        state = State(name, 0, np.zeros(len(values)), values)
+        figure = _paint_state(surface, views, state, 1.0, scale_for("1", values), label)
+        pair = result.dataset["contact"].values[int(np.argmax(values))]
+        caption = as_sentences(
+            f"{label.capitalize()}, at {result.describe(point)}",
+            f"Largest: {values.max():.3g} at pair {pair}" if values.max() > 0.0 else "No pair does",
+            "" if surface.is_mesh else "The file has no mesh: each pair is a patch",
+        )
+        yield Drawing(name, title, caption, figure)
+    yield draw_numbers(result, surface, views)
