@@ -8,8 +8,8 @@ from studyrunner.report.drawing import Drawing, Missing, Table, style
 from studyrunner.report.figures.loops import draw_loops
 from studyrunner.report.figures.missions import draw_missions
 from studyrunner.report.figures.modes import draw_modes
-from studyrunner.report.figures.outcome import draw_certificates, draw_outcomes, list_branches, list_stability
-from studyrunner.report.figures.pairs import draw_pairs, draw_wear
+from studyrunner.report.figures.outcome import draw_outcomes, list_certificates
+from studyrunner.report.figures.pairs import draw_numbers, draw_pairs, draw_wear
 from studyrunner.report.figures.precision import draw_precision
 from studyrunner.report.figures.response import draw_responses
 from studyrunner.report.figures.scatter import draw_scatter
@@ -38,14 +38,14 @@ def _choose_parts(result: Result) -> tuple[_Part, ...]:
     if not result.held.any():
         return (draw_outcomes, _draw_sector, _tell_nothing)
     if result.has_modes:
-        return (draw_modes, _of_pairs(draw_mode_fractions), draw_outcomes)
+        return (draw_modes, *map(_of_pairs, (draw_mode_fractions, draw_numbers)), draw_outcomes)
     if result.blocks is not None:
-        of_pairs = map(_of_pairs, (draw_root, draw_wear))
+        of_pairs = map(_of_pairs, (draw_root, draw_wear, draw_numbers))
         own = (draw_missions, draw_scatter, draw_trends, draw_volumes, *of_pairs)
-        return (*own, _draw_sector, draw_outcomes, draw_certificates)
-    of_pairs = map(_of_pairs, (draw_root, draw_pairs, draw_loops))
+        return (*own, _draw_sector, draw_outcomes, list_certificates)
+    of_pairs = map(_of_pairs, (draw_root, draw_pairs, draw_loops, draw_numbers))
     own = (draw_scatter, draw_volumes, draw_responses, draw_excitation, draw_trends, *of_pairs)
-    return (*own, _draw_sector, draw_outcomes, list_branches, list_stability, draw_certificates, draw_precision)
+    return (*own, _draw_sector, draw_outcomes, list_certificates, draw_precision)
 
 
 def _of_pairs(part: _Part) -> _Part:

@@ -13,6 +13,8 @@ from studyrunner.report.reading.result import Result
 JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
 """The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""
 
+_ORIGIN = "Axial 0 is the leading edge, up the flank 0 the inner end"
+
 _LONE, _SLIM = 1e-3, 0.2
 """Width that a single row of pairs is drawn with, m; that of its length where this is less, as under a cylinder."""
 _STRAIGHT = 0.999
@@ -45,6 +47,11 @@ class Flank:
     cells: Cells | None
     seen: NDArray[np.float64] | None
     directions: tuple[str, str]
+
+    @property
+    def origin(self) -> str:
+        """Where the two directions begin; empty where this is not known."""
+        return _ORIGIN if self.directions in JOINT_WORDS.values() else ""
 
     @property
     def height_over_width(self) -> float:

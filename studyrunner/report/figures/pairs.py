@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
@@ -39,6 +39,9 @@ _MOST_SERIES, _MOST_PROFILES, _MOST_FLANKS = 4, 5, 3
 _MANY_PAIRS = 150
 _SLENDER = 0.12
 _LABEL_WIDTH = 14
+_MOST_NUMBERED, _MOST_NUMBERS = 4, 120
+_PLAIN = ListedColormap(["#eeeeee"])
+_DOTS: dict[str, Any] = {"edgecolors": "0.3", "linewidths": 0.4}
 _NO_DEPTH = 1e-15
 """m. A depth below this is round-off: it is far less than an atom."""
 
@@ -110,6 +113,30 @@ def _draw_stems(panel: Axes, pairs: NDArray[np.int_], series: Sequence[FloatArra
     panel.set_xlabel("contact pair")
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.grid(visible=False, axis="x")
+
+
+def draw_numbers(result: Result) -> Iterator[Drawing]:
+    """The number of each pair where it lies on its surface (Fig. 3b); nothing without positions, or with many pairs."""
+    flanks, names = find_flanks(result), result.dataset["contact"].values
+    placed = all(flank.cells is not None or flank.seen is not None for flank in flanks)
+    if not placed or len(names) == 1 or len(flanks) > _MOST_NUMBERED or len(names) > _MOST_NUMBERS * len(flanks):
+        return
+    height = 0.6 + 6.0 * min(1.2, max(_SLENDER, max(flank.height_over_width for flank in flanks)))
+    figure, panels = new_panels(len(flanks), 1, min(height * len(flanks), 8.0))
+    for panel, flank in zip(panels[:, 0], flanks, strict=True):
+        _draw_field(panel, flank, np.ones(len(flank.pairs)), Normalize(0.0, 1.0), cmap=_PLAIN, edgecolors="0.6")
+        places = flank.seen
+        if flank.cells is not None:
+            x, y = np.meshgrid(flank.cells.x, flank.cells.y)
+            places = np.empty((len(flank.pairs), 2))
+            places[flank.cells.pair] = np.stack([x, y], axis=-1)
+        assert places is not None
+        for pair, (x, y) in zip(flank.pairs, 1e3 * places, strict=True):
+            panel.text(x, y, str(names[pair]), ha="center", va="center", fontsize=8, clip_on=False)
+        panel.set_title(flank.surface)
+    _label_outer(panels)
+    text = as_sentences(f"As along the dimension contact: {len(names)} pairs", flanks[0].origin)
+    yield Drawing("pair_numbers", "Numbers of the contact pairs", text, figure)
 
 
 def _shade_surfaces(panel: Axes, result: Result, pairs: NDArray[np.int_]) -> None:
@@ -220,17 +247,17 @@ def _label_outer(panels: NDArray[Any]) -> None:
         panel.set_xlabel("")
 
 
-def _draw_field(panel: Axes, flank: Flank, values: FloatArray, norm: Normalize) -> None:
+def _draw_field(panel: Axes, flank: Flank, values: FloatArray, norm: Normalize, **look: Any) -> None:
     """One field of a flank: cells of its grid, or dots at its pairs."""
     panel.grid(visible=False)
     if flank.cells is not None:
         cells = flank.cells
-        panel.pcolormesh(1e3 * cells.x_edges, 1e3 * cells.y_edges, values[cells.pair], norm=norm)
+        panel.pcolormesh(1e3 * cells.x_edges, 1e3 * cells.y_edges, values[cells.pair], norm=norm, **look)
         # Cells as they are in the flank, unless it is so slender that nothing would be seen.
         panel.set_aspect("equal" if flank.height_over_width > _SLENDER else "auto")
     elif flank.seen is not None:
         x, y = 1e3 * flank.seen.T
-        panel.scatter(x, y, c=values, norm=norm, s=60, edgecolors="0.3", linewidths=0.4)
+        panel.scatter(x, y, 160 if look else 60, values, norm=norm, **(_DOTS | look))
         panel.margins(0.12)
         panel.set_aspect("equal", adjustable="datalim")
     panel.set_xlabel(f"{flank.directions[0]} (mm)")

@@ -27,7 +27,7 @@ _DASH = "\N{EN DASH}"
 def draw_precision(result: Result) -> Iterator[Drawing | Missing | Table]:
     """The figure, and a table for each point that is drawn, those that wear most.
 
-    Nothing where no settings are compared. A sentence in place of the figure where it would tell no setting from another.
+    Nothing where no settings are compared; a sentence where no error tells one from another.
     """
     points = compare_settings(result)
     if not points:

@@ -1,6 +1,4 @@
-"""Trends of final worn volume, peak response and shift of the resonance along every axis of the study, and maps of the
-worn volume over any two axes.
-"""
+"""Trends of final worn volume, peak response and shift of the resonance along every axis of the study."""
 
 from __future__ import annotations
 
@@ -10,10 +8,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import COLOURS, Drawing, add_colour_bar, hatch_empty, new_figure, new_panels, set_log
+from studyrunner.report.drawing import COLOURS, Drawing, new_panels, set_log
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.sample_statistics import SAMPLE
 from studyrunner.report.reading.units import scale_for, show_number, units_of
@@ -26,7 +23,6 @@ _DECADES = 30.0
 _SMALL = 7.5
 _LONG = 9
 """Characters that stand side by side under a small panel."""
-_ERROR_COLOURS = "magma_r"
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,7 @@ class Quantity:
 
 
 def draw_trends(result: Result) -> Iterator[Drawing]:
-    """Small multiples and maps; nothing where only frequency and scheme vary, which other figures show."""
+    """Small multiples; nothing where only frequency and scheme vary, which other figures show."""
     if not result.computed.any() or all(name in _PLAIN for name in result.varying):
         return
     quantities = [one for one in find_quantities(result) if np.isfinite(one.values).any()]
@@ -55,8 +51,6 @@ def draw_trends(result: Result) -> Iterator[Drawing]:
     left = [name.replace("_", " ") for name in result.varying if name not in (*axes, SAMPLE)]
     left_out = f"Left out: {', '.join(left)}" if left else ""
     yield _draw_multiples(result, quantities, axes, left_out)
-    if len(axes) > 1 and quantities[0].units == "m3":
-        yield _draw_maps(result, quantities[0], axes, left_out)
 
 
 def find_quantities(result: Result) -> list[Quantity]:
@@ -193,16 +187,12 @@ def _positions(result: Result, name: str) -> tuple[FloatArray, NDArray[np.intp]]
     return np.asarray(values[order], dtype=float), order
 
 
-def _texts(result: Result, name: str, order: NDArray[np.intp]) -> list[str]:
-    """Values of an axis as ticks; they are turned where they would run into each other."""
-    values = result.dataset[name].values[order]
-    return [show_number(float(each), 4) if values.dtype.kind in "fiu" else str(each) for each in values]
-
-
 def _set_axis(panel: Axes, result: Result, name: str) -> None:
     """Label, scale and ticks of a horizontal axis: few values are ticks themselves."""
     at, order = _positions(result, name)
-    panel.set_xlabel(_label(result, name))
+    units = units_of(result.dataset[name])
+    # a word a line: panels are narrow
+    panel.set_xlabel(name.replace("_", "\n") + (f"\n({units})" if units else ""))
     panel.tick_params(labelsize=_SMALL)
     words = result.dataset[name].dtype.kind not in "fiu"
     if not words and name != "frequency" and at[0] > 0.0 and at[-1] / at[0] > _DECADES:
@@ -211,74 +201,9 @@ def _set_axis(panel: Axes, result: Result, name: str) -> None:
     room = (0.15 if len(at) <= 3 else 0.05) * float(np.ptp(at))
     panel.set_xlim(at[0] - room, at[-1] + room)
     if words or len(at) <= 3:
-        panel.set_xticks(at, _texts(result, name, order))
-        _turn(panel)
+        values = result.dataset[name].values[order]
+        texts = [str(each) if words else show_number(float(each), 4) for each in values]
+        turned: dict[str, Any] = {"rotation": 35, "ha": "right", "rotation_mode": "anchor"}
+        panel.set_xticks(at, texts, **(turned if sum(map(len, texts)) > _LONG else {}))
     else:
         panel.locator_params(axis="x", nbins=3)
-
-
-def _label(result: Result, name: str) -> str:
-    """Name of an axis, a word a line, and its unit below: panels are narrow."""
-    units = units_of(result.dataset[name])
-    return name.replace("_", "\n") + (f"\n({units})" if units else "")
-
-
-def _turn(panel: Axes) -> None:
-    """Turn tick labels that would run into each other."""
-    if sum(len(text.get_text()) for text in panel.get_xticklabels()) > _LONG:
-        for text in panel.get_xticklabels():
-            text.set(rotation=35, ha="right", rotation_mode="anchor")
-
-
-def _draw_maps(result: Result, worn: Quantity, axes: list[str], left_out: str) -> Drawing:
-    """A matrix of the axes: below its diagonal the worn volume, above it the estimated error over the same two axes."""
-    shown, scale = result.shown_point(), scale_for("m3", worn.values)
-    errors = np.where(result.computed, result.errors, np.nan) * 100.0
-    told = bool((errors > 0.0).any())
-    largest = scale(np.nanmax(worn.values)).item(), float(np.nanmax(errors, initial=0.0))
-    norms = [Normalize(0.0, each or 1.0) for each in largest]
-    n = len(axes) - 1
-    figure = new_figure(1.3 + 1.5 * n + (0.6 if n == 1 else 0.0))
-    volumes = figure.subplots(n, (1 + told) * n, squeeze=False)
-    for row in range(n):
-        for column in range(n):
-            across, down = axes[column], axes[row + 1]
-            for of_error in range(1 + told):
-                panel = volumes[row, column + of_error * n]
-                if column > row:
-                    panel.remove()
-                    continue
-                where = tuple(slice(None) if name in (across, down) else shown[name] for name in result.axes)
-                field = (errors if of_error else scale(worn.values))[where]
-                field = field if result.axes.index(across) > result.axes.index(down) else field.T
-                field = field[np.ix_(_positions(result, down)[1], _positions(result, across)[1])]
-                colours = _ERROR_COLOURS if of_error else None
-                panel.pcolormesh(field, norm=norms[of_error], cmap=colours)
-                hatch_empty(panel, bool(np.isnan(field).any()))
-                _tick_cells(panel, result, across, down, row == n - 1, column == 0)
-    for of_error, label in enumerate((scale.label("worn volume"), "estimated error (%)")[: 1 + told]):
-        beside = [panel for panel in volumes[:, of_error * n : (of_error + 1) * n].flat if panel.figure is not None]
-        colours = _ERROR_COLOURS if of_error else None
-        add_colour_bar(figure, beside, norms[of_error], label, cmap=colours, fraction=0.06, aspect=30, pad=0.02)
-    caption = as_sentences(
-        f"Left, the worn volume {result.when(-1, 'after')}" + ("; right, its estimated error" if told else ""),
-        f"The other axes are at {result.describe(shown)}, where most is worn" if n > 1 else "",
-        "Hatched: points without a result" if not result.computed.all() else "",
-        left_out,
-    )
-    return Drawing("trend_maps", "Final worn volume over any two axes", caption, figure)
-
-
-def _tick_cells(panel: Axes, result: Result, across: str, down: str, below: bool, left: bool) -> None:
-    """Values of two axes at the cells, all of a few, else the first and the last; names at the outer panels alone."""
-    panel.grid(visible=False)
-    for name, set_ticks, set_label, outer in (
-        (across, panel.set_xticks, panel.set_xlabel, below),
-        (down, panel.set_yticks, panel.set_ylabel, left),
-    ):
-        order = _positions(result, name)[1]
-        kept = np.arange(len(order)) if len(order) <= 3 else np.array([0, len(order) - 1])
-        set_ticks(kept + 0.5, _texts(result, name, order[kept]) if outer else [""] * len(kept), fontsize=_SMALL)
-        if outer:
-            set_label(_label(result, name))
-    _turn(panel)

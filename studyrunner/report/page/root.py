@@ -10,12 +10,11 @@ from studyrunner.report.page.data import encode_floats
 from studyrunner.report.reading.result import Result
 from studyrunner.report.reading.scene_pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
 from studyrunner.report.root.painting import body_colours
-from studyrunner.report.root.simplified import simplify
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.views import find_views
 
 _MOST_FACES, _MOST_PAIRS = 15_000, 10_000
-"""Faces beside those in contact, and contact pairs, that the page draws in three dimensions."""
+"""Faces, and contact pairs, that the page draws in three dimensions."""
 
 
 def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | None:
@@ -34,10 +33,10 @@ def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | Non
     whole = read_root(shown)
     if whole is None:
         return None
-    surface = simplify(whole, _MOST_FACES)
+    surface = whole.near_contact(_MOST_FACES)
     if len(surface.faces) < len(whole.faces):
         notes.append(
-            f"The mesh is drawn with {len(surface.faces)} of its {len(whole.faces)} faces; those in contact are whole."
+            f"In three dimensions are {len(surface.faces)} of {len(whole.faces)} faces, those near the contact."
         )
     views, contact = find_views(shown, surface), surface.contact
     pairs = pairs_of_scene(result, result.shown_point())[contact.pairs]
