@@ -100,17 +100,17 @@ class Drawing:
     caption: str
     figure: Figure
 
-    def save(self, folder: Path) -> tuple[Path, Path]:
-        """Write `<name>.svg` and `<name>.png` into a folder that exists; both paths.
+    def save(self, folder: Path) -> tuple[Path, ...]:
+        """Write `<name>.svg` and `<name>.png` into a folder that exists; the SVG files.
 
         A figure of one panel also becomes `<name>_column.svg` and `<name>_column.png`, as wide as a column.
         """
         with style():
-            paths = _save(self.figure, folder / self.name)
+            paths = [_save(self.figure, folder / self.name)]
             if self.fits_column:
                 set_in_column(self.figure)
-                _save(self.figure, folder / f"{self.name}_column")
-        return paths
+                paths.append(_save(self.figure, folder / f"{self.name}_column"))
+        return tuple(paths)
 
     @property
     def fits_column(self) -> bool:
@@ -151,8 +151,8 @@ def style() -> Iterator[None]:
         yield
 
 
-def _save(figure: Figure, path: Path) -> tuple[Path, Path]:
-    """The figure as SVG and as PNG; `path` is without a suffix. From then on what stands where is fixed."""
+def _save(figure: Figure, path: Path) -> Path:
+    """The figure as SVG, whose path is returned, and PNG; `path` is without a suffix. It is laid out for good."""
     for artist in figure.findobj(Line2D) + figure.findobj(PathCollection):
         points = artist.get_xdata() if isinstance(artist, Line2D) else artist.get_offsets()
         artist.set_rasterized(np.size(points) > _MANY)
@@ -164,7 +164,7 @@ def _save(figure: Figure, path: Path) -> tuple[Path, Path]:
     # What stands where is the same for both: it is found once.
     figure.set_layout_engine("none")
     figure.savefig(png, format="png", dpi=PRINT_DPI)
-    return svg, png
+    return svg
 
 
 def set_in_column(figure: Figure) -> None:

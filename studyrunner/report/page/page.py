@@ -118,13 +118,10 @@ def _turn_grey(found: re.Match[str]) -> str:
 
 
 def _save(drawing: Drawing, folder: Path) -> Shown:
-    drawing.save(folder)
-    column = folder / f"{drawing.name}_column.svg"
     texts = [
-        inline_svg(path.read_text(encoding="utf-8"), f"{path.stem}-", drawing.title)
-        for path in (folder / f"{drawing.name}.svg", *([column] if drawing.fits_column else []))
+        inline_svg(path.read_text(encoding="utf-8"), f"{path.stem}-", drawing.title) for path in drawing.save(folder)
     ]
-    return Shown(drawing, texts[0], texts[1] if drawing.fits_column else "")
+    return Shown(drawing, texts[0], texts[1] if len(texts) > 1 else "")
 
 
 def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str:

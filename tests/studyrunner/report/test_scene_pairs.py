@@ -6,13 +6,13 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
+from studyrunner.report.figures.flank import draw_flanks
+from studyrunner.report.page.maps import LAST_DEPTH
+from studyrunner.report.reading.flanks import find_flanks
 
 from studyrunner.report.drawing import style
-from studyrunner.report.figures.flank import draw_flanks
 from studyrunner.report.page.data import build_page_data
-from studyrunner.report.page.maps import LAST_DEPTH
 from studyrunner.report.reading.choice import choose
-from studyrunner.report.reading.flanks import find_flanks
 from studyrunner.report.reading.result import Result
 from studyrunner.report.reading.scene_pairs import last_depth, of_scene, of_shown_scene
 from studyrunner.report.reading.schema_check import check_dataset
