@@ -93,6 +93,8 @@ def _build_flank(
         return Flank(surface, pairs, area[pairs], None, None, ("", ""))
     centred = own - own.mean(axis=0)
     _, _, plane = np.linalg.svd(np.vstack([centred, np.zeros((3, 3))]), full_matrices=False)
+    largest = np.argmax(np.abs(np.round(plane, 6)), axis=1)[:, None]
+    plane = plane * np.sign(np.take_along_axis(plane, largest, axis=1))
     seen, cells = centred @ plane[:2].T, None
     try:
         grid = find_grid(own) if len(own) > 1 else None

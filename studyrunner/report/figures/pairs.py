@@ -40,7 +40,7 @@ _MANY_PAIRS = 150
 _SLENDER = 0.12
 _LABEL_WIDTH = 14
 _MOST_NUMBERED, _MOST_NUMBERS = 4, 120
-_PLAIN = ListedColormap(["#eeeeee"])
+_PLAIN = ListedColormap(["#ffffff00"])
 _DOTS: dict[str, Any] = {"edgecolors": "0.3", "linewidths": 0.4}
 _NO_DEPTH = 1e-15
 """m. A depth below this is round-off: it is far less than an atom."""
@@ -127,7 +127,8 @@ def draw_numbers(result: Result) -> Iterator[Drawing]:
         _draw_field(panel, flank, np.ones(len(flank.pairs)), Normalize(0.0, 1.0), cmap=_PLAIN, edgecolors="0.6")
         places = flank.seen
         if flank.cells is not None:
-            x, y = np.meshgrid(flank.cells.x, flank.cells.y)
+            middles = [0.5 * (edges[1:] + edges[:-1]) for edges in (flank.cells.x_edges, flank.cells.y_edges)]
+            x, y = np.meshgrid(*middles)
             places = np.empty((len(flank.pairs), 2))
             places[flank.cells.pair] = np.stack([x, y], axis=-1)
         assert places is not None

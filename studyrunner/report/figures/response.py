@@ -96,8 +96,9 @@ def _draw(result: Result, course: Course) -> Drawing:
 def _title(result: Result, worn: bool) -> str:
     if worn:
         return "Response at each frequency, new and after wear at that frequency"
-    new = result.cycles[0] == 0 and _WORN not in result.axes
-    return "Frequency response of the new joint" if new else "Frequency response"
+    if _WORN in result.axes:
+        return "Frequency response of one joint, worn before"
+    return "Frequency response of the new joint" if result.cycles[0] == 0 else "Frequency response"
 
 
 def _how_to_read(result: Result, worn: bool) -> str:

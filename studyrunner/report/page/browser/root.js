@@ -127,7 +127,8 @@ function prepareRoot() {
     byId("root-part").hidden = true;
     return;
   }
-  shape.colour = DEPTH || ofPairs[0].name;
+  const names = [...(DEPTH && largestOf(variables[DEPTH]) > 0 ? [DEPTH] : []), "mean_pressure", ofPairs[0].name];
+  shape.colour = names.find((name) => variables[name]);
   addChoice("root-choices", "root colour", "colour", ofPairs.map(({ name, label }) => [name, label]), shape.colour, (name) => { shape.colour = name; drawRoot(); });
   addChoice("root-choices", "root view", "view", root.views.map(({ title }, i) => [String(i), title]), "0", (i) => { shape.view = Number(i); drawRoot(); });
   if (DEPTH) addChoice("root-choices", "root shape", "wear drawn", [["1", "exaggerated"], ["", "as it is"]], "1", (value) => { shape.exaggerated = Boolean(value); drawRoot(); });
