@@ -168,7 +168,7 @@ def test_the_report_draws_frequency_and_damping(result, study_file, tmp_path):
         assert dataset.sizes == result.sizes
     shown = open_for_report(study_file.with_name("out.nc"))
     items = {item.name: item for item in draw_report(shown)}
-    assert {"natural_frequency", "damping_ratio", "outcomes"} <= items.keys()
+    assert {"natural_frequency", "damping_ratio"} <= items.keys()
     summary = write_page(shown, items.values(), tmp_path / "index.html")
     assert summary.n_missing == 0
     lines = items["damping_ratio"].figure.axes[0].get_lines()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 
 from studyrunner.report.drawing import Drawing, Table, add_legend, new_figure
-from studyrunner.report.figures.courses import Course, find_course
+from studyrunner.report.figures.courses import find_course
 from studyrunner.report.reading.choice import choose
-from studyrunner.report.reading.known_volumes import tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, Result, as_sentences
 from studyrunner.report.reading.units import show_cycles
 from studyrunner.variables import CERTIFICATE
@@ -25,30 +23,14 @@ _OTHER_COLOURS = ("#D55E00", "#0072B2", "#CC79A7", "#009E73", "#56B4E9", "#E69F0
 _HATCHES = ("///", "...", "xx", "\\\\\\", "++", "oo", "--", "||", "**")
 
 
-def draw_outcomes(result: Result) -> Iterator[Drawing | Table]:
-    """Table of the outcomes, with how many of each are known to rtol, and where some are special, a map of them."""
-    outcome = result.read("outcome")
-    numbers = Counter(outcome.values.ravel().tolist())
-    rows = []
-    for number in sorted(numbers):
-        place = np.argwhere(outcome.values == number)[0]
-        point = dict(zip(result.axes, map(int, place), strict=True))
-        ending = result.endings[number]
-        first = result.describe(point) if number != CONVERGED else ""
-        known = [str(np.count_nonzero(result.known & (outcome.values == number)))] if result.tells_volumes else []
-        rows.append((ending.word.replace("_", " "), str(numbers[number]), *known, ending.sentence, first))
-    without = "" if result.held.all() else "Where there is no result there are gaps in the figures and NaN in the file"
-    note = as_sentences(tell_volumes(result), tell_ends(result), without)
-    known = ["known to rtol"] if result.tells_volumes else []
-    columns = ("outcome", "points", *known, "what it means", "first of them at")
-    yield Table("outcomes", "Outcomes of the points", columns, tuple(rows), note)
+def draw_outcomes(result: Result) -> Iterator[Drawing]:
+    """One cell a point: the course across, a row for each other combination; colour and hatching tell the outcome.
+
+    Nothing where all points are alike, or there is no course.
+    """
     course = find_course(result)
-    if set(numbers) - {CONVERGED} and course is not None:
-        yield draw_outcome_map(result, course)
-
-
-def draw_outcome_map(result: Result, course: Course) -> Drawing:
-    """One cell a point: the course across, a row for each other combination; colour and hatching tell the outcome."""
+    if course is None or (result.dataset["outcome"].values == CONVERGED).all():
+        return
     choice = choose(result, [course.axis], _MOST_ROWS)
     field = np.array([course.read(result, "outcome", point) for point in choice.points]).astype(int)
     present = sorted(set(field.ravel().tolist()))
@@ -89,7 +71,7 @@ def draw_outcome_map(result: Result, course: Course) -> Drawing:
     panel.set_ylim(*edges[1][[-1, 0]])
     add_legend(figure, handles)
     meaning = [f"{words[number].capitalize()}: {result.endings[number].sentence}" for number in special]
-    return Drawing("outcome_map", "How the points ended", as_sentences(*meaning, choice.sentence), figure)
+    yield Drawing("outcome_map", "How the points ended", as_sentences(*meaning, choice.sentence), figure)
 
 
 def _hatch(special: list[int], number: int) -> str:

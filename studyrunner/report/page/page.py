@@ -26,7 +26,7 @@ from studyrunner.report.page.study import describe_study
 from studyrunner.report.reading.result import Result
 from studyrunner.user_error import show_text
 
-DATA_LIMIT = 4e6
+DATA_LIMIT = 5e6
 """Most characters of numbers of the interactive part, those of the root in three dimensions aside."""
 
 _SCRIPTS = ("panel.js", "root.js", "page.js")  # each uses what stands in those before it

@@ -13,7 +13,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from studyrunner.report.contents import draw_report
-from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, Table, set_in_column, style
+from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, set_in_column, style
 from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.report.figures.trends import find_peak, find_quantities
 from studyrunner.report.reading.result import Result
@@ -248,9 +248,6 @@ def test_the_map_of_outcomes_speaks_words():
     np.testing.assert_array_equal(cells_of(panel), [[0, 1, 0, 0], [0, 0, 1, 0]])
     assert [label.get_text() for label in panel.get_xticklabels()] == ["200", "201", "202", "204"]
     assert [text.get_text() for text in drawing.figure.legends[0].get_texts()] == ["converged", "branch lost"]
-    table = next(item for item in draw_report(result) if item.name == "outcomes")
-    assert isinstance(table, Table)
-    assert [row[:2] for row in table.rows] == [("converged", "6"), ("branch lost", "2")]
 
 
 def test_the_worst_certificate_is_named_with_its_place():
