@@ -13,12 +13,6 @@ function addChoice(parent, name, label, options, chosen, choose) {
   return select;
 }
 
-function show() {
-  drawPanel();
-  describe();
-  drawRoot();
-}
-
 // Lists of what the variable has: dimensions of several values, and coordinates along them.
 function fillLists() {
   const entry = variables[state.variable];
@@ -56,25 +50,32 @@ function fillSliders() {
   [...names].filter((name) => size(name) > 1).forEach(addSlider);
 }
 
-function pick(at) {
-  Object.assign(state.at, at);
+function showSliders() {
   for (const slider of byId("sliders").querySelectorAll("input")) {
     slider.value = String(state.at[slider.name]);
     slider.nextSibling.textContent = place(slider.name, state.at[slider.name]);
   }
-  show();
+  drawPanel();
+}
+
+function pick(at) {
+  Object.assign(state.at, at);
+  showSliders();
+  describe();
+  drawRoot();
 }
 
 function refresh() {
   fillLists();
   fillSliders();
-  pick({});
+  showSliders();
 }
 
 // colours are those of the page when it was opened
 DARK.addEventListener("change", () => location.reload());
 prepareRoot();
 refresh();
+pick({});
 byId("panel").on("plotly_click", (event) => {
   const found = event.points[0].customdata;
   if (!found) return;
