@@ -50,7 +50,7 @@ function fillSliders() {
   [...names].filter((name) => size(name) > 1).forEach(addSlider);
 }
 
-function showSliders() {
+function update() {
   for (const slider of byId("sliders").querySelectorAll("input")) {
     slider.value = String(state.at[slider.name]);
     slider.nextSibling.textContent = place(slider.name, state.at[slider.name]);
@@ -60,7 +60,7 @@ function showSliders() {
 
 function pick(at) {
   Object.assign(state.at, at);
-  showSliders();
+  update();
   describe();
   drawRoot();
 }
@@ -68,7 +68,7 @@ function pick(at) {
 function refresh() {
   fillLists();
   fillSliders();
-  showSliders();
+  update();
 }
 
 // colours are those of the page when it was opened
