@@ -21,7 +21,7 @@ _CHARACTERS_A_FLOAT = 16.0 / 3.0
 _MOST_POINTS = 20_000
 """Points of a study with an interactive part: each takes time to draw."""
 
-_MOST_MESSAGES = 500
+_MOST_MESSAGES, _MOST_PHASES = 500, 64
 _ERRORS = dict.fromkeys(("response_amplitude", "response_amplitude_begin", "response_peak"), "response_error")
 """Variables whose error has another name than `<name>_error`."""
 
@@ -77,7 +77,8 @@ def _arrays(result: Result) -> Iterator[tuple[str, xr.DataArray]]:
         if array.dtype.kind not in "iuf" or not set(result.axes) & set(array.dims) or not array.size:
             continue
         if "phase" in array.dims:
-            array = array.sel(contact=find_loops(result, result.shown_point()))
+            phases = slice(None, None, -(-array.sizes["phase"] // _MOST_PHASES))
+            array = array.sel(contact=find_loops(result, result.shown_point())).isel(phase=phases)
         if array.size:
             yield str(name), array
 
@@ -141,7 +142,9 @@ def _encode(array: xr.DataArray, kept: NDArray[np.intp] | None, arrays: Mapping[
 def _dimension(result: Result, name: str, arrays: Mapping[str, tuple[xr.DataArray, Any]]) -> dict[str, Any]:
     """A dimension with its values: numbers, or words."""
     if name in result.dataset.coords:
-        axis = result.dataset[name]
+        # of phases some are left out
+        shown = (array for array, _ in arrays.values() if name in array.dims)
+        axis = next(shown)[name] if name == "phase" else result.dataset[name]
         label = result.counted if name == "cycle" and not result.has_modes else name.replace("_", " ")
     else:
         size = next(array.sizes[name] for array, _ in arrays.values() if name in array.dims)
