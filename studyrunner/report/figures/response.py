@@ -114,10 +114,9 @@ def _how_to_read(result: Result, worn: bool) -> str:
 
 def _state(result: Result, end: int) -> str:
     """What a line shows: the new joint, or the worn one."""
-    if _WORN in result.axes:
-        return ""
     if end == 0:
-        return "new" if result.cycles[0] == 0 else result.cycle_label(0)
+        label = "new" if result.cycles[0] == 0 else result.cycle_label(0)
+        return "" if _WORN in result.axes else label
     return f"each point after its own {result.cycle_label(end)}"
 
 

@@ -22,6 +22,9 @@ _MOST_POINTS = 20_000
 """Points of a study with an interactive part: each takes time to draw."""
 
 _MOST_MESSAGES, _MOST_PHASES = 500, 64
+_LOOPS = "pair_of_loop"
+"""Dimension of those pairs that have loops."""
+
 _ERRORS = dict.fromkeys(("response_amplitude", "response_amplitude_begin", "response_peak"), "response_error")
 """Variables whose error has another name than `<name>_error`."""
 
@@ -79,6 +82,7 @@ def _arrays(result: Result) -> Iterator[tuple[str, xr.DataArray]]:
         if "phase" in array.dims:
             phases = slice(None, None, -(-array.sizes["phase"] // _MOST_PHASES))
             array = array.sel(contact=find_loops(result, result.shown_point())).isel(phase=phases)
+            array = array.rename(contact=_LOOPS)
         if array.size:
             yield str(name), array
 
@@ -122,16 +126,13 @@ def _encode(array: xr.DataArray, kept: NDArray[np.intp] | None, arrays: Mapping[
     words = dict(
         zip(array.attrs.get("flag_values", ()), str(array.attrs.get("flag_meanings", "")).split(), strict=False)
     )
-    places = {} if kept is None else {"cycle": kept.tolist()}
-    if "phase" in array.dims:
-        places["contact"] = array["contact"].values.tolist()
     return {
         "name": name,
         "label": str(array.attrs.get("long_name", name)),
         "unit": scale.unit,
         "factor": scale.factor,
         "dims": [str(dim) for dim in array.dims],
-        "kept": places,
+        "kept": {} if kept is None else {"cycle": kept.tolist()},
         "data": encode_floats(values),
         "error": error if error in arrays else None,
         "relative": error in arrays and str(arrays[error][0].attrs.get("units")) != str(array.attrs.get("units")),
@@ -141,17 +142,8 @@ def _encode(array: xr.DataArray, kept: NDArray[np.intp] | None, arrays: Mapping[
 
 def _dimension(result: Result, name: str, arrays: Mapping[str, tuple[xr.DataArray, Any]]) -> dict[str, Any]:
     """A dimension with its values: numbers, or words."""
-    if name in result.dataset.coords:
-        # of phases some are left out
-        shown = (array for array, _ in arrays.values() if name in array.dims)
-        axis = next(shown)[name] if name == "phase" else result.dataset[name]
-        label = result.counted if name == "cycle" and not result.has_modes else name.replace("_", " ")
-    else:
-        size = next(array.sizes[name] for array, _ in arrays.values() if name in array.dims)
-        axis = xr.DataArray(np.arange(size), dims=name, name=name)
-        if result.blocks is not None and name in result.blocks.coords:
-            axis = result.blocks[name]
-        label = name.replace("_", " ")
+    axis = next(array for array, _ in arrays.values() if name in array.dims)[name]
+    label = result.counted if name == "cycle" and not result.has_modes else name.replace("_", " ")
     words = axis.dtype.kind not in "fiu"
     values = axis.values.tolist()
     return {

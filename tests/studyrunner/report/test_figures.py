@@ -221,6 +221,16 @@ def test_frequency_response_of_both_sweeps_is_open_at_the_fold_and_unstable_stat
     np.testing.assert_allclose(lines["unstable"], [[201.0], [ringed]])
 
 
+def test_worn_joints_have_response_curves_of_their_own():
+    made = make_result(scheme=["implicit"], wear_coefficient=[0.0, 1e5])
+    worn = Result(made.path, made.dataset.rename(wear_coefficient="worn_cycle"))
+    lines = lines_of(draw_figure(worn, "frequency_response").figure.axes[0])
+    for number, label in enumerate(("worn cycle 0 1/Pa", "worn cycle 100\N{NO-BREAK SPACE}000 1/Pa")):
+        for cycle, text in ((0, ""), (-1, ", each point after its own 20\N{NO-BREAK SPACE}000 cycles")):
+            expected = 1e3 * values_of(worn, "response_amplitude", worn_cycle=number, cycle=cycle)
+            np.testing.assert_allclose(lines[label + text][1], expected)
+
+
 def test_an_exact_answer_is_drawn_beside_the_computed_one():
     result = make_result()
     exact = 1.02 * result.dataset["worn_volume"]
