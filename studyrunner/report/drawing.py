@@ -1,4 +1,4 @@
-"""What the report is made of: drawings, tables, and sentences about what is missing; and how drawings look."""
+"""What the report is made of: drawings, tables, and sentences about what is missing; how drawings look, and titles."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import AutoLocator, FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
+from studyrunner.report.reading.result import Result
 from studyrunner.report.reading.units import show_power
 
 WIDTH = 7.5
@@ -58,6 +59,8 @@ _LEGEND_ROW = 0.18
 """Inches of one row of a legend."""
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _FEWEST_TICKS, _MOST_TICKS = 3, 6
+_NAMED = ("frequency", "scheme")
+"""Axes that titles of figures of a single point name."""
 
 _STYLE: Any = {
     "font.size": 9.5,
@@ -300,3 +303,14 @@ def mark_failed(panel: Axes, positions: NDArray[np.float64], failed: NDArray[np.
             zorder=5,
         )
     return n_failed
+
+
+def title_at(result: Result, title: str, over: str = "") -> str:
+    """The title of a figure of the shown point: with its frequency, its scheme, and what else varies.
+
+    over: an axis that the figure is drawn over.
+    """
+    names = [name for name in result.axes if name in _NAMED or name in (*result.varying, *result.fixed)]
+    names = [name for name in names if name != over]
+    where = result.describe(result.shown_point(), names)
+    return f"{title}: {where}" if where else title

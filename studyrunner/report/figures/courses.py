@@ -1,4 +1,4 @@
-"""The horizontal axis of figures over an axis of the study, the values of the file along it, and titles of figures."""
+"""The horizontal axis of figures over an axis of the study, and the values of the file along it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from studyrunner.report.reading.units import scale_for, units_of
 
 _DECADES = 30.0
 _MANY = 60
-_NAMED = ("frequency", "scheme")
 
 
 @dataclass(frozen=True)
@@ -91,14 +90,3 @@ def cell_edges(positions: NDArray[np.float64], width: float = 1.0) -> NDArray[np
     middle = 0.5 * (positions[1:] + positions[:-1])
     first, last = 2.0 * positions[0] - middle[0], 2.0 * positions[-1] - middle[-1]
     return np.concatenate([[first], middle, [last]])
-
-
-def title_at(result: Result, title: str, over: str = "") -> str:
-    """The title of a figure of the shown point: with its frequency, its scheme, and what else varies.
-
-    over: an axis that the figure is drawn over.
-    """
-    names = [name for name in result.axes if name in _NAMED or name in (*result.varying, *result.fixed)]
-    names = [name for name in names if name != over]
-    where = result.describe(result.shown_point(), names)
-    return f"{title}: {where}" if where else title

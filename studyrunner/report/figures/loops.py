@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
-from studyrunner.report.drawing import Drawing, Missing, add_legend, line_style, new_panels
-from studyrunner.report.figures.courses import title_at
+from studyrunner.report.drawing import Drawing, Missing, add_legend, line_style, new_panels, title_at
 from studyrunner.report.figures.flanks import JOINT_WORDS
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.scene_pairs import last_depth, tells_depth

@@ -19,8 +19,8 @@ from studyrunner.report.drawing import (
     line_style,
     new_panels,
     set_from_zero,
+    title_at,
 )
-from studyrunner.report.figures.courses import title_at
 from studyrunner.report.reading.result import NO_VOLUME, Result, as_sentences
 from studyrunner.report.reading.units import scale_for, show_number
 

@@ -22,8 +22,8 @@ from studyrunner.report.drawing import (
     new_figure,
     new_panels,
     set_from_zero,
+    title_at,
 )
-from studyrunner.report.figures.courses import title_at
 from studyrunner.report.figures.flanks import Flank, find_flanks
 from studyrunner.report.figures.scar import draw_scar_depth, draw_scar_pressure
 from studyrunner.report.reading.choice import choose

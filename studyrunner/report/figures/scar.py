@@ -15,8 +15,8 @@ from studyrunner.report.drawing import (
     line_style,
     new_figure,
     set_from_zero,
+    title_at,
 )
-from studyrunner.report.figures.courses import title_at
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.scars import Scar
 from studyrunner.report.reading.scene_pairs import depths, last_depth

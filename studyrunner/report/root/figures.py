@@ -13,7 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import MAP, Drawing, Missing, new_figure
+from studyrunner.report.drawing import MAP, Drawing, Missing, new_figure, title_at
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.scars import find_scar
 from studyrunner.report.reading.scene_pairs import depths, tells_depth
@@ -99,7 +99,7 @@ def draw_state(result: Result, surface: RootSurface, views: Sequence[View], stat
     figure = _paint_state(surface, views, state, factor, scale, label)
     pair = result.dataset["contact"].values[int(np.argmax(state.values))]
     text = as_sentences(
-        f"{label.capitalize()} {result.when(state.cycle, 'after')} at {result.describe(result.shown_point())}",
+        f"{label.capitalize()} {result.when(state.cycle, 'after')}",
         f"Largest: {scale.show(largest)} at pair {pair}" if largest > 0.0 else "",
         f"The wear depth, of both surfaces together, is taken off each surface, {show_number(factor)} times exaggerated"
         if worn
@@ -107,7 +107,7 @@ def draw_state(result: Result, surface: RootSurface, views: Sequence[View], stat
         "Dashed: the edge of the contact surface before" if _close_ups(views) and worn else "",
         "The file has no mesh: each pair is a patch" if not surface.is_mesh else "",
     )
-    return Drawing("worn_root", "The worn root" if worn else "The root", text, figure)
+    return Drawing("worn_root", title_at(result, "The worn root" if worn else "The root"), text, figure)
 
 
 def _close_ups(views: Sequence[View]) -> list[View]:
@@ -220,8 +220,8 @@ def draw_mode_fractions(result: Result) -> Iterator[Drawing | Missing]:
         figure = _paint_state(surface, views, state, 1.0, scale_for("1", values), label)
         pair = result.dataset["contact"].values[int(np.argmax(values))]
         caption = as_sentences(
-            f"{label.capitalize()}, at {result.describe(point)}",
+            label.capitalize(),
             f"Largest: {values.max():.3g} at pair {pair}" if values.max() > 0.0 else "No pair does",
             "" if surface.is_mesh else "The file has no mesh: each pair is a patch",
         )
-        yield Drawing(name, title, caption, figure)
+        yield Drawing(name, title_at(result, title), caption, figure)
