@@ -174,14 +174,16 @@ def set_in_column(figure: Figure) -> None:
     """Lay a figure of one panel out anew, as wide as a column of a journal; its text keeps its size."""
     figure.set_size_inches(COLUMN_WIDTH, _COLUMN_HEIGHT)
     figure.set_layout_engine("constrained")
-    for legend in figure.legends:
+    legends = list(figure.legends)
+    for legend in legends:
         legend.remove()
     (panel,) = figure.axes
     panel.set_ylabel(textwrap.fill(panel.get_ylabel(), _COLUMN_LABEL, break_on_hyphens=False))
     if isinstance(panel.yaxis.get_major_locator(), AutoLocator):
         # steps of 2.5 have one digit more: with them the layout goes to and fro
         panel.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-    add_legend(figure)
+    if legends:
+        add_legend(figure)
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
