@@ -7,8 +7,7 @@ import os
 import sys
 import time
 import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -42,21 +41,6 @@ exit status:
   2  bad input, nothing was written: one line says what is wrong"""
 
 
-@dataclass(frozen=True)
-class Options:
-    """The command line.
-
-    folder: where the report goes. vtu: whether files for ParaView are written, too. point: values of axes, as text, of
-    the point that figures of single points show. measured: CSV file of a worn profile.
-    """
-
-    result: Path
-    folder: Path
-    vtu: bool = False
-    point: Mapping[str, str] = field(default_factory=dict)
-    measured: Path | None = None
-
-
 class _Parser(argparse.ArgumentParser):
     """A parser that reports mistakes as UserError."""
 
@@ -64,8 +48,8 @@ class _Parser(argparse.ArgumentParser):
         raise UserError("command line", "options", None, f"{message}; study-report --help lists them")
 
 
-def parse_options(arguments: Sequence[str]) -> Options:
-    """The command line.
+def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+    """The command line: `result`, `folder` and `measured` are paths, None where left out; `vtu`; `point`, by axis.
 
     Raises
     ------
@@ -81,32 +65,36 @@ def parse_options(arguments: Sequence[str]) -> Options:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("result", metavar="OUT.nc", help="result file of run-study")
-    parser.add_argument("-o", dest="folder", metavar="FOLDER", help="where to write (default: OUT-report, here)")
+    parser.add_argument("result", metavar="OUT.nc", type=Path, help="result file of run-study")
+    parser.add_argument(
+        "-o", dest="folder", metavar="FOLDER", type=Path, help="where to write (default: OUT-report, here)"
+    )
     parser.add_argument(
         "--vtu", action="store_true", help="also the root as VTU files over the cycles, for ParaView (extra meshio)"
     )
     parser.add_argument(
         "--point",
         metavar="AXIS=VALUE,...",
-        default="",
+        type=_read_point,
+        default={},
         help="the point that root, maps, loops and --vtu show (default: the most worn one)",
     )
     parser.add_argument(
         "--measured",
         metavar="PROFILE.csv",
+        type=Path,
         help="measured scar of a cylinder or sphere on a flat; first line x_mm,depth_um (also m, um)",
     )
-    found = parser.parse_args(list(arguments))
-    result = Path(found.result)
-    folder = Path(f"{result.stem}-report" if found.folder is None else found.folder)
-    point = {}
-    for text in filter(None, (part.strip() for part in found.point.split(","))):
-        name, equals, value = text.partition("=")
+    return parser.parse_args(list(arguments))
+
+
+def _read_point(text: str) -> dict[str, str]:
+    """Values of axes, as text. Raises UserError."""
+    parts = [part.strip().partition("=") for part in text.split(",") if part.strip()]
+    for name, equals, _ in parts:
         if not equals:
-            raise UserError("command line", "--point", text, "give AXIS=VALUE, as frequency=211.75")
-        point[name.strip()] = value.strip()
-    return Options(result, folder, found.vtu, point, None if found.measured is None else Path(found.measured))
+            raise UserError("command line", "--point", name, "give AXIS=VALUE, as frequency=211.75")
+    return {name.strip(): value.strip() for name, _, value in parts}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -135,15 +123,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return UNEXPECTED
 
 
-def _report(options: Options) -> int:
+def _report(options: argparse.Namespace) -> int:
     # Loaded late: help and mistakes on the command line do not wait for the libraries that draw.
     began = time.monotonic()
     from rich.console import Console
     from rich.markup import escape
 
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
+        from studyrunner.report.contents import draw_report
         from studyrunner.report.page.page import write_page
-        from studyrunner.report.page_contents import draw_report
         from studyrunner.report.reading.result import open_for_report
         from studyrunner.report.reading.schema_check import check_numbers, reading_errors
         from studyrunner.report.root.vtu import find_writer
@@ -153,10 +141,11 @@ def _report(options: Options) -> int:
         with result.dataset, reading_errors(str(options.result)):
             check_numbers(result.dataset, str(options.result))
             write_series = find_writer(result) if options.vtu else None
-            _make_folder(options.folder)
-            page = options.folder / "index.html"
+            folder = options.folder or Path(f"{options.result.stem}-report")
+            _make_folder(folder)
+            page = folder / "index.html"
             summary = write_page(result, _say(draw_report(result), status), page)
-            series = write_series(options.folder) if write_series else None
+            series = write_series(folder) if write_series else None
     shown = f"{count(summary.n_drawings, 'figure')}, {count(summary.n_tables, 'table')}, {summary.n_missing} left out"
     seconds = format_seconds(time.monotonic() - began)
     print(f"{page}: {shown}, {summary.n_bytes / 1e6:.1f} MB, {seconds}; open it in a browser")

@@ -1,4 +1,4 @@
-"""What the report is made of: drawings, tables, and sentences about what is missing; and how drawings look."""
+"""What the report is made of: drawings, tables, and sentences about what is missing; how drawings look, and titles."""
 
 from __future__ import annotations
 
@@ -14,13 +14,19 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import QuadMesh
+from matplotlib.axis import Axis, XAxis
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PathCollection, QuadMesh
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
-from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
 from matplotlib.textpath import TextPath
-from matplotlib.ticker import AutoLocator, MaxNLocator
+from matplotlib.ticker import AutoLocator, FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 from numpy.typing import NDArray
+
+from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.units import show_power
 
 WIDTH = 7.5
 """Inches of a figure across a printed page: 190 mm, both columns of a journal."""
@@ -32,10 +38,14 @@ _COLUMN_HEIGHT = 2.6
 _COLUMN_LABEL = 28
 """Characters of a vertical label that fit beside such a panel."""
 
-DPI = 120
+DPI = 200
+"""Of what is drawn as pixels in the SVG files."""
 
 PRINT_DPI = 300
 """Of the PNG files, as journals ask for."""
+
+_MANY = 600
+"""Points of a line from which on it is pixels in the SVG files, as maps are."""
 
 MAP = "cividis"
 """Colour map of values from low to high: its lightness grows evenly, and it looks the same to the colour blind."""
@@ -43,10 +53,14 @@ MAP = "cividis"
 # Okabe & Ito (2008), "Color universal design", without its yellow, which vanishes on white. Lightness differs as well.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9")
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
-_LONGEST_LABEL = 100
+_CHARACTERS = 13.0
+"""Of a label of a legend, in an inch."""
 _LEGEND_ROW = 0.18
 """Inches of one row of a legend."""
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_FEWEST_TICKS, _MOST_TICKS = 3, 6
+_NAMED = ("frequency", "scheme")
+"""Axes that titles of figures of a single point name."""
 
 _STYLE: Any = {
     "font.size": 9.5,
@@ -89,23 +103,23 @@ class Drawing:
     caption: str
     figure: Figure
 
-    def save(self, folder: Path) -> tuple[Path, Path]:
-        """Write `<name>.svg` and `<name>.png` into a folder that exists; both paths.
+    def save(self, folder: Path) -> tuple[Path, ...]:
+        """Write `<name>.svg` and `<name>.png` into a folder that exists; the SVG files.
 
         A figure of one panel also becomes `<name>_column.svg` and `<name>_column.png`, as wide as a column.
         """
         with style():
-            paths = _save(self.figure, folder / self.name)
+            paths = [_save(self.figure, folder / self.name)]
             if self.fits_column:
                 set_in_column(self.figure)
-                _save(self.figure, folder / f"{self.name}_column")
-        return paths
+                paths.append(_save(self.figure, folder / f"{self.name}_column"))
+        return tuple(paths)
 
     @property
     def fits_column(self) -> bool:
         """Whether it has one plane panel, no map, and its legend names what is drawn in it."""
         panels, legends = self.figure.axes, self.figure.legends
-        if len(panels) != 1 or panels[0].name != "rectilinear" or panels[0].findobj(_is_map):
+        if len(panels) != 1 or panels[0].name != "rectilinear" or panels[0].findobj(QuadMesh):
             return False
         labels = set(panels[0].get_legend_handles_labels()[1])
         return all({text.get_text() for text in legend.get_texts()} <= labels for legend in legends)
@@ -140,32 +154,36 @@ def style() -> Iterator[None]:
         yield
 
 
-def _is_map(artist: Artist) -> bool:
-    return isinstance(artist, QuadMesh | AxesImage)
-
-
-def _save(figure: Figure, path: Path) -> tuple[Path, Path]:
-    """The figure as SVG and as PNG; `path` is without a suffix. From then on what stands where is fixed."""
+def _save(figure: Figure, path: Path) -> Path:
+    """The figure as SVG, whose path is returned, and PNG; `path` is without a suffix. It is laid out for good."""
+    for artist in figure.findobj(Line2D) + figure.findobj(PathCollection):
+        points = artist.get_xdata() if isinstance(artist, Line2D) else artist.get_offsets()
+        artist.set_rasterized(np.size(points) > _MANY)
+    for mesh in figure.findobj(QuadMesh):
+        # cells as shapes of their own have seams between them
+        mesh.set_rasterized(True)
     svg, png = path.with_name(f"{path.name}.svg"), path.with_name(f"{path.name}.png")
     figure.savefig(svg, format="svg", metadata={"Date": None})
     # What stands where is the same for both: it is found once.
     figure.set_layout_engine("none")
     figure.savefig(png, format="png", dpi=PRINT_DPI)
-    return svg, png
+    return svg
 
 
 def set_in_column(figure: Figure) -> None:
     """Lay a figure of one panel out anew, as wide as a column of a journal; its text keeps its size."""
     figure.set_size_inches(COLUMN_WIDTH, _COLUMN_HEIGHT)
     figure.set_layout_engine("constrained")
-    for legend in figure.legends:
+    legends = list(figure.legends)
+    for legend in legends:
         legend.remove()
     (panel,) = figure.axes
     panel.set_ylabel(textwrap.fill(panel.get_ylabel(), _COLUMN_LABEL, break_on_hyphens=False))
     if isinstance(panel.yaxis.get_major_locator(), AutoLocator):
         # steps of 2.5 have one digit more: with them the layout goes to and fro
         panel.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-    add_legend(figure)
+    if legends:
+        add_legend(figure)
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
@@ -209,7 +227,7 @@ def add_legend(figure: Figure, handles: Sequence[Artist] | None = None) -> None:
         found = {str(handle.get_label()): handle for handle in handles}
     if not found:
         return
-    labels = [textwrap.fill(label, _LONGEST_LABEL) for label in found]
+    labels = [textwrap.fill(label, int(_CHARACTERS * figure.get_figwidth())) for label in found]
     size = FontProperties(size=mpl.rcParams["legend.fontsize"]).get_size_in_points()
     gap = size * mpl.rcParams["legend.columnspacing"]
     mark = size * (mpl.rcParams["legend.handlelength"] + mpl.rcParams["legend.handletextpad"])
@@ -227,6 +245,36 @@ def add_legend(figure: Figure, handles: Sequence[Artist] | None = None) -> None:
 def set_from_zero(panel: Axes, largest: float) -> None:
     """Let the vertical axis begin at zero, and end at something where all values are zero."""
     panel.set_ylim(0.0, 1.06 * largest if largest > 0.0 else 1.0)
+
+
+def add_colour_bar(figure: Figure, panels: Any, norm: Normalize, label: str, **options: Any) -> None:
+    """The colour bar of maps, dots or faces. panels, options: as for `colorbar`; cmap: another than `MAP`."""
+    figure.colorbar(ScalarMappable(norm, options.pop("cmap", None)), ax=panels, label=label, **options)
+
+
+def set_log(axis: Axis, low: float, high: float, percent: bool = False) -> None:
+    """A logarithmic axis that shows values between these, above zero, with three to six ticks in few digits."""
+    if isinstance(axis, XAxis):
+        axis.axes.set_xscale("log")
+    else:
+        axis.axes.set_yscale("log")
+    decades = [10.0**power for power in range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 2)]
+    if high < 20.0 * low:
+        low, high = 0.9 * low, 1.1 * high
+    for steps in ((1.0,), (1.0, 3.0), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)):
+        ticks = [factor * decade for decade in decades for factor in steps if low <= factor * decade <= high]
+        if len(ticks) >= _FEWEST_TICKS:
+            break
+    ticks = ticks[:: -(-len(ticks) // _MOST_TICKS)] if ticks else []
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_locator(FixedLocator(ticks))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _show_tick(value, percent)))
+
+
+def _show_tick(value: float, percent: bool) -> str:
+    number = 100.0 * value if percent else value
+    text = f"{number:.4g}" if 1e-3 <= number < 1e4 else show_power(number)
+    return f"{text} %" if percent else text
 
 
 def hatch_empty(panel: Axes, anything_empty: bool) -> None:
@@ -257,3 +305,14 @@ def mark_failed(panel: Axes, positions: NDArray[np.float64], failed: NDArray[np.
             zorder=5,
         )
     return n_failed
+
+
+def title_at(result: Result, title: str, over: str = "") -> str:
+    """The title of a figure of the shown point: with its frequency, its scheme, and what else varies.
+
+    over: an axis that the figure is drawn over.
+    """
+    names = [name for name in result.axes if name in _NAMED or name in (*result.varying, *result.fixed)]
+    names = [name for name in names if name != over]
+    where = result.describe(result.shown_point(), names)
+    return f"{title}: {where}" if where else title

@@ -26,8 +26,8 @@ from matplotlib.collections import LineCollection, QuadMesh
 from matplotlib.container import ErrorbarContainer
 
 import studies
+from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Drawing
-from studyrunner.report.page_contents import draw_report
 from studyrunner.report.reading.result import Result, open_for_report
 from tests.benchmarks.small_png import shrink
 
@@ -68,7 +68,7 @@ def write_picture(drawing: Drawing, folder: Path) -> Path:
     """The figure as a PNG file of `WIDTH` pixels in few colours; its path."""
     path = folder / f"{drawing.name}.png"
     with tempfile.TemporaryDirectory() as large:
-        path.write_bytes(shrink(drawing.save(Path(large))[1].read_bytes(), WIDTH))
+        path.write_bytes(shrink(drawing.save(Path(large))[0].with_suffix(".png").read_bytes(), WIDTH))
     return path
 
 

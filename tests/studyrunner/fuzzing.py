@@ -212,13 +212,13 @@ def ask(path: Path) -> int:
     return 0
 
 
-def _lay_out(drawing: Drawing, folder: Path) -> tuple[Path, Path]:
+def _lay_out(drawing: Drawing, folder: Path) -> tuple[Path]:
     """As Drawing.save, with everything but the painting, which takes most of the time."""
     with style():
         drawing.figure.draw_without_rendering()
-    paths = folder / f"{drawing.name}.svg", folder / f"{drawing.name}.png"
-    paths[0].write_text('<svg xmlns="http://www.w3.org/2000/svg"/>', encoding="utf-8")
-    return paths
+    path = folder / f"{drawing.name}.svg"
+    path.write_text('<svg xmlns="http://www.w3.org/2000/svg"/>', encoding="utf-8")
+    return (path,)
 
 
 def command_of(kind: str) -> int:

@@ -1,4 +1,4 @@
-"""Frequency response at the first and the last cycle count, on the branches of both sweeps (Fig. 9 of the paper)."""
+"""Frequency response of the joint, new and worn, on the branches of both sweeps (Fig. 9 of the paper)."""
 
 from __future__ import annotations
 
@@ -10,72 +10,71 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS, Drawing, Missing, add_legend, mark_failed, new_panels, set_from_zero
-from studyrunner.report.figures.frequency_course import Course, find_course
-from studyrunner.report.reading.choice import Choice, choose
-from studyrunner.report.reading.result import Point, Result, as_sentences
+from studyrunner.report.figures.courses import Course, find_course
+from studyrunner.report.reading.choice import choose
+from studyrunner.report.reading.result import NO_VOLUME, Point, Result, as_sentences
 from studyrunner.report.reading.units import Scale, scale_for
 from studyrunner.system.progress import count
 
-_MOST_LINES = 3
-_MOST_RESPONSES = 3
+_MOST_LINES, _MOST_RESPONSES, _MOST_FOLDS = 3, 3, 12
 _OF_WEAR = ("wear_coefficient", "step", "scheme")
-_TITLE = "Frequency response, first and last cycle"
+_WORN = "worn_cycle"
+_NEW: dict[str, Any] = {"markerfacecolor": "white", "linestyle": (0, (4, 2)), "linewidth": 1.2}
+_WORN_POINTS: dict[str, Any] = {"linewidth": 0.5, "linestyle": ":"}
+"""No curve: the points are of different joints."""
+_RING: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 10, "markerfacecolor": "none"}
 
 
 def draw_responses(result: Result) -> Iterator[Drawing | Missing]:
     """The frequency response; a sentence where the file has one frequency or no response."""
+    course, title = find_course(result, "frequency"), "Frequency response"
     if not result.has("response_amplitude"):
-        yield Missing("frequency_response", _TITLE, result.lacks("response_amplitude"))
-        return
-    course = find_course(result, "frequency")
-    if course is None:
-        yield Missing("frequency_response", _TITLE, "The study has one frequency: give several under [axes] frequency.")
-        return
-    yield draw_response(result, course)
+        yield Missing("frequency_response", title, result.lacks("response_amplitude"))
+    elif course is None:
+        yield Missing("frequency_response", title, "The study has one frequency: give several under [axes] frequency.")
+    else:
+        yield _draw(result, course)
 
 
-def draw_response(result: Result, course: Course) -> Drawing:
-    """Amplitude of the first harmonic over frequency, one panel a response (Fig. 9)."""
+def _draw(result: Result, course: Course) -> Drawing:
+    """Amplitude of the first harmonic over frequency, one panel a response.
+
+    Of a point that wore, the first and the last count: the latter joins points that wore differently.
+    """
     # Scheme, step and wear coefficient make no difference at the first cycle: the sweep is what the figure is about.
-    choice = choose(result, ["frequency"], _MOST_LINES, first=("sweep", "excitation_amplitude", "scheme"))
+    choice = choose(result, ["frequency"], _MOST_LINES, first=(_WORN, "sweep", "excitation_amplitude", "scheme"))
     n_panels = min(len(result.responses), _MOST_RESPONSES)
     figure, panels = new_panels(n_panels, 1, 0.5 + 3.1 * n_panels, sharex=True)
     amplitudes = [course.read(result, "response_amplitude", point) for point in choice.points]
     unit = str(result.dataset["response_amplitude"].attrs.get("units", "m"))
     failed = np.array([np.isnan(amplitude[:, 0, 0]) for amplitude in amplitudes])
+    wears = not result.has("worn_volume") or bool(np.nanmax(result.worn) > NO_VOLUME)
+    ends = [0, -1] if len(result.cycles) > 1 and wears else [0]
     peaks: list[str] = []
-    exact_drawn = unstable_drawn = False
     for number, panel in enumerate(panels[:, 0]):
         scale = scale_for(unit, *(amplitude[:, :, number] for amplitude in amplitudes))
-        unworn: set[str] = set()
+        drawn: set[str] = set()
         for line, (point, label) in enumerate(choice):
-            amplitude = amplitudes[line][:, :, number]
-            ends = [0, -1] if len(result.cycles) > 1 else [0]
             for end in ends:
-                values, told = amplitude[:, end], label
-                if end == 0 and result.cycles[0] == 0:
-                    told = _tell_unworn(result, point, choice)
-                    if told in unworn:
-                        continue
-                    unworn.add(told)
-                    same = [
-                        one for one, other in enumerate(choice.points) if _tell_unworn(result, other, choice) == told
-                    ]
-                    values = _first_known([amplitudes[one][:, 0, number] for one in same])
-                if np.isnan(values).all():
+                told = _tell_unworn(result, point, choice.points) if end == 0 and result.cycles[0] == 0 else label
+                text = ", ".join(filter(None, (told, _state(result, end))))
+                # states at the first count are the same for all that differs in wear alone: NaN where one has none
+                same = [each for each, other in enumerate(choice.points) if end or _same_start(result, other, point)]
+                values = amplitudes[line][:, end, number]
+                for each in [] if end else same:
+                    values = np.where(np.isnan(values), amplitudes[each][:, end, number], values)
+                if text in drawn or np.isnan(values).all():
                     continue
-                text = ", ".join(part for part in (told, result.cycle_label(end)) if part)
+                drawn.add(text)
                 style = course.line_style(line) | {"label": text}
-                if end == 0 and told == "" and len(choice.points) > 1:
-                    style["color"] = "0.2"
+                if len(ends) > 1:
+                    style |= _NEW if end == 0 else _WORN_POINTS
                 _draw_branch(result, panel, course, point, scale(values), end, style)
-                unstable_drawn |= _mark_unstable(result, panel, course, point, scale(values), end, not unstable_drawn)
                 if number == 0:
                     top = int(np.nanargmax(values))
-                    at = result.describe({"frequency": int(course.index[top])}, ["frequency"])
-                    peaks.append(f"{scale.show(float(values[top]))} at {at} ({text})")
+                    peaks.append(f"{scale.show(float(values[top]))} at {course.at(result, top)} ({text})")
             if result.has("exact_response_amplitude"):
-                exact_drawn |= _draw_exact(result, panel, course, point, number, scale, ends, first=line == 0)
+                _draw_exact(result, panel, course, point, number, scale, ends)
         set_from_zero(panel, panel.dataLim.ymax)
         panel.set_ylabel(scale.label(f"amplitude of {result.responses[number]}"))
         _mark_folds(result, panel)
@@ -84,34 +83,56 @@ def draw_response(result: Result, course: Course) -> Drawing:
     course.set_axis(panels[-1, 0])
     more = len(result.responses) - n_panels
     caption = as_sentences(
-        f"Amplitude of the first harmonic over frequency. Largest of {result.responses[0]}: {'; '.join(peaks)}",
-        "The file holds the unworn states only" if len(result.cycles) == 1 and result.cycles[0] == 0 else "",
+        f"Largest amplitude of the first harmonic of {result.responses[0]}: {'; '.join(peaks)}",
+        _how_to_read(result, len(ends) > 1),
         _tell_folds(result),
-        "Grey bands: exact answer" if exact_drawn else "",
-        "Rings: unstable states" if unstable_drawn else "",
         f"Crosses: at these, {count(n_failed, 'point')} in all without a result" if n_failed else "",
         f"{more} more responses are in the file" if more else "",
         choice.sentence,
     )
-    return Drawing("frequency_response", _TITLE, caption, figure)
+    return Drawing("frequency_response", _title(result, len(ends) > 1), caption, figure)
 
 
-def _tell_unworn(result: Result, point: Point, choice: Choice) -> str:
+def _title(result: Result, worn: bool) -> str:
+    if worn:
+        return "Response at each frequency, new and after wear at that frequency"
+    if _WORN in result.axes:
+        return "Frequency response of one joint, worn before"
+    return "Frequency response of the new joint" if result.cycles[0] == 0 else "Frequency response"
+
+
+def _how_to_read(result: Result, worn: bool) -> str:
+    if worn:
+        return (
+            "After wear, each point shows a joint that wore at its own frequency only: the line through these points is"
+            " not the response curve of one worn joint, and a lower peak does not mean that wear protects. For that"
+            " curve run the study with [scene] worn = {result = ..., frequency = ..., cycle = [0, ...]} and"
+            " slow_time.cycles = 0"
+        )
+    return "Each line is the response of one joint, worn before as its label says" if _WORN in result.varying else ""
+
+
+def _state(result: Result, end: int) -> str:
+    """What a line shows: the new joint, or the worn one."""
+    if end == 0:
+        label = "new" if result.cycles[0] == 0 else result.cycle_label(0)
+        return "" if _WORN in result.axes else label
+    return f"each point after its own {result.cycle_label(end)}"
+
+
+def _tell_unworn(result: Result, point: Point, points: tuple[dict[str, int], ...]) -> str:
     """Label of an unworn state: nothing that only tells how it wears."""
     told = [
         name
         for name in result.varying
-        if name not in _OF_WEAR and len({other.get(name) for other in choice.points}) > 1
+        if name not in _OF_WEAR and len({other.get(name) for other in points}) > 1 and name in point
     ]
     return result.describe(point, told)
 
 
-def _first_known(lines: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Of lines that agree where they have values, the first value at each place."""
-    found = lines[0].copy()
-    for line in lines[1:]:
-        found = np.where(np.isnan(found), line, found)
-    return found
+def _same_start(result: Result, one: Point, other: Point) -> bool:
+    """Whether two points differ in nothing but how they wear."""
+    return result.cycles[0] == 0 and all(one[name] == other[name] for name in one if name not in _OF_WEAR)
 
 
 def _draw_branch(
@@ -123,48 +144,28 @@ def _draw_branch(
     end: int,
     style: dict[str, Any],
 ) -> None:
-    """One line: the first cycle dashed with open markers, open where the sweep has jumped; the last one full."""
+    """One line with its unstable states; that of the first count open where the sweep has jumped."""
     at = course.values
-    if end == 0:
-        style = style | {"markerfacecolor": "white", "linestyle": (0, (4, 2)), "linewidth": 1.2}
-        if result.has("branch"):
-            jumps = np.flatnonzero(np.diff(course.read(result, "branch", point)) != 0) + 1
-            at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan)
+    if result.has("stable"):
+        unstable = course.read(result, "stable", point)[:, end] == 0
+        named = "unstable" not in panel.get_legend_handles_labels()[1]
+        if unstable.any():
+            panel.plot(at[unstable], values[unstable], color="black", label="unstable" if named else None, **_RING)
+    if end == 0 and result.has("branch"):
+        jumps = np.flatnonzero(np.diff(course.read(result, "branch", point)) != 0) + 1
+        at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan)
     panel.plot(at, values, **style)
 
 
-def _mark_unstable(
-    result: Result, panel: Axes, course: Course, point: Point, values: NDArray[np.float64], end: int, named: bool
-) -> bool:
-    """Rings around unstable states; whether there are any."""
-    if not result.has("stable"):
-        return False
-    unstable = course.read(result, "stable", point)[:, end] == 0
-    if not unstable.any():
-        return False
-    panel.plot(
-        course.values[unstable],
-        values[unstable],
-        linestyle="none",
-        marker="o",
-        markersize=10,
-        markerfacecolor="none",
-        color="black",
-        label="unstable" if named else None,
-    )
-    return True
-
-
 def _draw_exact(
-    result: Result, panel: Axes, course: Course, point: Point, number: int, scale: Scale, ends: list[int], first: bool
-) -> bool:
-    """Exact answers as broad grey lines; whether there are any."""
+    result: Result, panel: Axes, course: Course, point: Point, number: int, scale: Scale, ends: list[int]
+) -> None:
+    """Exact answers as broad grey lines."""
     exact = course.read(result, "exact_response_amplitude", point)[:, :, number]
     for end in ends:
         if np.isfinite(exact[:, end]).any():
-            label = "exact" if first and end == ends[0] else None
+            label = None if "exact" in panel.get_legend_handles_labels()[1] else "exact"
             panel.plot(course.values, scale(exact[:, end]), color="0.5", linewidth=5, alpha=0.45, zorder=1, label=label)
-    return bool(np.isfinite(exact).any())
 
 
 def folds(result: Result) -> list[tuple[str, float]]:
@@ -174,8 +175,7 @@ def folds(result: Result) -> list[tuple[str, float]]:
     fold = result.read("fold_frequency")
     sweeps = np.array([""])
     if "sweep" in fold.dims:
-        fold = fold.transpose(..., "sweep")
-        sweeps = result.dataset["sweep"].values.astype(str)
+        fold, sweeps = fold.transpose(..., "sweep"), result.dataset["sweep"].values.astype(str)
     values = fold.values.reshape(-1, len(sweeps))
     found = {
         (str(sweep), float(frequency))
@@ -188,19 +188,16 @@ def folds(result: Result) -> list[tuple[str, float]]:
 def _mark_folds(result: Result, panel: Axes) -> None:
     """A line down at each fold; its triangle points the way of the sweep."""
     named: set[str] = set()
-    for sweep, frequency in folds(result)[:12]:
+    for sweep, frequency in folds(result)[:_MOST_FOLDS]:
         label = f"fold, sweep {sweep}" if sweep else "fold"
         panel.axvline(frequency, color=COLOURS[3], linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
-        panel.plot(
-            frequency,
-            0.97,
-            marker={"up": ">", "down": "<"}.get(sweep, "v"),
-            color=COLOURS[3],
-            linestyle="none",
-            markersize=6,
-            transform=panel.get_xaxis_transform(),
-            label=None if label in named else label,
-        )
+        style: dict[str, Any] = {
+            "marker": {"up": ">", "down": "<"}.get(sweep, "v"),
+            "color": COLOURS[3],
+            "markersize": 6,
+        }
+        label_once = None if label in named else label
+        panel.plot(frequency, 0.97, linestyle="none", transform=panel.get_xaxis_transform(), label=label_once, **style)
         named.add(label)
 
 
@@ -211,4 +208,4 @@ def _tell_folds(result: Result) -> str:
         return ""
     shown = ", ".join(f"{frequency:.6g} Hz{f' (sweep {sweep})' if sweep else ''}" for sweep, frequency in found[:4])
     more = f" and {len(found) - 4} more" if len(found) > 4 else ""
-    return f"Dotted: folds at which a sweep jumps to another branch, at {shown}{more}"
+    return f"Dotted, upright: folds at which a sweep jumps to another branch, at {shown}{more}"

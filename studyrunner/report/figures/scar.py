@@ -7,8 +7,16 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import COLOURS, Drawing, add_legend, line_style, new_figure, set_from_zero
-from studyrunner.report.isolines import add_colour_bar
+from studyrunner.report.drawing import (
+    COLOURS,
+    Drawing,
+    add_colour_bar,
+    add_legend,
+    line_style,
+    new_figure,
+    set_from_zero,
+    title_at,
+)
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.reading.scars import Scar
 from studyrunner.report.reading.scene_pairs import depths, last_depth
@@ -40,11 +48,10 @@ def draw_scar_pressure(result: Result, scar: Scar) -> Drawing:
         for cycle, each in zip(kept, values, strict=True)
     ]
     text = as_sentences(
-        f"Contact pressure over x, mean over a period, at {result.describe(shown)}",
-        f"Largest: {', '.join(largest)}",
+        f"Mean over a period. Largest: {', '.join(largest)}",
         _how_much(scar),
     )
-    return Drawing("mean_pressure", "Mean pressure", text, figure)
+    return Drawing("mean_pressure", title_at(result, "Mean pressure over x"), text, figure)
 
 
 def draw_scar_depth(result: Result, scar: Scar) -> Drawing:
@@ -86,14 +93,13 @@ def draw_scar_depth(result: Result, scar: Scar) -> Drawing:
     add_legend(figure)
     worn = np.abs(scar.x[scar.line][after[pairs] > _NO_DEPTH])
     text = as_sentences(
-        f"Wear scar over x {result.when(last, 'after')} at {result.describe(shown)}",
-        f"Deepest: {scale.show(float(np.nanmax(after)))}; worn from x = {along.show(float(worn.min()))} to"
-        f" {along.show(float(worn.max()))} on both sides",
+        f"{result.when(last, 'after').capitalize()}. Deepest: {scale.show(float(np.nanmax(after)))}",
+        f"Worn from x = {along.show(float(worn.min()))} to {along.show(float(worn.max()))} on both sides",
         "The depth is the sum of both bodies",
         _how_much(scar),
         "" if measured is None else f"Measured: {measured.name}",
     )
-    return Drawing("worn_profile", "Wear scar", text, figure)
+    return Drawing("worn_profile", title_at(result, "Wear scar"), text, figure)
 
 
 def _draw_map(panel: Axes, scar: Scar, values: NDArray[np.float64], norm: Normalize, milli: float) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from studyrunner.report.drawing import COLOURS, Drawing, Missing, new_figure, set_from_zero
+from studyrunner.report.drawing import COLOURS, Drawing, Missing, line_style, new_figure, set_from_zero
 from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint_faces, rgb
 from studyrunner.report.root.surface import MESH
@@ -26,21 +27,18 @@ def draw_sector(result: Result) -> Iterator[Drawing | Missing]:
     lacking = [name for name, held in (("natural_frequency", frequencies), ("mesh", mesh)) if not held]
     if lacking:
         sentence = f"Add {' and '.join(lacking)} to [outputs] variables. Only bundled sector scenes have them."
-        if not frequencies or not mesh:
-            yield Missing("natural_frequencies" if not frequencies else "mesh", _TITLE, sentence)
+        yield Missing("natural_frequencies" if not frequencies else "mesh", _TITLE, sentence)
     if not mesh and not frequencies:
         return
     figure = new_figure(4.0)
     ratios = [ratio for ratio, held in ((1.0, mesh), (1.7, frequencies)) if held]
     panels = figure.subplots(1, len(ratios), squeeze=False, width_ratios=ratios)[0]
-    sentences = []
-    if mesh:
-        sentences.append(_draw_mesh(result, panels[0]))
-    if frequencies:
-        sentences.append(_draw_frequencies(result, panels[-1]))
-    sentences.append(f"Of the sector at {result.describe(result.shown_point(), result.fixed)}" if result.fixed else "")
-    name = "natural_frequencies" if frequencies else "mesh"
-    yield Drawing(name, _TITLE, as_sentences(*sentences), figure)
+    text = as_sentences(
+        _draw_mesh(result, panels[0]) if mesh else "",
+        _draw_frequencies(result, panels[-1]) if frequencies else "",
+        f"Of the sector at {result.describe(result.shown_point(), result.fixed)}" if result.fixed else "",
+    )
+    yield Drawing("natural_frequencies" if frequencies else "mesh", _TITLE, text, figure)
 
 
 def _draw_frequencies(result: Result, panel: Axes) -> str:
@@ -48,35 +46,23 @@ def _draw_frequencies(result: Result, panel: Axes) -> str:
     frequencies = result.read("natural_frequency").transpose("nodal_diameter", "mode").values
     diameters = result.dataset["nodal_diameter"].values
     for number, mode in enumerate(frequencies.T):
-        marker = "os^DvPX"[number % 7]
-        panel.plot(
-            diameters, mode, color="0.35", linewidth=0.8, marker=marker, markersize=3.5, markerfacecolor=COLOURS[0]
-        )
+        style = {"linewidth": 0.8, "markersize": 3.5, "marker": line_style(number)["marker"]}
+        panel.plot(diameters, mode, color="0.35", markerfacecolor=COLOURS[0], **style)
     set_from_zero(panel, float(np.nanmax(frequencies)))
     panel.set_xlabel("nodal diameter")
     panel.set_ylabel("natural frequency (Hz)")
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
-    text = f"Natural frequencies of the sector with its joint stuck, {frequencies.shape[1]} modes"
-    first = f"The lowest is {np.nanmin(frequencies):.4g} Hz"
+    text = f"With the joint stuck, {frequencies.shape[1]} modes, the lowest at {np.nanmin(frequencies):.4g} Hz"
     diameter = result.study.get("scene", {}).get("nodal_diameter")
-    if isinstance(diameter, int) and "frequency" in result.dataset.coords:
-        studied = result.dataset["frequency"].values
-        low, high = float(studied.min()), float(studied.max())
-        panel.plot(
-            [diameter, diameter],
-            [low, high],
-            color=COLOURS[1],
-            marker="*",
-            markersize=11,
-            label="this study",
-            linestyle="-",
-            clip_on=False,
-            zorder=5,
-        )
-        panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
-        span = f"{low:.6g} Hz" if low == high else f"{low:.6g} to {high:.6g} Hz"
-        return as_sentences(text, first, f"Star: this study, {span} at nodal diameter {diameter}")
-    return as_sentences(text, first)
+    if not isinstance(diameter, int) or "frequency" not in result.dataset.coords:
+        return text
+    studied = result.dataset["frequency"].values
+    low, high = float(studied.min()), float(studied.max())
+    star: dict[str, Any] = {"marker": "*", "markersize": 11, "label": "this study", "clip_on": False, "zorder": 5}
+    panel.plot([diameter, diameter], [low, high], color=COLOURS[1], **star)
+    panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
+    span = f"{low:.6g} Hz" if low == high else f"{low:.6g} to {high:.6g} Hz"
+    return f"{text}. Star: this study, {span} at nodal diameter {diameter}"
 
 
 def _draw_mesh(result: Result, panel: Axes) -> str:
@@ -85,8 +71,7 @@ def _draw_mesh(result: Result, panel: Axes) -> str:
     quads = result.read("mesh_quad").values
     parts = result.read("mesh_part").values.astype(str) if result.has("mesh_part") else np.full(len(quads), "sector")
     names = tuple(dict.fromkeys(parts.tolist()))
-    colours = rgb(body_colours(names), np.array([names.index(part) for part in parts.tolist()]))
-    view = from_aslant(nodes, len(quads))
-    paint_faces(panel, nodes, quads, colours, view)
+    view, body = from_aslant(nodes, len(quads)), np.array([names.index(part) for part in parts.tolist()])
+    paint_faces(panel, nodes, quads, rgb(body_colours(names), body), view)
     draw_scale_bar(panel, nodes, view)
     return f"Outer faces of the mesh of one sector ({', '.join(names)}; {len(quads)} faces, {len(nodes)} nodes)"

@@ -1,210 +1,181 @@
-"""Numbers for the interactive part of the page: 32-bit floats of a result file, within a limit of size.
-
-Points are numbered as in the file, the last axis fastest. Values are in the units of the file; the script of the page
-multiplies them by `factor`.
-"""
+"""Numbers of the interactive part of the page: variables of the file as 32-bit floats, within a limit of size."""
 
 from __future__ import annotations
 
-import json
+import base64
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike, NDArray
 
-from studyrunner.report.drawing import COLOURS
-from studyrunner.report.page.blocks import build_block_numbers, n_block_numbers
-from studyrunner.report.page.encoding import encode_floats
-from studyrunner.report.page.kept import Encoded, Kept, encode_kept, encode_values, inner_shape, thin_out
-from studyrunner.report.page.maps import build_loops, build_maps, has_maps
-from studyrunner.report.page.root import build_root_numbers
-from studyrunner.report.page.scatter import build_scatter_numbers
-from studyrunner.report.page.trends import build_trend_numbers
-from studyrunner.report.reading.known_volumes import advise_point, advise_volume, show_error
-from studyrunner.report.reading.result import CONVERGED, Result, as_sentences
-from studyrunner.report.reading.units import units_of
+from studyrunner.report.figures.loops import find_loops
+from studyrunner.report.reading.result import NO_VOLUME, Result
+from studyrunner.report.reading.sample_statistics import DRAWN
+from studyrunner.report.reading.units import Scale, scale_for, units_of
 from studyrunner.variables import CERTIFICATE
 
-COURSES = (
-    "response_amplitude",
-    "response_phase",
-    "response_peak",
-    "worn_volume",
-    "worn_volume_error",
-    "wear_depth_max",
-    "wear_rate",
-    "exact_worn_volume",
-    "exact_response_amplitude",
-)
-"""Variables that the page holds for every point at every cycle."""
-
-POINT_NUMBERS = (
-    "jump_cycle",
-    "cycles_to_target",
-    "cycles_to_target_error",
-    "error_estimate",
-    "last_cycle",
-    "largest_wear_depth",
-    "newton_iterations",
-    "run_time",
-    "branch",
-    "step_limit",
-)
-"""Numbers of a point that stand in the list beside the plots."""
-
-_LARGEST = {"harmonics_used": "harmonics", "samples_used": "samples in a period"}
-
-MOST_POINTS = 20_000
-"""Largest number of points of a study with interactive part: not even the numbers without cycles would fit."""
-
-_LINES = ("scheme", "sweep")
-_FRACTION_OF_COURSES = 0.5
-_FRACTION_OF_LOOPS = 0.25
-_FRACTION_OF_SCATTER = 0.2
 _CHARACTERS_A_FLOAT = 16.0 / 3.0
+_MOST_POINTS = 20_000
+"""Points of a study with an interactive part: each takes time to draw."""
+
+_MOST_MESSAGES, _MOST_PHASES = 500, 64
+_LOOPS = "pair_of_loop"
+"""Dimension of those pairs that have loops."""
+
+_ERRORS = dict.fromkeys(("response_amplitude", "response_amplitude_begin", "response_peak"), "response_error")
+"""Variables whose error has another name than `<name>_error`."""
+
+_FIRST = ("worn_volume", "natural_frequency", "response_amplitude")
+_COLOURED = ("worn_cycle", "scheme", "sweep", "cycle", "mode")
+_LINES = 10
 
 
-@dataclass(frozen=True)
-class PageData:
-    """Input of the script of the page.
+def encode_floats(values: ArrayLike) -> str:
+    """Numbers as base64 of little-endian 32 bit floats, the last index fastest; NaN stays NaN."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode("ascii")
 
-    content: None without interactive part.
-    notes: on what is left out.
+
+def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str, Any] | None:
+    """What the script of the page reads, in about `limit` characters; None where there is nothing to show.
+
+    `dims`: the dimensions, the axes of the study first, with label, unit and values. `coords`: numbers along one
+    dimension that may be its values instead. `variables`: see `_encode`. `at`: index along each dimension that is shown
+    first; `start`: variable, horizontal and coloured dimension. `messages`: of points, by number, the last axis
+    fastest. Sentences on what is left out are appended to `notes`.
     """
-
-    content: Mapping[str, object] | None
-    notes: tuple[str, ...]
-
-
-def build_page_data(result: Result, limit: float) -> PageData:
-    """Numbers of the interactive part in about `limit` characters of text.
-
-    Where there are too many numbers cycles are thinned out evenly, first those of the contact pairs, then those of the
-    points; then points lose their maps and loops. A note says so.
-    """
-    if result.has_modes:
-        return PageData(None, ("Of nonlinear modes the page has figures alone.",))
-    n_points = result.held.size
-    if n_points > MOST_POINTS:
-        note = f"The study has {n_points} points, more than the {MOST_POINTS} that can be picked here."
-        return PageData(None, (note,))
-    notes: list[str] = []
-    if result.has("cycle_count"):
-        notes.append(
-            "Each point has cycle counts of its own, spaced evenly in worn volume and cycles: those of the point"
-            " that is picked are shown; the slider runs through the outputs."
-        )
-    floats = limit / _CHARACTERS_A_FLOAT
-    points, last = _point_numbers(result), result.last_cycle
-    remarks = {str(place): text for place, text in _remarks(result)}
-    floats -= len(json.dumps(remarks)) / _CHARACTERS_A_FLOAT
-    floats -= sum(len(str(entry["data"])) for entry in points.values()) / _CHARACTERS_A_FLOAT
-    trends = build_trend_numbers(result)
-    scatter = build_scatter_numbers(result, _FRACTION_OF_SCATTER * floats, notes)
-    floats -= (len(json.dumps(trends)) + len(json.dumps(scatter))) / _CHARACTERS_A_FLOAT
-    kept = _fit_courses(result, _FRACTION_OF_COURSES * floats, notes)
-    if kept is None:
-        return PageData(None, (f"The histories of {n_points} points do not fit into the page.",))
-    courses = {name: encode_kept(result, name, kept) for name in COURSES if result.has(name)}
-    blocks = build_block_numbers(result, kept)
-    floats -= sum(len(str(entry["data"])) for entry in courses.values()) / _CHARACTERS_A_FLOAT
-    floats -= len(json.dumps(blocks)) / _CHARACTERS_A_FLOAT
-    root = build_root_numbers(result, limit, notes) if has_maps(result) else None
-    floats -= len(json.dumps(root)) / _CHARACTERS_A_FLOAT
-    loops, used = build_loops(result, kept.cycles, _FRACTION_OF_LOOPS * floats, notes)
-    maps = build_maps(result, kept.cycles, floats - used, notes)
-    shown = [result.shown_point()[name] for name in result.axes]
-    content = {
-        "axes": [_axis(result.dataset[name]) for name in result.axes],
-        "horizontal": result.axes.index(result.course_axis or result.axes[0]),
-        "lines": [result.axes.index(name) for name in _LINES if name in result.varying],
-        "colours": COLOURS,
-        "counted": result.counted.removesuffix("s"),
-        "cycles": result.dataset["cycle"].values[kept.cycles].tolist(),
-        "counts": _counts(result, kept) if result.has("cycle_count") else None,
-        "responses": result.responses,
-        "shown": int(np.ravel_multi_index(shown, result.held.shape)),
-        "outcome": result.dataset["outcome"].values.ravel().tolist(),
-        "without": np.flatnonzero(~result.held).tolist(),
-        "ends": {
-            str(place): float(last.flat[place])
-            # of counts of their own each says whether it is known
-            for place in np.flatnonzero(result.held & (~result.computed | (last < result.cycles[-1]))).tolist()
-            if not result.has("cycle_count")
-        },
-        "remarks": remarks,
-        "endings": {str(number): ending.sentence for number, ending in result.endings.items()},
-        "points": points,
-        "courses": courses,
-        "blocks": blocks,
-        "trends": trends,
-        "scatter": scatter,
-        "maps": maps,
-        "loops": loops,
-        "root": root if maps else None,
-    }
-    return PageData(content, tuple(notes))
-
-
-def _remarks(result: Result) -> Iterator[tuple[int, str]]:
-    """What there is to say of points beside their outcome, by number: messages, errors above rtol, advice."""
-    messages = result.dataset["message"].values.ravel() if result.has("message") else None
-    for flat in np.flatnonzero(result.above | (result.dataset["outcome"].values != CONVERGED)).tolist():
-        place = tuple(int(index) for index in np.unravel_index(flat, result.above.shape))
-        texts = ["" if messages is None else str(messages[flat]), advise_point(result, place)]
-        if result.above[place] and math.isfinite(result.errors[place]):
-            texts.append(f"Its worn volume is known to {show_error(result, place)} only")
-            texts.append(f"What may help: {advise_volume(result, place)}")
-        text = as_sentences(*texts)
-        if text:
-            yield flat, text
-
-
-def _counts(result: Result, kept: Kept) -> str:
-    """Cycle counts of the points, infinite of a final state that has none, NaN where there is no such output."""
-    points = np.stack(np.unravel_index(kept.points, result.held.shape), axis=-1).tolist()
-    counts = [result.counts(dict(zip(result.axes, place, strict=True))) for place in points]
-    return encode_floats(np.array(counts)[:, kept.cycles])
-
-
-def _fit_courses(result: Result, floats: float, notes: list[str]) -> Kept | None:
-    """Cycles at which the numbers of all points fit; None where not even two of them do."""
-    told = np.arange(result.dataset.sizes.get("cycle", 1))
-    if result.has("cycle_count"):
-        # final states have no outputs on the way to them
-        told = np.flatnonzero(result.dataset["cycle_count"].notnull().any(result.axes).values)
-    n_cycles, n_points = len(told), result.held.size
-    names = [name for name in COURSES if result.has(name)]
-    of_point = sum(math.prod(inner_shape(result.dataset[name])[1:]) for name in names) + n_block_numbers(result)
-    per_cycle = of_point * n_points
-    keep = n_cycles if per_cycle == 0 else min(n_cycles, int(floats // per_cycle))
-    if keep < min(2, n_cycles):
+    if not result.held.any():
         return None
-    cycles = told[thin_out(n_cycles, keep)]
-    if len(cycles) < n_cycles:
-        notes.append(f"The slider runs through {len(cycles)} of the {n_cycles} cycle counts of the file.")
-    return Kept(np.arange(n_points), cycles)
-
-
-def _point_numbers(result: Result) -> dict[str, Encoded]:
-    """Numbers of the points without cycles: those of the file, and the worst of the certificates over the cycles."""
-    dataset = result.dataset
-    found = {name: encode_values(dataset[name], dataset[name].values) for name in POINT_NUMBERS if result.has(name)}
-    for name, label in {**CERTIFICATE, **_LARGEST}.items():
-        if result.has(name):
-            worst = result.read(name).max("cycle").values
-            found[name] = {**encode_values(dataset[name], worst), "label": f"{label}, largest over the cycles"}
-    return found
-
-
-def _axis(axis: xr.DataArray) -> dict[str, object]:
-    """Name, label, unit and values of an axis. `words`: whether the values are texts."""
-    words = axis.dtype.kind not in "fiu"
+    if result.held.size > _MOST_POINTS:
+        notes.append(f"The study has {result.held.size} points, more than the {_MOST_POINTS} that can be picked here.")
+        return None
+    if result.has("cycle_count"):
+        notes.append("Each point has cycle counts of its own, see cycle_count: cycle is the number of the output.")
+    arrays = _fit(dict(_arrays(result)), limit / _CHARACTERS_A_FLOAT, notes)
+    variables = [_encode(array, kept, arrays) for array, kept in arrays.values()]
+    used = [*result.axes, *(str(dim) for array, _ in arrays.values() for dim in array.dims)]
+    shown: dict[str, int] = {**result.shown_point(), **({} if result.has_modes else {"cycle": -1})}
+    if "cycle" in shown:
+        shown["cycle"] = result.last_kept(result.shown_point())
+    dims = [_dimension(result, name, arrays) for name in dict.fromkeys(used)]
+    messages = result.dataset["message"].values.ravel().tolist() if result.has("message") else []
     return {
-        "label": str(axis.name).replace("_", " "),
-        "unit": units_of(axis),
-        "words": words,
-        "values": [str(value) for value in axis.values] if words else axis.values.tolist(),
+        "dims": dims,
+        "axes": list(result.axes),
+        "coords": list(_coordinates(result, set(used))),
+        "variables": variables,
+        "at": {str(entry["name"]): shown.get(str(entry["name"]), 0) for entry in dims},
+        "start": _start(result, arrays),
+        "sentences": {str(number): ending.sentence for number, ending in result.endings.items()},
+        "messages": {str(place): text for place, text in enumerate(messages) if text and place < _MOST_MESSAGES},
     }
+
+
+def _arrays(result: Result) -> Iterator[tuple[str, xr.DataArray]]:
+    """Numbers of the file that belong to points of the study, unread; loops of those pairs alone that have some."""
+    found = {**result.dataset.data_vars, **(result.blocks.data_vars if result.blocks is not None else {})}
+    for name, array in found.items():
+        if array.dtype.kind not in "iuf" or not set(result.axes) & set(array.dims) or not array.size:
+            continue
+        if "phase" in array.dims:
+            phases = slice(None, None, -(-array.sizes["phase"] // _MOST_PHASES))
+            array = array.sel(contact=find_loops(result, result.shown_point())).isel(phase=phases)
+            array = array.rename(contact=_LOOPS)
+        if array.size:
+            yield str(name), array
+
+
+def _fit(
+    arrays: Mapping[str, xr.DataArray], floats: float, notes: list[str]
+) -> dict[str, tuple[xr.DataArray, NDArray[np.intp] | None]]:
+    """Variables that fit, in the order of the file, and which cycles of each are held; None for all.
+
+    Small ones come first. Of what does not fit, cycles are thinned out evenly, down to the first and the last.
+    """
+    found: dict[str, NDArray[np.intp] | None] = {}
+    for n_before, name in enumerate(sorted(arrays, key=lambda name: arrays[name].size)):
+        array, share = arrays[name], floats / (len(arrays) - n_before)
+        n_cycles = array.sizes.get("cycle", 1)
+        keep = min(n_cycles, int(share * n_cycles // array.size))
+        if keep < min(2, n_cycles):
+            notes.append(f"{name} does not fit into this page.")
+            continue
+        found[name] = None
+        if keep < n_cycles:
+            found[name] = np.unique(np.linspace(0, n_cycles - 1, keep).round().astype(np.intp))
+            notes.append(f"{name} is on this page at {keep} of {n_cycles} counts; the nearest one is shown.")
+        floats -= array.size * keep / n_cycles
+    return {name: (array, found[name]) for name, array in arrays.items() if name in found}
+
+
+def _encode(array: xr.DataArray, kept: NDArray[np.intp] | None, arrays: Mapping[str, Any]) -> dict[str, Any]:
+    """A variable: `dims`, `data` in SI, times `factor` in `unit`; `kept`, the places along dimensions held in part.
+
+    `error`: the variable that holds its error, `relative` or in the same unit. `words`: what its values mean.
+    """
+    name = str(array.name)
+    values = (array if kept is None else array.isel(cycle=kept)).values.astype(float)
+    scale = scale_for(str(array.attrs.get("units", "")), values)
+    if name in ("worn_volume_error", "error_estimate", "block_worn_volume_error") or (
+        name in CERTIFICATE and name.endswith("_error")
+    ):
+        scale = Scale(100.0, "%")
+    error = _ERRORS.get(name, f"{name}_error")
+    words = dict(
+        zip(array.attrs.get("flag_values", ()), str(array.attrs.get("flag_meanings", "")).split(), strict=False)
+    )
+    return {
+        "name": name,
+        "label": str(array.attrs.get("long_name", name)),
+        "unit": scale.unit,
+        "factor": scale.factor,
+        "dims": [str(dim) for dim in array.dims],
+        "kept": {} if kept is None else {"cycle": kept.tolist()},
+        "data": encode_floats(values),
+        "error": error if error in arrays else None,
+        "relative": error in arrays and str(arrays[error][0].attrs.get("units")) != str(array.attrs.get("units")),
+        "words": {str(int(value)): word.replace("_", " ") for value, word in words.items()},
+    }
+
+
+def _dimension(result: Result, name: str, arrays: Mapping[str, tuple[xr.DataArray, Any]]) -> dict[str, Any]:
+    """A dimension with its values: numbers, or words."""
+    axis = next(array for array, _ in arrays.values() if name in array.dims)[name]
+    label = result.counted if name == "cycle" and not result.has_modes else name.replace("_", " ")
+    words = axis.dtype.kind not in "fiu"
+    values = axis.values.tolist()
+    return {
+        "name": name,
+        "label": label,
+        "unit": "" if name == "cycle" else units_of(axis),
+        "values": [str(each) for each in values]
+        if words
+        else [each if math.isfinite(each) else None for each in values],
+        "words": words,
+    }
+
+
+def _coordinates(result: Result, dims: set[str]) -> Iterator[dict[str, Any]]:
+    """Numbers along one dimension: what samples draw, positions of the pairs."""
+    for name, axis in result.dataset.coords.items():
+        along = [str(dim) for dim in axis.dims]
+        if len(along) == 1 and along[0] in dims and name != along[0] and axis.dtype.kind in "iuf":
+            scale = scale_for(str(axis.attrs.get("units", "")), axis.values)
+            label = str(name).removeprefix(DRAWN).replace("_", " ")
+            data = encode_floats(scale(axis.values))
+            yield {"name": str(name), "dim": along[0], "label": label, "unit": scale.unit, "data": data}
+
+
+def _start(result: Result, arrays: Mapping[str, tuple[xr.DataArray, Any]]) -> dict[str, str]:
+    """What is shown first: a variable over the axis that figures are drawn over, or over slow time."""
+    wears = result.has("worn_volume") and bool(np.nanmax(result.worn) > NO_VOLUME)
+    usual = [name for name in _FIRST if name in arrays and (wears or name != "worn_volume")]
+    name = next(iter((*usual, *arrays)))
+    sizes = arrays[name][0].sizes
+    several = [str(dim) for dim in sizes if sizes[dim] > 1]
+    across = result.course_axis if result.course_axis in several else ("cycle" if "cycle" in several else "")
+    across = across or (several[0] if several else str(arrays[name][0].dims[0]))
+    colours = [dim for dim in _COLOURED if dim in several and dim != across and sizes[dim] <= _LINES]
+    return {"variable": name, "x": across, "colour": colours[0] if colours else ""}

@@ -1,67 +1,50 @@
 """One HTML page of a result, with everything inside: opens from a disk, without a network.
 
-Templates put it together and escape all texts; only pictures, scripts, the style sheet and the numbers are taken as
-they are. The page runs only its own scripts, named by their hashes in its security policy.
+A template puts it together and escapes all texts; only pictures, scripts, the style sheet and the numbers are taken as
+they are.
 
 By hand: ids in the SVG files of matplotlib are alike, and no library makes one page of several.
 """
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import json
 import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from studyrunner.report.drawing import Drawing, Missing, Table
-from studyrunner.report.page.data import PageData, build_page_data
+from studyrunner.report.page.data import build_page_data
+from studyrunner.report.page.root import build_root_numbers
 from studyrunner.report.page.study import describe_study
 from studyrunner.report.reading.result import Result
 from studyrunner.user_error import show_text
 
-DATA_LIMIT = 5.2e6
-"""Most characters of numbers for the interactive part."""
+DATA_LIMIT = 5e6
+"""Most characters of numbers of the interactive part, those of the root in three dimensions aside."""
 
-PAGE_LIMIT = 11.4e6
-"""Bytes that a page is to stay below; its drawings and numbers make room."""
-
-_SCRIPTS = (
-    "numbers.js",
-    "plots.js",
-    "blocks.js",
-    "root.js",
-    "trends.js",
-    "scatter.js",
-    "page.js",
-)  # each uses what stands in those before it
-_DRAWINGS_LIMIT = 3e6
-_FEWEST_DATA = 0.5e6
+_SCRIPTS = ("panel.js", "root.js", "page.js")  # each uses what stands in those before it
 _SVG = "http://www.w3.org/2000/svg"
 _XLINK = "http://www.w3.org/1999/xlink"
-_REFERENCE = re.compile(r"url\(#")
 _UNWANTED = {f"{{{_SVG}}}metadata", f"{{{_SVG}}}style"}
+_REFERENCE = re.compile(r"url\(#")
+_GREY = re.compile(r"#([0-9a-f]{2})\1\1\b")
+_DARKEST, _BRIGHTEST = 0x18, 0xE8
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A drawing as it stands on the page: as an SVG element, or as the base64 of a PNG file where there is one."""
+    """A drawing as it stands on the page: SVG elements. column: that of narrow windows; empty where there is none."""
 
     drawing: Drawing
     svg: str
-    png: str = ""
-
-    @property
-    def n_bytes(self) -> int:
-        """Length in the page."""
-        return len((self.png or self.svg).encode())
+    column: str
 
 
 @dataclass(frozen=True)
@@ -91,12 +74,10 @@ def write_page(result: Result, items: Iterable[Drawing | Missing | Table], path:
     OSError
         Where something cannot be written.
     """
-    folder = path.parent
-    parts = _within_limit([_save(item, folder) if isinstance(item, Drawing) else item for item in items], folder)
-    text = _build_page(result, parts)
+    parts = [_save(item, path.parent) if isinstance(item, Drawing) else item for item in items]
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        partial.write_text(text, encoding="utf-8", newline="\n")
+        partial.write_text(_build_page(result, parts), encoding="utf-8", newline="\n")
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
@@ -105,7 +86,11 @@ def write_page(result: Result, items: Iterable[Drawing | Missing | Table], path:
 
 
 def inline_svg(text: str, prefix: str, label: str) -> str:
-    """An SVG file of matplotlib as an element of the page: its ids begin with `prefix`, its style sheet is left out."""
+    """An SVG file of matplotlib as an element of the page.
+
+    Its ids begin with `prefix`, its style sheet is left out, and its greys, black and white among them, change places
+    on a dark page.
+    """
     root = ElementTree.fromstring(text)
     for parent in list(root.iter()):
         for child in [child for child in parent if child.tag in _UNWANTED]:
@@ -114,10 +99,12 @@ def inline_svg(text: str, prefix: str, label: str) -> str:
         for name, value in element.attrib.items():
             if name == "id":
                 element.set(name, prefix + value)
-            elif name in ("href", f"{{{_XLINK}}}href") and value.startswith("#"):
-                element.set(name, f"#{prefix}{value[1:]}")
+            elif name in ("href", f"{{{_XLINK}}}href"):
+                element.set(name, f"#{prefix}{value[1:]}" if value.startswith("#") else value)
             else:
                 element.set(name, _REFERENCE.sub(f"url(#{prefix}", value))
+        if "style" in element.attrib:
+            element.set("style", _GREY.sub(_turn_grey, element.attrib["style"]))
     root.set("role", "img")
     root.set("aria-label", label)
     ElementTree.register_namespace("", _SVG)
@@ -125,26 +112,16 @@ def inline_svg(text: str, prefix: str, label: str) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
+def _turn_grey(found: re.Match[str]) -> str:
+    level = _BRIGHTEST - (_BRIGHTEST - _DARKEST) * int(found[1], 16) // 255
+    return f"light-dark({found[0]}, #{level:02x}{level:02x}{level:02x})"
+
+
 def _save(drawing: Drawing, folder: Path) -> Shown:
-    svg, _ = drawing.save(folder)
-    return Shown(drawing, inline_svg(svg.read_text(encoding="utf-8"), f"{drawing.name}-", drawing.title))
-
-
-def _within_limit(parts: Sequence[Shown | Missing | Table], folder: Path) -> list[Shown | Missing | Table]:
-    """The parts with the largest drawings as pixels instead of lines, until they are small enough together."""
-    parts = list(parts)
-    for place in sorted(range(len(parts)), key=lambda place: -_size(parts[place])):
-        if sum(map(_size, parts)) <= _DRAWINGS_LIMIT:
-            break
-        part = parts[place]
-        if isinstance(part, Shown):
-            image = base64.b64encode((folder / f"{part.drawing.name}.png").read_bytes()).decode("ascii")
-            parts[place] = min(part, replace(part, png=image), key=_size)
-    return parts
-
-
-def _size(part: Shown | Missing | Table) -> int:
-    return part.n_bytes if isinstance(part, Shown) else 0
+    texts = [
+        inline_svg(path.read_text(encoding="utf-8"), f"{path.stem}-", drawing.title) for path in drawing.save(folder)
+    ]
+    return Shown(drawing, texts[0], texts[1] if len(texts) > 1 else "")
 
 
 def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str:
@@ -154,44 +131,25 @@ def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str
 
     blocks: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
     loader = PackageLoader("studyrunner.report.page", ".")
-    template = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks).get_template(
-        "page.html"
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks)
+    notes: list[str] = []
+    data = build_page_data(result, DATA_LIMIT, notes)
+    if data is not None:
+        data["root"] = build_root_numbers(result, notes)
+    scripts = [] if data is None else [get_plotlyjs(), "\n".join(map(_own_file, _SCRIPTS))]
+    return environment.get_template("page.html").render(
+        title=result.title,
+        file=show_text(result.path.name),
+        css=_own_file("page.css"),
+        study=describe_study(result),
+        parts=[part for part in parts if not isinstance(part, Missing)],
+        missing=[part for part in parts if isinstance(part, Missing)],
+        notes=notes,
+        # nothing in it ends the script element that it stands in
+        data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c") if data else "",
+        scripts=scripts,
     )
-    scripts = [_normal(get_plotlyjs()), _normal("\n".join(map(_own_file, _SCRIPTS)))]
-    shown: dict[str, Any] = {
-        "title": result.title,
-        "file": show_text(result.path.name),
-        "css": _own_file("page.css"),
-        "study": describe_study(result),
-        "parts": parts,
-        "missing": [part for part in parts if isinstance(part, Missing)],
-    }
-
-    def render(data: PageData) -> str:
-        """The page with these numbers; without scripts where there are none."""
-        own = scripts if data.content is not None else []
-        hashes = " ".join(f"'sha256-{_digest(script)}'" for script in own) or "'none'"
-        policy = f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"
-        numbers = _json(data.content) if own else ""
-        return template.render(shown, policy=policy, scripts=own, data=numbers, notes=data.notes)
-
-    fixed = sum(len(text.encode()) for text in (render(PageData(None, ())), *scripts))
-    return render(build_page_data(result, min(DATA_LIMIT, max(PAGE_LIMIT - fixed, _FEWEST_DATA))))
 
 
 def _own_file(name: str) -> str:
     return resources.files("studyrunner.report.page").joinpath("browser", name).read_text(encoding="utf-8")
-
-
-def _normal(script: str) -> str:
-    """A script as a browser reads it from the page: the hash is that of its text with plain line ends."""
-    return script.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _digest(script: str) -> str:
-    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
-
-
-def _json(content: object) -> str:
-    """JSON that cannot end the script element that it stands in."""
-    return json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")

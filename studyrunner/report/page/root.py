@@ -2,87 +2,68 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from studyrunner.report.page.encoding import encode_floats
+from studyrunner.report.page.data import encode_floats
 from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.scene_pairs import of_shown_scene, pairs_of_scene
+from studyrunner.report.reading.scene_pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
 from studyrunner.report.root.painting import body_colours
-from studyrunner.report.root.simplified import simplify
-from studyrunner.report.root.surface import RootSurface, read_root
-from studyrunner.report.root.views import View, find_views
+from studyrunner.report.root.surface import read_root
+from studyrunner.report.root.views import find_views
 
-MOST_FACES = 15_000
-"""Faces beside those in contact that the page takes, if they fit."""
-
-_CHARACTERS_A_FACE = 56.0  # with its nodes, of which there are about as many
-_FRACTION = 0.25
-_BESIDE = 0.3
-
-_MOST_PAIRS = 10_000
+_MOST_FACES, _MOST_PAIRS = 15_000, 10_000
+"""Faces, and contact pairs, that the page draws in three dimensions."""
 
 
-def build_root_numbers(result: Result, limit: float, notes: list[str]) -> dict[str, object] | None:
+def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | None:
     """Faces and views as the script on the page reads them; None where there are none to draw, or too many.
-
-    They take a quarter of `limit`, characters of text, at most, those in contact aside.
 
     `nodes`, m, three numbers each; `faces`, four nodes each; `body` and `flank` of each face; `seen`: bits of the views
     that show a face; of `contact`: `nodes`, `pairs` and `weights`, `columns` of them for each node, and `normals`; all
-    of these as `encode_floats` has them. `well_seen`: m, the depth that is well seen.
+    of these as `encode_floats` has them. `well_seen`: m, the depth that is well seen. `scene`: index along the axes
+    along which scenes differ, of the one that is drawn.
     """
     n_pairs = result.dataset.sizes["contact"]
     if n_pairs > _MOST_PAIRS:
         notes.append(f"The contact is not on this page in three dimensions: it has {n_pairs} pairs.")
         return None
     shown = of_shown_scene(result)
-    surface = read_root(shown)
-    if surface is None:
+    whole = read_root(shown)
+    if whole is None:
         return None
-    n_faces, surface = (
-        len(surface.faces),
-        simplify(surface, min(MOST_FACES, int(_FRACTION * limit / _CHARACTERS_A_FACE))),
-    )
-    if len(surface.faces) < n_faces:
-        notes.append(f"The mesh is drawn with {len(surface.faces)} of its {n_faces} faces; those in contact are whole.")
-    views = find_views(shown, surface)
-    seen = sum(view.faces.astype(int) << number for number, view in enumerate(views))
-    contact = surface.contact
+    surface = whole.near_contact(_MOST_FACES)
+    if len(surface.faces) < len(whole.faces):
+        notes.append(
+            f"In three dimensions are {len(surface.faces)} of {len(whole.faces)} faces, those near the contact."
+        )
+    views, contact = find_views(shown, surface), surface.contact
+    pairs = pairs_of_scene(result, result.shown_point())[contact.pairs]
     return {
         "nodes": encode_floats(surface.nodes),
         "faces": encode_floats(surface.faces),
         "body": encode_floats(surface.body),
         "flank": encode_floats(contact.flank),
-        "seen": encode_floats(seen),
+        "seen": encode_floats(sum(view.faces.astype(int) << number for number, view in enumerate(views))),
         "bodies": list(surface.bodies),
         "colours": list(body_colours(surface.bodies)),
-        "mesh": surface.is_mesh,
         "contact": {
             "nodes": encode_floats(contact.nodes),
             "columns": int(contact.pairs.shape[1]),
-            "pairs": encode_floats(pairs_of_scene(result, result.shown_point())[contact.pairs]),
+            "pairs": encode_floats(pairs),
             "weights": encode_floats(contact.weights),
             "normals": encode_floats(contact.normals),
         },
         "well_seen": surface.well_seen,
+        "scene": {name: result.shown_point()[name] for name in axes_of_scenes(result)},
         "views": [
             {
                 "title": view.title,
                 "body": view.body,
                 "eye": np.round(view.to_eye, 6).tolist(),
                 "up": np.round(view.up, 6).tolist(),
-                "leading": _beside(surface, view),
             }
             for view in views
         ],
     }
-
-
-def _beside(surface: RootSurface, view: View) -> list[float] | None:
-    """A place (3,), m, beside the leading edge, off the contact surface; None where the edge is not known."""
-    if view.leading is None:
-        return None
-    flank = surface.faces[(surface.body == view.body) & (surface.contact.flank == view.flank)]
-    away = view.leading - surface.nodes[flank].mean(axis=(0, 1))
-    beside: list[float] = (view.leading + _BESIDE * away).tolist()
-    return beside

@@ -6,14 +6,14 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
 from studyrunner.coordinates import COORDINATES
 from studyrunner.report.reading.endings import Ending
 from studyrunner.report.reading.known_volumes import advise_ended, describe_ended, tell_ends, tell_volumes
-from studyrunner.report.reading.result import CONVERGED, Result
+from studyrunner.report.reading.result import CONVERGED, Point, Result
 from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
 from studyrunner.report.reading.units import scale_for, show_cycles, show_number, units_of
-from studyrunner.report.scatter.points import last_of, statistics_at
 from studyrunner.statistics.sentence import sentence, sentences
 from studyrunner.system.progress import count
 
@@ -94,8 +94,14 @@ def _tell_samples(result: Result) -> str:
     told = sentences(result.statistics)
     if len(told) > _MOST_SENTENCES:
         shown = {name: index for name, index in result.shown_point().items() if name != SAMPLE}
-        told = [f"{result.describe(shown)}: {sentence(last_of(statistics_at(result.statistics, shown)))}"]
+        told = [f"{result.describe(shown)}: {sentence(_last_at(result.statistics, shown))}"]
     return " ".join(f"{line}." for line in told)
+
+
+def _last_at(statistics: xr.Dataset, point: Point) -> xr.Dataset:
+    """Statistics of a point at the last count."""
+    kept = {name: index for name, index in point.items() if name in statistics.dims}
+    return statistics.isel(kept).isel(cycle=-1, missing_dims="ignore")
 
 
 def _drawn(result: Result) -> list[tuple[str, str]]:

@@ -24,7 +24,7 @@ _NAMED = {"blade": "#9ecae1", "disk": "#d9b38c"}
 
 def body_colours(names: tuple[str, ...]) -> tuple[str, ...]:
     """One colour a body; blade and disk have those of the other pictures of the mesh."""
-    return tuple(_NAMED.get(name, BODIES[number % len(BODIES)]) for number, name in enumerate(names))
+    return tuple(_NAMED.get(name.lower(), BODIES[number % len(BODIES)]) for number, name in enumerate(names))
 
 
 def paint_faces(

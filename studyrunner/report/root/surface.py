@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,21 @@ class RootSurface:
         own = np.nan_to_num(self.contact.values(depth))
         worn[self.contact.nodes] -= factor * own[:, None] * self.contact.normals
         return worn
+
+    def near_contact(self, most_faces: int) -> RootSurface:
+        """The surface with at most so many faces: those in contact, and those nearest to them."""
+        if len(self.faces) <= most_faces:
+            return self
+        centres = self.nodes[self.faces].mean(axis=1)
+        distance, _ = cKDTree(self.nodes[self.contact.nodes]).query(centres)
+        of_contact = self.contact.flank >= 0
+        order = np.argsort(np.where(of_contact, -1.0, distance), kind="stable")
+        kept = np.sort(order[: max(most_faces, int(of_contact.sum()))])
+        used, places = np.unique(self.faces[kept], return_inverse=True)
+        nodes = np.searchsorted(used, self.contact.nodes)
+        contact = replace(self.contact, flank=self.contact.flank[kept], nodes=nodes)
+        faces = places.reshape(-1, _CORNERS)
+        return replace(self, nodes=self.nodes[used], faces=faces, body=self.body[kept], contact=contact)
 
     @property
     def well_seen(self) -> float:

@@ -1,9 +1,8 @@
 """What the tests of the page do in a browser, and what they see."""
 
-import re
 import shutil
+from typing import Any
 
-import numpy as np
 import pytest
 from selenium import webdriver
 from selenium.webdriver import ActionChains
@@ -21,9 +20,7 @@ MARKS = [
     pytest.mark.slow,
     pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="there is no chromium with its chromedriver"),
 ]
-FACTORS = {"mm": 1e3, "µm": 1e6, "nm": 1e9, "mm³": 1e9, "µm³": 1e18, "mm³ per kcycle": 1e12, "kPa": 1e-3, "Pa": 1.0}
-FACTORS |= {"%": 100.0, "mPa": 1e3, "mN": 1e3, "m": 1.0, "N": 1.0, "mm³ per cycle": 1e9, "µm³ per cycle": 1e18, "": 1.0}
-DESKTOP, PHONE = (1400, 1000), (400, 800)
+DESKTOP, PHONE = (1400, 1000), (420, 800)
 PATIENCE = 120.0  # s
 
 
@@ -57,84 +54,59 @@ def write(dataset, folder):
 def load(browser, address):
     browser.get(address)
     assert messages(browser) == []
-    assert browser.execute_script("return document.getElementById('explore-failed').hidden")
-    assert not browser.execute_script("return document.getElementById('explore').hidden")
+    assert drawn(browser)
 
 
-def map_values(page):
-    script = "return document.getElementById('map-plot').data.map(trace => trace.z)"
-    found: list[list[list[float]]] = page.execute_script(script)
-    return found
+def choose(page, name, value):
+    Select(page.find_element(By.CSS_SELECTOR, f"select[name='{name}']")).select_by_value(value)
 
 
-def map_pairs(page):
-    script = "return document.getElementById('map-plot').data.map(trace => trace.customdata)"
-    found: list[list[list[int]]] = page.execute_script(script)
-    return found
-
-
-def numbers(page):
-    """The list beside the plots, back in the units of the file."""
-    rows = "[...document.querySelectorAll('#readout div')]"
-    found = {}
-    for name, text in page.execute_script(f"return {rows}.map(row => [row.dataset.name, row.children[1].title])"):
-        number, unit = re.fullmatch(r"(\S+?)(?:\s(.*))?", re.sub(r"(?<=\d)\s(?=\d{3}\b)", "", text)).groups()  # type: ignore[union-attr]
-        try:
-            found[name] = float(number) / FACTORS.get(unit or "", 1.0)
-        except ValueError:
-            found[name] = np.nan
-    return found
-
-
-def choose(page, name, index):
-    Select(page.find_element(By.CSS_SELECTOR, f"select[name='{name}']")).select_by_index(index)
-
-
-def press(page, *keys):
-    page.find_element(By.ID, "cycle").send_keys(*keys)
-    wait_for_frame(page)
-
-
-def wait_for_frame(page):
-    page.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(() => arguments[0]()))")
-
-
-def click_at(page, point, name="response-plot", meta=None):
-    """A press of the mouse on the pixel at which a plot, or its trace `meta`, shows a point; picked afterwards."""
+def slide(page, name, index):
+    """Move a slider to a place."""
     script = """
-    const [plot, meta, point] = arguments;
+    const slider = document.querySelector(`input[name='${arguments[0]}']`);
+    slider.value = String(arguments[1]);
+    slider.dispatchEvent(new Event("input"));
+    requestAnimationFrame(() => requestAnimationFrame(() => arguments[2]()));"""
+    page.execute_async_script(script, name, index)
+
+
+def drawn(page, plot="panel"):
+    """The traces of a plot as plain lists."""
+    script = """
+    const held = ["meta", "name", "x", "y", "z", "i", "intensity", "customdata"];
+    const plain = (values) => (typeof values === "string" ? values : Array.from(values));
+    return document.getElementById(arguments[0]).data.map((trace) => Object.fromEntries([
+      ...held.filter((name) => trace[name]).map((name) => [name, plain(trace[name])]),
+      ["bars", trace.error_y && Array.from(trace.error_y.array)],
+    ]));"""
+    found: list[dict[str, Any]] = page.execute_script(script, plot)
+    return found
+
+
+def click_at(page, index, colour):
+    """A press of the mouse on the pixel at which the panel shows a value; picked afterwards."""
+    script = """
+    const [plot, index, colour] = arguments;
     plot.scrollIntoView({block: "center", behavior: "instant"});
     const box = plot.getBoundingClientRect(), { xaxis, yaxis } = plot._fullLayout;
-    for (const trace of plot.data) {
-      if (!trace.customdata || (meta && trace.meta !== meta)) continue;
-      const rows = trace.z ? trace.customdata : [trace.customdata];
-      const row = rows.findIndex((each) => each.includes(point));
-      if (row < 0) continue;
-      const at = rows[row].indexOf(point);
-      const [x, y] = trace.z ? [at, row] : [trace.x[at], trace.y[at]];
-      if (!Number.isFinite(yaxis.d2p(y))) continue;
-      return [xaxis._offset + xaxis.d2p(x) - box.width / 2, yaxis._offset + yaxis.d2p(y) - box.height / 2];
-    }"""
-    plot = page.find_element(By.ID, name)
-    # behind the listener of the page
-    listen = 'plot.on("plotly_click", (event) => { plot.clicked = event.points[0].customdata; })'
-    page.execute_script(f"const plot = arguments[0]; plot.clicked = null; plot.listens ??= {listen};", plot)
+    const trace = plot.data.find((each) => each.customdata && each.customdata[0][1] === colour);
+    const at = trace.customdata.findIndex((each) => each[0] === index);
+    const [x, y] = [xaxis._offset + xaxis.d2p(trace.x[at]), yaxis._offset + yaxis.d2p(trace.y[at])];
+    return [x - box.width / 2, y - box.height / 2];"""
+    plot = page.find_element(By.ID, "panel")
 
     def hover(_):
         # a click is one on what the plot has found under the mouse before, which it does in its own time
-        x, y = page.execute_script(script, plot, meta, point)
-        actions = ActionChains(page).move_to_element_with_offset(plot, round(x) - 3, round(y) + 2)
-        actions.move_by_offset(3, -2).perform()
-        wait_for_frame(page)
+        x, y = page.execute_script(script, plot, index, colour)
+        ActionChains(page).move_to_element_with_offset(plot, round(x) - 3, round(y) + 2).move_by_offset(3, -2).perform()
         found = page.execute_script("return (arguments[0]._hoverdata || []).map((each) => each.customdata)", plot)
-        return point in found
+        return [index, colour] in found
 
-    wait = WebDriverWait(page, PATIENCE, poll_frequency=0.1)
-    wait.until(hover)
+    WebDriverWait(page, PATIENCE, poll_frequency=0.1).until(hover)
     ActionChains(page).click().perform()
-    wait.until(lambda _: page.execute_script("return arguments[0].clicked", plot) == point)
 
 
-def selected(page):
-    text: str = page.execute_script("return document.getElementById('selected').textContent")
+def text_of(page, element):
+    text: str = page.execute_script("return document.getElementById(arguments[0]).textContent", element)
     return text

@@ -1,54 +1,41 @@
 """Numbers of a figure and of the file, picked by plain indexing."""
 
-from collections.abc import Callable, Iterator
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import Drawing, Missing, Table, style
-from studyrunner.report.figures.flank import draw_flanks
+from studyrunner.report.drawing import Drawing, style
 from studyrunner.report.figures.loops import draw_loops
-from studyrunner.report.figures.outcome import draw_certificates, draw_outcomes, list_branches, list_stability
+from studyrunner.report.figures.outcome import draw_outcomes
+from studyrunner.report.figures.pairs import draw_pairs
 from studyrunner.report.figures.response import draw_responses
+from studyrunner.report.figures.scatter import draw_scatter
 from studyrunner.report.figures.sector import draw_sector
+from studyrunner.report.figures.trends import draw_trends
 from studyrunner.report.figures.volume import draw_volumes
 from studyrunner.report.reading.result import Result
 from studyrunner.report.root.figures import draw_root
-from studyrunner.report.trends.figures import draw_trends
 
-OWNERS: dict[Callable[[Result], Iterator[Drawing | Missing | Table]], tuple[str, ...]] = {
-    draw_outcomes: ("outcomes", "outcome_map"),
+OWNERS = {
+    draw_outcomes: ("outcome_map",),
     draw_sector: ("natural_frequencies",),
-    draw_trends: ("trends", "trend_map"),
+    draw_trends: ("trends",),
+    draw_scatter: ("worn_volume_bands", "deciding_inputs", "deciding_input"),
     draw_responses: ("frequency_response",),
     draw_volumes: ("worn_volume", "worn_volume_map", "wear_rate_map", "final_worn_volume"),
     draw_root: ("worn_root",),
-    draw_flanks: ("wear_depth", "mean_pressure", "worn_profile"),
+    draw_pairs: ("wear_depth", "mean_pressure", "worn_profile"),
     draw_loops: ("fretting_loops", "normal_load", "pair_motion"),
-    list_branches: ("folds_and_jumps",),
-    list_stability: ("stability",),
-    draw_certificates: ("certificates", "estimated_errors"),
 }
-"""What draws which item of the report; the whole report takes a second."""
-
-
-def find_item(result: Result, name: str) -> Drawing | Missing | Table | None:
-    (draw,) = [draw for draw, names in OWNERS.items() if name in names]
-    with style():
-        return next((item for item in draw(result) if item.name == name), None)
+"""What draws which figure; the whole report takes a second."""
 
 
 def draw_figure(result: Result, name: str) -> Drawing:
-    found = find_item(result, name)
+    (draw,) = [draw for draw, names in OWNERS.items() if name in names]
+    with style():
+        found = next(item for item in draw(result) if item.name == name)
     assert isinstance(found, Drawing)
-    return found
-
-
-def find_table(result: Result, name: str) -> Table | None:
-    found = find_item(result, name)
-    assert found is None or isinstance(found, Table)
     return found
 
 

@@ -1,93 +1,96 @@
-"""All figures together: which there are in each case, that none is empty, that axes have units."""
+"""The figures: which there are of each kind of result, that they can be read and show the numbers of the file."""
+
+from itertools import combinations
+from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
-from studyrunner.report.drawing import Drawing, Missing, Table
-from studyrunner.report.page_contents import draw_report
+from studyrunner.report.contents import draw_report
+from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, set_in_column, style
+from studyrunner.report.figures.flanks import find_flanks
+from studyrunner.report.figures.trends import find_peak, find_quantities
 from studyrunner.report.reading.result import Result
 from tests.studyrunner.report.figure_cases import (
     make_result,
+    with_endings,
     with_loops,
     with_sector,
     with_two_responses,
     with_variables,
 )
-from tests.studyrunner.report.figure_numbers import draw_figure
+from tests.studyrunner.report.figure_numbers import cells_of, draw_figure, lines_of, values_of
+from tests.studyrunner.report.root_cases import dovetail_file
+from tests.studyrunner.report.scatter_cases import N_SAMPLES, sample_file
+from tests.studyrunner.report.test_settings import finest_file
 
 ALL_DRAWINGS = (
-    "natural_frequencies frequency_response worn_volume worn_volume_map wear_rate_map final_worn_volume worn_root"
-    " pair_numbers wear_depth worn_profile mean_pressure fretting_loops normal_load pair_motion estimated_errors"
+    "final_worn_volume worn_volume worn_volume_map wear_rate_map frequency_response worn_root wear_depth worn_profile"
+    " mean_pressure fretting_loops normal_load pair_motion pair_numbers natural_frequencies"
 )
-
-
-WITHOUT_UNITS = {"contact pair", "nodal diameter", "estimated relative error", "scheme", "sweep", ""}
-
-
-def _complete():
-    return with_sector(with_loops(make_result()))
-
-
-def _names(items, kind):
-    return [item.name for item in items if isinstance(item, kind)]
-
-
+NOTHING = (
+    *("worn_volume", "wear_rate", "wear_depth", "mean_pressure", "response_amplitude", "response_phase"),
+    *("response_error", "wear_rate_error", "energy_error", "stable"),
+)
 CASES = {
-    "complete": _complete,
+    "complete": lambda: with_sector(with_loops(make_result())),
     "one point": lambda: make_result(frequency=[200.0], scheme=["implicit"]),
     "no cycles": lambda: make_result(cycles=[0.0]),
     "all failed": lambda: make_result(failed=range(8)),
     "nothing wears": lambda: make_result(wears=False),
     "scattered pairs": lambda: make_result(pairs="scattered"),
     "pairs nowhere": lambda: make_result(pairs="nowhere"),
-    "wear coefficients at one frequency": lambda: make_result(
-        frequency=[200.0], wear_coefficient=[1e-12, 1e-11, 1e-10]
+    "wear coefficients": lambda: make_result(frequency=[200.0], wear_coefficient=[1e-12, 1e-11, 1e-10]),
+    "many": lambda: with_sector(
+        with_loops(make_result(wear_coefficient=[1e-12, 1.1e-11], sweep=["up", "down"], failed=[3]))
     ),
-    "many combinations": lambda: make_result(wear_coefficient=np.geomspace(1e-12, 1e-10, 7), sweep=["up", "down"]),
-    "loops where some failed": lambda: with_loops(make_result(failed=[0, 5])),
     "two responses": lambda: with_two_responses(make_result()),
-    "nothing asked for": lambda: make_result(
-        without=[
-            *("worn_volume", "wear_rate", "wear_depth", "mean_pressure", "response_amplitude", "response_phase"),
-            *("response_error", "wear_rate_error", "energy_error", "stable"),
-        ]
-    ),
+    "nothing asked for": lambda: make_result(without=NOTHING),
+    "samples": lambda: Result(Path("samples.nc"), sample_file()),
+    "settings": lambda: finest_file(1e-4),
 }
-
-
 ABSENT = {
-    "one point": {"frequency_response", "worn_volume_map", "final_worn_volume", "outcome_map", "estimated_errors"},
+    "one point": {"frequency_response", "worn_volume_map", "final_worn_volume", "outcome_map"},
     "no cycles": {"worn_volume", "worn_volume_map", "wear_depth", "worn_profile"},
     "nothing wears": {"worn_volume_map", "final_worn_volume", "wear_depth", "worn_profile"},
-    "pairs nowhere": {"worn_profile"},
+    "pairs nowhere": {"worn_profile", "pair_numbers"},
     "all failed": set(ALL_DRAWINGS.split()),
 }
 """What is not drawn, as there is nothing to see."""
 
-# Laying out takes most of the time: done where the panels are others than elsewhere.
-LAID_OUT = {"scattered pairs", "two responses"}
+PRESENT = {
+    "complete": ALL_DRAWINGS,
+    "many": "outcome_map trends",
+    "samples": "worn_volume_bands worn_volume_bands_course exceedance deciding_inputs deciding_input",
+    "settings": "precision",
+}
+PRINTED = {"many", "scattered pairs", "two responses", "samples", "settings"}
+_THIN = 2.0
+"""Pixels by which boxes of text may touch."""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_no_figure_is_empty_and_all_axes_have_units(case):
+def test_each_kind_of_result_has_its_figures_and_they_can_be_read(case):
     items = list(draw_report(CASES[case]()))
-    names = [item.name for item in items]
-    assert len(set(names)) == len(names)
-    assert not ABSENT.get(case, set()) & set(_names(items, Drawing))
-    if case == "complete":
-        assert (" ".join(_names(items, Drawing)), _names(items, Missing)) == (ALL_DRAWINGS, [])
+    drawn = [item.name for item in items if isinstance(item, Drawing)]
+    assert len({item.name for item in items}) == len(items)
+    assert not ABSENT.get(case, set()) & set(drawn)
+    assert set(PRESENT.get(case, "").split()) <= set(drawn)
     for item in items:
         assert item.title
         if isinstance(item, Drawing):
             assert item.caption.endswith(".")
             assert "nan" not in item.caption
-            if case in LAID_OUT:
-                item.figure.draw_without_rendering()
-            if not item.name.startswith("precision"):
-                _check_panels(item)
+            assert item.figure.axes
+            if case in PRINTED:
+                _check_print(item)
         elif isinstance(item, Missing):
             assert item.sentence.endswith(".")
         else:
@@ -95,63 +98,43 @@ def test_no_figure_is_empty_and_all_axes_have_units(case):
             assert all(len(row) == len(item.columns) for row in item.rows)
 
 
-def _check_panels(drawing):
-    assert drawing.figure.axes
-    for panel in drawing.figure.axes:
-        values = [np.ma.masked_invalid(line.get_ydata()).compressed() for line in panel.get_lines()]
-        values += [
-            np.ma.masked_invalid(collection.get_array()).compressed()
-            for collection in panel.collections
-            if collection.get_array() is not None
-        ]
-        assert any(array.size for array in values), f"{drawing.name}: an empty panel"
-        for axis in (panel.xaxis, panel.yaxis):
-            label = axis.get_label_text().replace("\n", " ")
-            assert label.endswith(")") or label in WITHOUT_UNITS, label
-
-
-def test_what_is_missing_says_which_output_to_ask_for():
-    items = list(draw_report(CASES["nothing asked for"]()))
-    sentences = {item.name: item.sentence for item in items if isinstance(item, Missing)}
-    for name in ("worn_volume", "frequency_response", "mean_pressure", "wear_depth"):
-        variable = "response_amplitude" if name == "frequency_response" else name
-        assert sentences[name] == f"Add {variable} to [outputs] variables."
-    assert "loops = [0]" in sentences["fretting_loops"]
-    assert sentences["natural_frequencies"].startswith("Add natural_frequency and mesh to [outputs] variables.")
-
-
-def test_all_points_failed():
-    items = list(draw_report(CASES["all failed"]()))
-    assert _names(items, Drawing) == ["outcome_map"]
-    assert "results" in _names(items, Missing)
-    table = next(item for item in items if item.name == "outcomes")
-    assert isinstance(table, Table)
-    assert table.rows == (("3", "branch lost", "8", "The branch was lost.", "200 Hz, implicit scheme"),)
-
-
-def _pixels(path):
-    """Width of a picture."""
-    header = path.read_bytes()[:24]
-    assert header.startswith(b"\x89PNG")
-    return int.from_bytes(header[16:20])
+def _check_print(drawing):
+    """Legends cover no panel, nothing is cut off or runs into its neighbour, whole and as wide as a column."""
+    for width_in_print in (WIDTH, COLUMN_WIDTH) if drawing.fits_column else (WIDTH,):
+        figure = drawing.figure
+        with style():
+            if width_in_print == COLUMN_WIDTH:
+                set_in_column(figure)
+            canvas = FigureCanvasAgg(figure)
+            figure.draw_without_rendering()
+        renderer = canvas.get_renderer()
+        inside = figure.get_tightbbox(renderer)
+        width, height = figure.get_size_inches()
+        assert width == width_in_print
+        assert min(inside.x0, inside.y0, width - inside.x1, height - inside.y1) > -_THIN / figure.dpi, drawing.name
+        whole = [panel.get_tightbbox(renderer) for panel in figure.axes]
+        whole += [legend.get_window_extent(renderer) for legend in figure.legends]
+        for one, other in combinations([box for box in whole if box is not None], 2):
+            common = Bbox.intersection(one, other)
+            assert common is None or np.min(common.size) <= _THIN, drawing.name
+        assert all(text.get_fontsize() >= 7.0 for text in figure.findobj(Text) if text.get_text()), drawing.name
 
 
 @pytest.mark.slow
 def test_figures_are_saved_as_svg_and_png_those_of_one_panel_for_a_column_too(tmp_path):
+    def width(path):
+        return int.from_bytes(path.read_bytes()[16:20])
+
     before = dict(mpl.rcParams)
     drawings = {item.name: item for item in draw_report(make_result()) if isinstance(item, Drawing)}
-    # one in three dimensions is in the tests of the root; saving takes long
-    for name, fits in (("final_worn_volume", True), ("worn_volume_map", False)):
-        assert drawings[name].fits_column == fits
-        svg, png = drawings[name].save(tmp_path)
-        content = svg.read_bytes()
-        assert content.rstrip().endswith(b"</svg>")
+    for name, n_files in (("final_worn_volume", 2), ("worn_volume_map", 1)):
+        paths = drawings[name].save(tmp_path)
+        assert len(paths) == n_files
+        content = paths[0].read_bytes()
         assert len(content) < 200_000
-        assert _pixels(png) == 2250  # 190 mm at 300 dpi
+        assert width(paths[0].with_suffix(".png")) == 2250  # 190 mm at 300 dpi
         assert draw_figure(make_result(), name).save(tmp_path)[0].read_bytes() == content
-    assert _pixels(tmp_path / "final_worn_volume_column.png") == 1065  # 90 mm at 300 dpi
-    names = ("final_worn_volume", "final_worn_volume_column", "worn_volume_map")
-    assert {path.name for path in tmp_path.iterdir()} == {f"{name}.{kind}" for name in names for kind in ("svg", "png")}
+    assert width(tmp_path / "final_worn_volume_column.png") == 1065  # 90 mm at 300 dpi
     assert dict(mpl.rcParams) == before
 
 
@@ -163,16 +146,266 @@ def test_variables_are_read_no_more_than_needed(tmp_path):
         # Values of the pairs are read for the points shown; what is small is kept.
         assert not dataset["wear_depth"].variable._in_memory
         assert not dataset["mean_pressure"].variable._in_memory
-        assert dataset["worn_volume"].variable._in_memory
 
 
-@pytest.mark.slow
+def test_the_output_to_ask_for_is_named():
+    sentences = {
+        item.name: item.sentence for item in draw_report(make_result(without=NOTHING)) if hasattr(item, "sentence")
+    }
+    for name, variable in (("worn_volume", "worn_volume"), ("frequency_response", "response_amplitude")):
+        assert variable in sentences[name]
+    assert "loops = [0]" in sentences["fretting_loops"]
+
+
+def test_worn_volume_over_cycles_with_its_error_and_its_end():
+    result = with_endings(make_result(), {5: (3, 6000.0)}, {})
+    panel = draw_figure(result, "worn_volume").figure.axes[0]
+    lines = lines_of(panel)
+    for number, label in enumerate(("implicit scheme", "explicit scheme")):
+        worn = 1e9 * values_of(result, "worn_volume", frequency=2, scheme=number)
+        np.testing.assert_allclose(lines[label], [[0.0, 1.0, 5.0, 20.0], worn])
+    ended = lines["ended early"]
+    np.testing.assert_allclose([ended[0].item(), ended[1].item()], [5.0, worn[2]])
+    band = next(found for found in panel.collections if found.get_gid() == "error")
+    error = values_of(result, "worn_volume_error", frequency=2, scheme=0)[-1]
+    highest = 1e9 * values_of(result, "worn_volume", frequency=2, scheme=0)[-1] * (1.0 + error)
+    assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(highest)
+
+
+@pytest.mark.parametrize(("name", "factor"), [("worn_volume", 1e9), ("wear_rate", 1e12)])
+def test_maps_over_frequency_and_cycles(name, factor):
+    result = make_result(frequency=[204.0, 200.0, 202.0, 201.0], failed=[2])
+    panels = draw_figure(result, f"{name}_map").figure.axes
+    for number in (0, 1):
+        expected = factor * values_of(result, name, scheme=number)[[1, 3, 2, 0]].T
+        np.testing.assert_allclose(cells_of(panels[number]), expected)
+    assert np.isnan(cells_of(panels[0])).all(axis=0).tolist() == [True, False, False, False]
+    assert panels[0].patch.get_hatch()
+
+
+def test_final_volumes_have_bars_and_marks():
+    # flat indices: frequency 200, 201, 202, 204 times implicit, explicit; errors 2 % at 202 Hz, 1.3 % beside it
+    endings = {2: (3, 6000.0), 4: (6, 20_000.0), 5: (15, 20_000.0)}
+    result = with_endings(make_result(failed=[7]), endings, {})
+    panel = draw_figure(result, "final_worn_volume").figure.axes[0]
+    lines = lines_of(panel)
+    assert lines["above rtol"][0].tolist() == [202.0, 204.0, 201.0]
+    assert lines["sensitive"][0].tolist() == [202.0]
+    assert lines["no result"][0].tolist() == [204.0]
+    # what was worn by the last count before it ended
+    early = 1e9 * values_of(result, "worn_volume", frequency=1, scheme=0)[2]
+    np.testing.assert_allclose(lines["ended early"], [[201.0], [early]])
+    (bars, _) = [found for found in panel.collections if isinstance(found, LineCollection)]
+    worn = 1e9 * values_of(result, "worn_volume", frequency=2, scheme=0)[-1]
+    (bar,) = [segment for segment in bars.get_segments() if segment[0, 0] == 202.0]
+    np.testing.assert_allclose(bar[:, 1], [0.98 * worn, 1.02 * worn])
+
+
+def test_frequency_response_of_both_sweeps_is_open_at_the_fold_and_unstable_states_are_ringed():
+    result = make_result(sweep=["up", "down"], scheme=["implicit"])
+    branch, fold, stable = (result.dataset[name].copy() for name in ("branch", "fold_frequency", "stable"))
+    branch[2:, ..., 0] = 1
+    fold[2, ..., 0] = 201.4
+    stable[1, ..., -1] = 0
+    changed = with_variables(result, branch=branch, fold_frequency=fold, stable=stable)
+    lines = lines_of(draw_figure(changed, "frequency_response").figure.axes[0])
+    for number, sweep in enumerate(("up", "down")):
+        for cycle, text in ((0, "new"), (-1, "each point after its own 20\N{NO-BREAK SPACE}000 cycles")):
+            x, y = lines[f"sweep {sweep}, {text}"]
+            known = np.isfinite(y)
+            expected = 1e3 * values_of(result, "response_amplitude", sweep=number, cycle=cycle)
+            np.testing.assert_allclose([x[known], y[known]], [result.dataset["frequency"].values, expected])
+            assert np.flatnonzero(~known).tolist() == ([2] if (number, cycle) == (0, 0) else [])
+    assert lines["fold, sweep up"][0].tolist() == [201.4]
+    ringed = 1e3 * values_of(result, "response_amplitude", frequency=1, cycle=-1, sweep=0)
+    np.testing.assert_allclose(lines["unstable"], [[201.0], [ringed]])
+
+
+def test_worn_joints_have_response_curves_of_their_own():
+    made = make_result(scheme=["implicit"], wear_coefficient=[0.0, 1e5])
+    worn = Result(made.path, made.dataset.rename(wear_coefficient="worn_cycle"))
+    lines = lines_of(draw_figure(worn, "frequency_response").figure.axes[0])
+    for number, label in enumerate(("worn cycle 0 1/Pa", "worn cycle 100\N{NO-BREAK SPACE}000 1/Pa")):
+        for cycle, text in ((0, ""), (-1, ", each point after its own 20\N{NO-BREAK SPACE}000 cycles")):
+            expected = 1e3 * values_of(worn, "response_amplitude", worn_cycle=number, cycle=cycle)
+            np.testing.assert_allclose(lines[label + text][1], expected)
+
+
 def test_an_exact_answer_is_drawn_beside_the_computed_one():
     result = make_result()
     exact = 1.02 * result.dataset["worn_volume"]
     amplitude = 1.01 * result.dataset["response_amplitude"]
-    items = list(draw_report(with_variables(result, exact_worn_volume=exact, exact_response_amplitude=amplitude)))
+    changed = with_variables(result, exact_worn_volume=exact, exact_response_amplitude=amplitude)
     for name in ("worn_volume", "frequency_response"):
-        drawing = next(item for item in items if item.name == name)
-        assert isinstance(drawing, Drawing)
-        assert "exact" in [line.get_label() for line in drawing.figure.axes[0].get_lines()]
+        assert "exact" in lines_of(draw_figure(changed, name).figure.axes[0])
+
+
+def test_natural_frequencies_and_mesh():
+    result = with_sector(make_result())
+    left, right = draw_figure(result, "natural_frequencies").figure.axes
+    faces = next(item for item in left.collections if isinstance(item, PolyCollection))
+    assert len(faces.get_paths()) == 6
+    modes = [line for line in right.get_lines() if line.get_label() != "this study"]
+    for line, mode in zip(modes, result.dataset["natural_frequency"].values.T, strict=True):
+        np.testing.assert_allclose(line.get_data(), [[0, 1, 2], mode])
+    np.testing.assert_allclose(lines_of(right)["this study"], [[0, 0], [200.0, 204.0]])
+
+
+def test_the_map_of_outcomes_speaks_words():
+    result = make_result(failed=[2, 5])
+    drawing = draw_figure(result, "outcome_map")
+    panel = drawing.figure.axes[0]
+    np.testing.assert_array_equal(cells_of(panel), [[0, 1, 0, 0], [0, 0, 1, 0]])
+    assert [label.get_text() for label in panel.get_xticklabels()] == ["200", "201", "202", "204"]
+    assert [text.get_text() for text in drawing.figure.legends[0].get_texts()] == ["converged", "branch lost"]
+
+
+def test_the_worst_certificate_is_named_with_its_place():
+    result = make_result()
+    table = next(item for item in draw_report(result) if item.name == "certificates")
+    (row,) = [row for row in table.rows if row[0] == "estimated error of the response"]
+    assert float(row[1]) == pytest.approx(float(result.dataset["response_error"].max()), rel=0.05)
+    assert row[2].startswith("202 Hz")
+
+
+def test_wear_depth_of_each_pair():
+    result = make_result()
+    lines = lines_of(draw_figure(result, "wear_depth").figure.axes[0])
+    for number, label in enumerate(("implicit scheme", "explicit scheme")):
+        x, y = lines[label]
+        np.testing.assert_allclose(np.round(x), np.arange(12))
+        np.testing.assert_allclose(y, 1e6 * values_of(result, "wear_depth", frequency=2, scheme=number, cycle=-1))
+
+
+def _by_position(result, values, pairs):
+    """Values of a flank as (up, along): along grows with z, upwards x rises."""
+    x, z = result.dataset["contact_x"].values, result.dataset["contact_z"].values
+    order = sorted(pairs, key=lambda pair: (round(x[pair], 6), round(z[pair], 6)))
+    return values[order].reshape(2, 3)
+
+
+def test_pressure_and_worn_profile_on_both_flanks():
+    result = make_result()
+    panels = draw_figure(result, "mean_pressure").figure.axes[:4]
+    for number, panel in enumerate(panels):
+        pressure = 1e-6 * values_of(result, "mean_pressure", frequency=2, scheme=0, cycle=[0, -1][number // 2])
+        pairs = range(6) if number % 2 == 0 else range(6, 12)
+        np.testing.assert_allclose(cells_of(panel), _by_position(result, pressure, pairs))
+        mesh = next(item for item in panel.collections if isinstance(item, QuadMesh))
+        largest = result.dataset["mean_pressure"].isel(frequency=2, scheme=0, cycle=[0, -1]).max()
+        np.testing.assert_allclose([mesh.norm.vmin, mesh.norm.vmax], [0.0, 1e-6 * largest])
+    panels = draw_figure(result, "worn_profile").figure.axes
+    depth = 1e6 * values_of(result, "wear_depth", frequency=2, scheme=0, cycle=-1)
+    for number, pairs in enumerate((range(6), range(6, 12))):
+        rows = _by_position(result, depth, pairs)
+        np.testing.assert_allclose(cells_of(panels[number]), rows)
+        for line, row in zip(panels[2 + number].get_lines(), rows, strict=True):
+            np.testing.assert_allclose(line.get_data(), [[0.0, 10.0, 20.0], row], atol=1e-9)
+        assert panels[2 + number].yaxis_inverted()
+
+
+@pytest.mark.parametrize("density", [1, 2])
+def test_a_flank_is_as_large_as_it_is(density):
+    """40 mm long and 7 mm high: pairs at its edges own a half or a quarter of a cell."""
+    for flank in find_flanks(Result(Path("dovetail.nc"), dovetail_file(density))):
+        assert flank.cells is not None
+        np.testing.assert_allclose(flank.cells.x_edges[[0, -1]], [0.0, 0.04], atol=1e-6)
+        np.testing.assert_allclose(flank.cells.y_edges[[0, -1]], [0.0, 0.007], atol=1e-6)
+        cells = np.outer(np.diff(flank.cells.y_edges), np.diff(flank.cells.x_edges))
+        np.testing.assert_allclose(cells, flank.area[flank.cells.pair], rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "take"),
+    [
+        ("fretting_loops", lambda move, force: (1e6 * move[..., 1], force[..., 1])),
+        ("normal_load", lambda _move, force: (np.broadcast_to(np.arange(17) * 22.5, (4, 17)), force[..., 0])),
+        ("pair_motion", lambda move, _force: (1e6 * move[..., 1], 1e6 * move[..., 2])),
+    ],
+)
+def test_loops_are_closed_and_those_of_the_file(name, take):
+    result = with_loops(make_result())
+    figure = draw_figure(result, name).figure
+    for panel, pair in zip(figure.axes[:2], (0, 11), strict=True):
+        assert panel.get_title() == f"pair {pair}"
+        move = values_of(result, "loop_displacement", frequency=2, scheme=0, contact=pair)
+        force = values_of(result, "loop_force", frequency=2, scheme=0, contact=pair)
+        x, y = take(*(np.concatenate([array, array[:, :1]], axis=1) for array in (move, force)))
+        for line, cycle in zip(panel.get_lines(), (0, -1), strict=True):
+            np.testing.assert_allclose(line.get_data(), [x[cycle], y[cycle]], atol=1e-9)
+
+
+def test_the_most_worn_of_many_loops_are_shown_and_one_tangent_has_no_path():
+    result = with_loops(make_result(), contacts=range(12))
+    titles = [panel.get_title() for panel in draw_figure(result, "fretting_loops").figure.axes[:3]]
+    assert titles == ["pair 9", "pair 10", "pair 11"]
+    only = result.dataset["loop_displacement"].where(result.dataset["component"] != "tangent_2")
+    assert "pair_motion" not in {item.name for item in draw_report(with_variables(result, loop_displacement=only))}
+
+
+def test_words_of_the_joint_are_the_same_in_maps_and_loops():
+    result = with_loops(make_result())
+    result.dataset.attrs["study"] = '[scene]\nmodel = "dovetail_sector"\n'
+    profile = draw_figure(result, "worn_profile").figure.axes
+    motion = draw_figure(result, "pair_motion").figure.axes[0]
+    words = "axial", "up the flank"
+    for one, other, word in zip(
+        (profile[2].get_xlabel(), profile[0].get_ylabel()),
+        (motion.get_xlabel(), motion.get_ylabel()),
+        words,
+        strict=True,
+    ):
+        assert word in one.replace("\n", " ")
+        assert word in other.replace("\n", " ")
+    # the axes of the mesh, where the scene has no words
+    assert draw_figure(make_result(), "worn_profile").figure.axes[2].get_xlabel() == "z (mm)"
+
+
+def test_a_peak_is_the_vertex_of_the_parabola_through_its_neighbours():
+    frequency = np.array([200.0, 201.0, 202.0, 204.0])
+    amplitude = 3.0 - (frequency - 201.7) ** 2
+    top, height, top_error, height_error = (float(each[0]) for each in find_peak(frequency, amplitude, 0))
+    assert (top, height) == pytest.approx((201.7, 3.0))
+    assert (top_error, height_error) == pytest.approx((0.3, 0.09))
+    for values in ([1.0, 2.0, 3.0], [3.0, 2.0, 1.0], [np.nan, 2.0, 1.0]):
+        assert np.isnan(find_peak(np.arange(3.0), np.array(values), 0)).all()
+
+
+def test_trends_are_those_of_the_file():
+    result = make_result(wear_coefficient=(1e-12, 5e-12, 5e-11), sweep=("up", "down"))
+    amplitude = result.dataset["response_amplitude"].copy(deep=True)
+    frequency = result.dataset["frequency"]
+    for cycle, centre in ((0, 201.7), (-1, 202.4)):
+        parabola = 2e-3 - 1e-5 * (frequency - centre) ** 2
+        amplitude[{"cycle": cycle}] = parabola.broadcast_like(amplitude.isel(cycle=cycle))
+    result = with_variables(result, response_amplitude=amplitude)
+    shift = next(one for one in find_quantities(result) if one.units == "Hz")
+    np.testing.assert_allclose(shift.values, 0.7, rtol=1e-6)
+    place = tuple(result.shown_point()[name] for name in result.axes)
+    worn = result.dataset["worn_volume"].isel(cycle=-1).values
+    panels = draw_figure(result, "trends").figure.axes
+    first = [panel for panel in panels if panel.get_subplotspec().rowspan.start == 0]
+    for panel, axis in zip(first, (0, 1, 4, 5), strict=True):
+        own = worn[(*place[:axis], slice(None), *place[axis + 1 :])]
+        (drawn,) = [np.asarray(each.get_ydata(), dtype=float) for each in panel.get_lines() if each.get_marker() == "o"]
+        np.testing.assert_allclose(drawn / drawn.max(), own / own.max(), rtol=1e-12)
+
+
+def test_samples_are_those_of_the_file():
+    dataset = sample_file()
+    result = Result(Path("samples.nc"), dataset)
+    panel = draw_figure(result, "worn_volume_bands").figure.axes[0]
+    (median,) = [line for line in panel.get_lines() if line.get_label() == "median"]
+    expected = np.quantile(dataset["worn_volume"].values[0, 0], 0.5, axis=0, method="inverted_cdf") * 1e9
+    np.testing.assert_allclose(median.get_ydata(), expected)
+    bars = draw_figure(result, "deciding_inputs").figure.axes[0]
+    heights = [patch.get_height() for patch in bars.patches]
+    names = [text.get_text().replace("\n", " ") for text in bars.get_xticklabels()]
+    assert names[int(np.argmax(heights))] == "wear coefficient"
+    for place, panel in enumerate(draw_figure(result, "deciding_input").figure.axes):
+        (points,) = [found for found in panel.collections if found.get_label() == "samples"]
+        drawn = dataset["sample_wear_coefficient"].values, dataset["worn_volume"].values[place, 0, :, -1] * 1e9
+        np.testing.assert_allclose(np.asarray(points.get_offsets()).T, drawn)
+    two = draw_figure(Result(Path("two.nc"), sample_file(factor=1.05, jump=1.0)), "deciding_input").figure.axes[0]
+    groups = {each.get_label(): len(each.get_offsets()) for each in two.collections if "group" in str(each.get_label())}
+    assert groups == {"lower group": N_SAMPLES // 2, "upper group": N_SAMPLES // 2}

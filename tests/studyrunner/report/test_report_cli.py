@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from studyrunner.report import page_contents
+from studyrunner.report import contents
 from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, main
 from studyrunner.report.drawing import Missing, Table
 from tests.studyrunner.report.page_cases import build_file
@@ -24,7 +24,7 @@ def short_report(_result):
 @pytest.fixture
 def short(monkeypatch, tmp_path):
     """A folder to work in, with a result file; a report has no figures."""
-    monkeypatch.setattr(page_contents, "draw_report", short_report)
+    monkeypatch.setattr(contents, "draw_report", short_report)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "results").mkdir()
     build_file().to_netcdf(tmp_path / "results" / "worn.x.nc")
@@ -68,7 +68,7 @@ def test_an_unexpected_failure_has_a_traceback(short, capsys, monkeypatch):
     def fail(_result):
         raise ZeroDivisionError("broken")
 
-    monkeypatch.setattr(page_contents, "draw_report", fail)
+    monkeypatch.setattr(contents, "draw_report", fail)
     assert main(["results/worn.x.nc"]) == UNEXPECTED
     said = capsys.readouterr().err
     assert "unexpected failure" in said
@@ -79,9 +79,9 @@ APART = """
 import os, signal, sys, time
 # in the background of a shell it is ignored
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from studyrunner.report import page_contents
+from studyrunner.report import contents
 from studyrunner.report.cli import main
-page_contents.draw_report = lambda _: {}
+contents.draw_report = lambda _: {}
 sys.exit(main())
 """
 

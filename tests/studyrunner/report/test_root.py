@@ -1,17 +1,21 @@
-"""The root in three dimensions: which faces are in contact, the worn shape, views, patches, fewer faces, figures."""
+"""The root in three dimensions: which faces are in contact, the worn shape, views, patches, figures."""
 
 import math
 
+import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 
 from studies.finite_element.joint.pairing import build_contact_pairs
 from studies.finite_element.joint.surfaces import describe_mesh as describe_fe_mesh
+from studyrunner.report.figures.pairs import draw_numbers
 from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.figures import draw_root
-from studyrunner.report.root.simplified import simplify
 from studyrunner.report.root.surface import read_root
+from studyrunner.report.root.views import find_views
 from tests.studies.fe_models.sectors import Sector
+from tests.studyrunner.report.figure_numbers import draw_figure
 from tests.studyrunner.report.page_cases import as_result, build_file, flank_positions
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs, volume, with_mesh
 
@@ -128,32 +132,54 @@ def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path, wrong):
 
 
 @pytest.mark.slow
-def test_fewer_faces_keep_those_in_contact_and_the_shape(tmp_path):
+def test_the_faces_near_the_contact_are_kept(tmp_path):
     surface = read_root(as_result(dovetail_file(density=4), tmp_path / "fine.nc"))
-    in_contact = int((surface.contact.flank >= 0).sum())
-    fewer = simplify(surface, 3000)
-    assert 2500 < len(fewer.faces) - in_contact <= 3000 < len(surface.faces) - in_contact
-    assert int((fewer.contact.flank >= 0).sum()) == in_contact
+    fewer = surface.near_contact(1000)
+    assert len(fewer.faces) == 1000
+    assert (fewer.contact.flank >= 0).sum() == (surface.contact.flank >= 0).sum()
     np.testing.assert_array_equal(fewer.nodes[fewer.contact.nodes], surface.nodes[surface.contact.nodes])
-    np.testing.assert_array_equal(fewer.contact.pairs, surface.contact.pairs)
-    for body in (0, 1):
-        before, after = (volume(each.nodes, each.faces[each.body == body]) for each in (surface, fewer))
-        assert after == pytest.approx(before, rel=0.03)
-    assert simplify(surface, len(surface.faces)) is surface
+    assert surface.near_contact(len(surface.faces)) is surface
 
 
 def test_the_figures_of_the_dovetail(dovetail):
-    worn, numbers, disk = list(draw_root(dovetail))
-    assert [worn.name, numbers.name, disk.name] == ["worn_root", "pair_numbers", "whole_disk"]
+    worn, disk = list(draw_root(dovetail))
+    assert [worn.name, disk.name] == ["worn_root", "whole_disk"]
     depth = dovetail.at("wear_depth", dovetail.shown_point(), -1).values
     root = read_root(dovetail)
     assert f"at pair {int(np.argmax(depth))}." in worn.caption
     assert f"{root.exaggeration(float(depth.max())):g} times exaggerated" in worn.caption.replace("\u00a0", "")
-    panels = numbers.figure.axes
-    written = [text.get_text() for panel in panels for text in panel.texts]
-    assert sorted(int(text) for text in written if text.isdigit()) == list(range(16))
-    assert written.count("leading edge") == 2
-    assert "47 sectors" in disk.caption
+    (numbers,) = draw_numbers(dovetail)
+    written = [text.get_text() for panel in numbers.figure.axes for text in panel.texts]
+    assert sorted(map(int, written)) == list(range(16))
+
+
+def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(dovetail):
+    """Shares of red, green and blue: the light on a face, which differs, makes all of them larger or smaller."""
+
+    def shares(colours):
+        return np.asarray(colours[..., :3] / colours[..., :3].sum(axis=-1, keepdims=True))
+
+    def of_faces(name, surface):
+        """Of a variable of pairs: a face has four of them at its corners."""
+        pairs = shown.fretwear.flank(name, surface).values
+        return np.asarray(0.25 * (pairs[1:, 1:] + pairs[1:, :-1] + pairs[:-1, 1:] + pairs[:-1, :-1])).ravel()
+
+    result, root = dovetail, read_root(dovetail)
+    views = {view.title: view.frame for view in find_views(result, root)}
+    shown = result.dataset.isel(result.shown_point()).isel(cycle=-1)
+    panels = draw_figure(result, "worn_root").figure.axes[1:3]
+    for panel, surface in zip(panels, shown.fretwear.surfaces, strict=True):
+        assert surface in panel.get_title()
+        faces = next(item for item in panel.collections if isinstance(item, PolyCollection))
+        drawn = shares(np.asarray(faces.get_facecolors()))
+        wanted = shares(mpl.colormaps["cividis"](of_faces("wear_depth", surface) / float(shown.wear_depth.max())))
+        centres = np.stack([of_faces(f"contact_{axis}", surface) for axis in "xyz"], axis=1)
+        right, up, _ = views[panel.get_title()]
+        for colour, centre in zip(wanted, centres, strict=True):
+            alike = np.flatnonzero(np.abs(drawn - colour).max(axis=1) < 1e-3)
+            places = np.array([faces.get_paths()[each].vertices[:4].mean(axis=0) for each in alike])
+            # in mm; the worn shape is moved by some of them, and faces are 13 mm long
+            assert np.linalg.norm(places - 1e3 * np.array([centre @ right, centre @ up]), axis=1).min() < 5.0
 
 
 def test_pairs_on_a_line_are_strips_beside_each_other(tmp_path):

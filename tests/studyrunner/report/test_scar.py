@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.report.figures.flank import draw_flanks
 from studyrunner.report.figures.loops import draw_loops
+from studyrunner.report.figures.pairs import draw_pairs
 from studyrunner.report.reading.measured import read_profile
 from studyrunner.report.reading.result import Result, open_for_report
 from studyrunner.report.reading.scars import find_scar
@@ -34,7 +34,7 @@ def test_the_scar_is_symmetric_and_that_of_the_pairs(model):
     scar = find_scar(result)
     assert scar is not None
     depth = result.dataset["wear_depth"].isel(result.shown_point()).isel(cycle=-1).values
-    drawing = next(each for each in draw_flanks(result) if each.name == "worn_profile")
+    drawing = next(each for each in draw_pairs(result) if each.name == "worn_profile")
     panel = drawing.figure.axes[-1] if model == "cylinder_on_flat" else drawing.figure.axes[1]
     (line,) = [each for each in panel.lines if str(each.get_label()).startswith("after")]
     at, drawn = np.array(line.get_xdata()), np.array(line.get_ydata())
@@ -60,7 +60,7 @@ def test_the_measured_profile_is_drawn_beside_it(tmp_path):
     profile = read_profile(path)
     np.testing.assert_allclose(profile.x, [-2e-5, 2e-5])
     np.testing.assert_allclose(profile.depth, [0.5e-6, 1.5e-6])
-    drawings = draw_flanks(replace(half_space("cylinder_on_flat"), measured=profile))
+    drawings = draw_pairs(replace(half_space("cylinder_on_flat"), measured=profile))
     drawing = next(each for each in drawings if each.name == "worn_profile")
     (line,) = [each for each in drawing.figure.axes[0].lines if each.get_label() == "measured"]
     assert len(line.get_xdata()) == 2
@@ -112,4 +112,4 @@ def test_loops_stand_about_their_means_and_the_caption_tells_the_drift(tmp_path)
     point = result.shown_point()
     means = loops.isel(point).isel(contact=2, component=1).mean("phase").values
     told = 1e3 * float(means[-1] - means[0])
-    assert f"pair 2 {told:.3g} mm along" in drawing.caption
+    assert f"pair 2 {told:.3g} mm " in drawing.caption

@@ -1,27 +1,28 @@
 """Figures and maps of pairs show those of one scene; the depth of the last count; coordinates that lie are refused."""
 
+import base64
 from pathlib import Path
-from typing import Any
 
 import meshio
 import numpy as np
 import pytest
 
 from studyrunner.report.drawing import style
-from studyrunner.report.figures.flank import draw_flanks
+from studyrunner.report.figures.flanks import find_flanks
+from studyrunner.report.figures.pairs import draw_pairs
 from studyrunner.report.page.data import build_page_data
-from studyrunner.report.page.maps import LAST_DEPTH
+from studyrunner.report.page.root import build_root_numbers
 from studyrunner.report.reading.choice import choose
-from studyrunner.report.reading.flanks import find_flanks
 from studyrunner.report.reading.result import Result
 from studyrunner.report.reading.scene_pairs import last_depth, of_scene, of_shown_scene
 from studyrunner.report.reading.schema_check import check_dataset
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.vtu import find_writer
 from tests.studyrunner.report.scatter_cases import mesh_file, sample_file
-from tests.studyrunner.report.test_page_data import decode
+from tests.studyrunner.report.test_page import decode
 
 FEW, MANY = 12, 24
+LAST_DEPTH = "wear_depth_last"
 
 
 @pytest.fixture(scope="module")
@@ -32,11 +33,6 @@ def meshes():
 @pytest.fixture(scope="module")
 def samples():
     return Result(Path("samples.nc"), check_dataset(sample_file(), "samples.nc"))
-
-
-@pytest.fixture(scope="module")
-def page(samples):
-    return build_page_data(samples, 4e6).content
 
 
 def test_a_scene_has_its_own_pairs(meshes):
@@ -60,49 +56,33 @@ def test_axes_of_the_scene_are_named_with_their_unit(meshes):
 
 def test_figures_show_the_pairs_of_the_shown_scene(meshes):
     with style():
-        items = {item.name: item for item in draw_flanks(of_shown_scene(meshes))}
+        items = {item.name: item for item in draw_pairs(of_shown_scene(meshes))}
     assert set(items) == {"wear_depth", "mean_pressure", "worn_profile"}
-    assert "mesh 1" in items["worn_profile"].caption
-
-
-def test_panels_of_each_scene_name_places_in_the_file(meshes):
-    content = build_page_data(meshes, 4e6).content
-    maps: Any = content["maps"]
-    assert maps["scenes"] == [meshes.axes.index("mesh")]
-    for panels, n_pairs in zip(maps["panels"], (FEW, MANY), strict=True):
-        pairs = np.concatenate([np.ravel(panel["pairs"]) for panel in panels])
-        assert sorted(pairs) == list(range(n_pairs))
+    assert "mesh 1" in items["worn_profile"].title
 
 
 def test_the_depth_of_the_last_count_is_drawn(samples):
     with style():
-        items = {item.name: item for item in draw_flanks(samples)}
+        items = {item.name: item for item in draw_pairs(samples)}
     assert "worn_profile" in items
     depth = samples.at(LAST_DEPTH, samples.shown_point()).values
     assert f"at pair {int(np.argmax(depth))}" in items["wear_depth"].caption
 
 
-def test_the_page_holds_the_depth_of_every_sample(samples, page):
-    entry = page["maps"]["variables"][LAST_DEPTH]
-    expected = samples.dataset[LAST_DEPTH].values.reshape(len(entry["points"]), 1, -1)
-    np.testing.assert_array_equal(decode(entry, *expected.shape), expected.astype("f4"))
+def test_the_page_holds_the_depth_and_the_draws_of_every_sample(samples):
+    content = build_page_data(samples, 4e6, [])
+    (depth,) = [entry for entry in content["variables"] if entry["name"] == LAST_DEPTH]
+    np.testing.assert_array_equal(*decode(depth, samples.dataset[LAST_DEPTH]))
+    drawn = {entry["name"]: entry for entry in content["coords"]}
+    wear = drawn["sample_wear_coefficient"]
+    np.testing.assert_array_equal(*decode(wear, samples.dataset["sample_wear_coefficient"]))
+    assert (wear["dim"], wear["label"]) == ("sample", "wear coefficient")
 
 
-def test_the_page_holds_what_samples_draw(samples, page):
-    scatter = page["scatter"]
-    assert scatter["axis"] == samples.axes.index("sample")
-    by_label = {entry["label"]: entry for entry in scatter["inputs"]}
-    wear = samples.dataset["sample_wear_coefficient"].values
-    np.testing.assert_array_equal(decode(by_label["wear coefficient"], 1, wear.size)[0], wear.astype("f4"))
-    labels = [entry["label"] for entry in scatter["inputs"]]
-    assert [labels[place] for place in scatter["deciding"]] == ["wear coefficient"] * 2
-
-
-def test_little_room_takes_the_shown_combination(samples):
-    data = build_page_data(samples, 3e4)
-    scatter: Any = data.content["scatter"]
-    assert scatter["held"] == [samples.shown_point()["frequency"]]
-    assert "The scatter is on this page for one of 2 combinations of the other axes." in data.notes
+def test_the_root_on_the_page_is_that_of_the_shown_scene(meshes):
+    root = build_root_numbers(meshes, [])
+    assert root["scene"] == {"mesh": 0}
+    assert np.frombuffer(base64.b64decode(root["contact"]["pairs"]), "<f4").max() == FEW - 1
 
 
 @pytest.mark.parametrize(("kind", "n_files"), [("meshes", 3), ("samples", 1)])

@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 
-from studyrunner.report import page_contents
+from studyrunner.report import contents
 from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
 from studyrunner.report.root import vtu
 from tests.studyrunner.report.page_cases import as_result, build_file
@@ -71,7 +71,7 @@ def test_the_files_hold_the_numbers_of_the_pairs(folder, dataset):
 
 @pytest.mark.slow
 def test_the_command_writes_the_series_beside_the_page(tmp_path, monkeypatch, capsys, dataset):
-    monkeypatch.setattr(page_contents, "draw_report", lambda _: iter(()))
+    monkeypatch.setattr(contents, "draw_report", lambda _: iter(()))
     monkeypatch.chdir(tmp_path)
     dataset.to_netcdf("some.nc")
     assert main(["some.nc", "--vtu"]) == WRITTEN

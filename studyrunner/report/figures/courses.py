@@ -1,4 +1,4 @@
-"""The horizontal axis of figures over frequency, and the values of the file along it."""
+"""The horizontal axis of figures over an axis of the study, and the values of the file along it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import line_style
-from studyrunner.report.reading.flanks import cell_edges
+from studyrunner.report.drawing import line_style, set_log
 from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.units import scale_for, show_power, units_of
+from studyrunner.report.reading.units import scale_for, units_of
 
 _DECADES = 30.0
 _MANY = 60
@@ -40,6 +39,15 @@ class Course:
         values = result.read(name).isel(where).transpose(self.axis, ...).values
         return np.asarray(values, dtype=float)[self.index]
 
+    def along(self, result: Result, flags: NDArray[np.bool_], point: Mapping[str, int]) -> NDArray[np.bool_]:
+        """Flags (axes...) of points along the course (n,)."""
+        index = tuple(slice(None) if name == self.axis else point[name] for name in result.axes)
+        return np.asarray(flags[index][self.index])
+
+    def at(self, result: Result, place: int) -> str:
+        """A place of the course in words."""
+        return result.describe({self.axis: int(self.index[place])}, [self.axis])
+
     @property
     def edges(self) -> NDArray[np.float64]:
         """Edges (n + 1,) of cells around the values, as shown."""
@@ -57,13 +65,11 @@ class Course:
         """Label and scale of a horizontal axis."""
         panel.set_xlabel(self.label)
         if self.logarithmic:
-            panel.set_xscale("log")
-            panel.xaxis.set_major_formatter(show_power)
-            panel.xaxis.set_minor_formatter("")
+            set_log(panel.xaxis, float(self.values[0]), float(self.values[-1]))
 
 
 def find_course(result: Result, axis: str | None = None) -> Course | None:
-    """The course of a study, along `axis` or along that of `Result.course_axis`; None where it has a single value."""
+    """The course along an axis, by default along `course_axis`; None where it has one value."""
     axis = axis or result.course_axis
     if axis is None or axis not in result.varying:
         return None
@@ -75,3 +81,12 @@ def find_course(result: Result, axis: str | None = None) -> Course | None:
     text = "excitation frequency" if axis == "frequency" else name
     decades = axis != "frequency" and bool(shown[0] > 0.0) and shown[-1] / shown[0] > _DECADES
     return Course(axis, index, shown, scale.label(text), name, decades)
+
+
+def cell_edges(positions: NDArray[np.float64], width: float = 1.0) -> NDArray[np.float64]:
+    """Edges (n + 1,) of cells around rising positions (n,): halfway between them; of this width around a single one."""
+    if positions.size == 1:
+        return np.array([positions[0] - 0.5 * width, positions[0] + 0.5 * width])
+    middle = 0.5 * (positions[1:] + positions[:-1])
+    first, last = 2.0 * positions[0] - middle[0], 2.0 * positions[-1] - middle[-1]
+    return np.concatenate([[first], middle, [last]])

@@ -1,0 +1,359 @@
+"""Figures of studies with samples: bands of the worn volume, its exceedance, and what decides it."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Collection, Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from studyrunner.report.drawing import (
+    COLOURS,
+    Drawing,
+    Missing,
+    add_legend,
+    line_style,
+    new_figure,
+    new_panels,
+    set_from_zero,
+)
+from studyrunner.report.figures.courses import Course, find_course
+from studyrunner.report.figures.volume import slow_time
+from studyrunner.report.reading.choice import choose
+from studyrunner.report.reading.result import NO_VOLUME, Point, Result, as_sentences
+from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
+from studyrunner.report.reading.units import Scale, scale_for
+from studyrunner.statistics.ranking import deciding_input, describe_ranking, leading_input, measure_of
+from studyrunner.system.progress import count
+
+FloatArray = NDArray[np.float64]
+Shown = list[tuple[Point, str, xr.Dataset]]
+"""Combinations of the axes beside the samples with their labels and statistics."""
+
+_MOST_PANELS, _MOST_LINES = 4, 3
+_LOWEST, _HIGHEST = 0, 1
+"""Places along the dimension `bound`."""
+_BANDS: tuple[tuple[int, int, float, str], ...] = ((0, 4, 0.18, "5 to 95 %"), (1, 3, 0.32, "25 to 75 %"))
+"""Quantiles between which a band lies, how dark it is, and what it is called."""
+_MIDDLE = 2
+_NOT_NEGLIGIBLE = 1e-3
+_CHARACTERS = 80
+"""Of titles over panels side by side."""
+_EXCEEDED = (
+    ("worn_volume_exceedance", "exceeded_volume", "m3", "worn volume"),
+    ("wear_depth_exceedance", "exceeded_depth", "m", "largest wear depth"),
+)
+_GROUPS = (("samples", "o", 0), ("lower group", "o", 0), ("upper group", "s", 1), ("between", "D", 3))
+"""Name, marker and number of the colour of samples, by what `groups_of` says."""
+
+
+def draw_scatter(result: Result) -> Iterator[Drawing | Missing]:
+    """Bands, exceedance, indices and deciding input; a sentence where the samples cannot be told of."""
+    if SAMPLE not in result.varying:
+        return
+    statistics, title = result.statistics, "Scatter of the worn volume"
+    if statistics is None:
+        lacks = result.lacks("worn_volume")
+        yield Missing(
+            "scatter", title, lacks or "The file holds more samples than the report takes: read it in Python."
+        )
+        return
+    if not float(result.read("worn_volume").max()) > NO_VOLUME:
+        yield Missing("scatter", title, "Nothing is worn at the counts kept.")
+        return
+    last = statistics.isel(cycle=-1)
+    if statistics.sizes["cycle"] > 1:
+        yield _draw_bands(result, statistics, None)
+    course = find_course(result)
+    if course is not None:
+        yield _draw_bands(result, last.isel({course.axis: course.index}), course)
+    yield _draw_exceedance(result, last)
+    if "input" in statistics.dims:
+        yield _draw_indices(result, last)
+        yield _draw_samples(result, last)
+
+
+def _choose(
+    result: Result, statistics: xr.Dataset, free: Collection[str] = (), limit: int = _MOST_PANELS
+) -> tuple[Shown, str]:
+    """Combinations of the axes beside samples and `free`, at most `limit`, and a sentence on those left out."""
+    choice = choose(result, [SAMPLE, *free], limit)
+    return [
+        (point, label, statistics.isel({name: index for name, index in point.items() if name in statistics.dims}))
+        for point, label in choice
+    ], choice.sentence
+
+
+def _ends(statistics: xr.Dataset, name: str, *dims: str) -> FloatArray:
+    """A statistic (dims..., 2): its lowest and its highest value."""
+    return np.asarray(statistics[name].transpose(*dims, "bound").values, dtype=float)
+
+
+def _largest(*values: FloatArray) -> float:
+    return max((float(each[np.isfinite(each)].max(initial=0.0)) for each in values), default=0.0)
+
+
+def _panel_grid(shown: Shown, height: float, **options: Any) -> tuple[Figure, NDArray[Any]]:
+    """A figure and its panels (rows, columns) with the labels, two by two where there are four, else side by side."""
+    n_columns = 2 if len(shown) == _MOST_PANELS else len(shown)
+    n_rows = -(-len(shown) // n_columns)
+    figure, panels = new_panels(n_rows, n_columns, 0.5 + height * n_rows, sharey=True, **options)
+    for panel, (_, label, _) in zip(panels.flat, shown, strict=True):
+        panel.set_title(textwrap.fill(label, _CHARACTERS // n_columns))
+    return figure, panels
+
+
+def _draw_bands(result: Result, statistics: xr.Dataset, course: Course | None) -> Drawing:
+    """5, 25, 50, 75 and 95 % of the samples over the cycles, or at the last count over a course."""
+    name, axis = "worn_volume_quantile", course.axis if course else "cycle"
+    shown, left_out = _choose(result, statistics, [course.axis] if course else [])
+    counts = statistics["cycle"].values.astype(float)
+    cycles = scale_for(result.counted, counts)
+    at = course.values if course else cycles(counts)
+    volumes = [_ends(point, name, axis, "quantile") for _, _, point in shown]
+    wrong = [_ends(point, f"{name}_error", axis, "quantile") for _, _, point in shown]
+    known = _largest(*(each[..., _LOWEST] for each in volumes))
+    scale = scale_for("m3", known)
+    figure, panels = _panel_grid(shown, 3.0, sharex=True)
+    for panel, volume, error in zip(panels.flat, volumes, wrong, strict=True):
+        _draw_band(panel, at, volume, error, scale)
+    for panel in panels[-1]:
+        if course:
+            course.set_axis(panel)
+        else:
+            panel.set_xlabel(cycles.label(slow_time(result)))
+    for panel in panels[:, 0]:
+        panel.set_ylabel(scale.label("worn volume"))
+    panels[0, 0].set_xlim(at.min(), at.max())
+    # errors and what is open count to twice what is known
+    set_from_zero(panels[0, 0], scale(min(max(known, _largest(*wrong, *volumes)), 2.0 * known)).item())
+    add_legend(figure)
+    n_without = max(int(point["n_without_value"].max()) for _, _, point in shown)
+    text = as_sentences(
+        f"{count(int(statistics['n_samples']), 'sample')}: so much is worn at most in 5, 25, 50, 75 and 95 % of them",
+        *(_tell_last(shown, scale) if course is None else []),
+        "Dashed: 5 and 95 %, with every sample less or more its numerical error",
+        f"Hatched: what {count(n_without, 'sample')} without a value to be trusted leave open" if n_without else "",
+        left_out,
+    )
+    over = course.name if course else result.counted
+    name = "worn_volume_bands_course" if course else "worn_volume_bands"
+    return Drawing(name, f"Worn volume of the samples over {over}", text, figure)
+
+
+def _draw_band(panel: Axes, at: FloatArray, volume: FloatArray, wrong: FloatArray, scale: Scale) -> None:
+    """Bands and median along an axis; dashed the outer ends with the numerical error, hatched what is open."""
+    drawn = scale(np.minimum(volume, 10.0 * max(_largest(volume), 1e-30)))
+    for low, high, alpha, label in _BANDS:
+        style: dict[str, Any] = {"color": COLOURS[0], "alpha": alpha, "lw": 0.0, "label": label}
+        panel.fill_between(at, drawn[:, low, _LOWEST], drawn[:, high, _HIGHEST], **style)
+    panel.plot(at, drawn[:, _MIDDLE, _LOWEST], color=COLOURS[0], marker="o" if at.size <= 12 else "", label="median")
+    for number in np.flatnonzero((volume[..., _HIGHEST] > volume[..., _LOWEST]).any(axis=0)).tolist():
+        style = {"facecolor": "none", "edgecolor": "0.45", "hatch": "////", "lw": 0.0, "label": "left open"}
+        panel.fill_between(at, drawn[:, number, _LOWEST], drawn[:, number, _HIGHEST], **style)
+    moved = np.abs(wrong - volume)[np.isfinite(wrong) & np.isfinite(volume)]
+    if (moved > _NOT_NEGLIGIBLE * _largest(volume)).any():
+        style = {"color": COLOURS[1], "linestyle": (0, (4, 2)), "linewidth": 1.0}
+        panel.plot(at, scale(wrong[:, 0, _LOWEST]), **style, label="with numerical error")
+        panel.plot(at, scale(np.where(np.isfinite(wrong), wrong, np.nan)[:, -1, _HIGHEST]), **style)
+
+
+def _tell_last(shown: Shown, scale: Scale) -> list[str]:
+    """Quantiles at the last cycle count of each panel, with their confidence intervals."""
+    found = []
+    for _, label, point in shown:
+        last = point.isel(cycle=-1)
+        value, interval = (_ends(last, f"worn_volume_quantile{each}", "quantile") for each in ("", "_interval"))
+        told = [
+            f"{100.0 * probability:g} % {_range(scale, *value[number])} ({_range(scale, *interval[number])})"
+            for number, probability in enumerate(last["quantile"].values)
+            if number in (0, _MIDDLE, len(value) - 1)
+        ]
+        found.append(f"{f'At {label}' if label else 'In the end'}: {', '.join(told)}")
+    return [*found, f"In brackets: {100.0 * float(shown[0][2].attrs['confidence']):g} % confidence interval"]
+
+
+def _range(scale: Scale, low: float, high: float) -> str:
+    if np.isinf(high):
+        return f"above {scale.show(low)}"
+    return scale.show(low) if low == high else f"{scale.show(low)} to {scale.show(high)}"
+
+
+def _draw_exceedance(result: Result, last: xr.Dataset) -> Drawing:
+    """Probability of more than a volume, and of deeper than a depth, with its confidence band."""
+    shown, left_out = _choose(result, last, limit=_MOST_LINES)
+    held = [one for one in _EXCEEDED if one[0] in last]
+    figure, panels = new_panels(1, len(held), 3.2, sharey=True)
+    for panel, (name, dimension, units, words) in zip(panels[0], held, strict=True):
+        scale = scale_for(units, last[dimension].values)
+        for number, (_, label, point) in enumerate(shown):
+            at, style = scale(point[dimension].values), line_style(number)
+            value, interval = (_ends(point, f"{name}{each}", dimension) for each in ("", "_interval"))
+            panel.fill_between(at, *interval.T, color=style["color"], alpha=0.18, lw=0.0)
+            for bound in (_LOWEST, _HIGHEST) if (np.ptp(value, axis=1) > 0.0).any() else (_LOWEST,):
+                own = {"color": style["color"], "linestyle": style["linestyle"]}
+                panel.plot(at, value[:, bound], **own, label="_" if bound else label or "samples")
+        panel.set_xlabel(scale.label(words))
+        panel.set_xlim(0.0, scale(last[dimension].values[-1]).item())
+        panel.set_ylim(0.0, 1.02)
+    panels[0, 0].set_ylabel("probability of more")
+    if len(shown) > 1:
+        add_legend(figure)
+    text = as_sentences(
+        f"Probability that more is worn than a volume {result.when(-1)}"
+        + (", and that a pair is worn deeper than a depth until then" if len(held) > 1 else "")
+        + f", from {count(int(last['n_samples']), 'sample')}",
+        f"Bands: {100.0 * float(last.attrs['confidence']):g} % confidence",
+        "Where two lines are alike, samples without a value leave open what is between them",
+        left_out,
+    )
+    return Drawing("exceedance", "Probability of more wear", text, figure)
+
+
+def _draw_indices(result: Result, last: xr.Dataset) -> Drawing | Missing:
+    """What each input decides at the last cycle count: Sobol' indices, or rank correlations, with their intervals."""
+    title, measure = "What decides the worn volume", measure_of(last)
+    if measure is None or not last[measure].notnull().any():
+        sentence = "The file holds too few samples to say what decides, or samples that do not differ: raise samples."
+        return Missing("deciding_inputs", title, sentence)
+    shares = measure == "first_index"
+    bars = {"first_index": "alone", "total_index": "with the others"} if shares else {measure: "rank correlation"}
+    shown, left_out = _choose(result, last)
+    figure, panels = _panel_grid(shown, 2.9, sharex=True)
+    for panel, (_, _, point) in zip(panels.flat, shown, strict=True):
+        for place, (name, words) in enumerate(bars.items()):
+            value, interval = (_ends(point, f"{name}{each}", "input") for each in ("", "_interval"))
+            width = 0.72 / len(bars)
+            at, middle = np.arange(len(value)) + (place - 0.5 * (len(bars) - 1)) * 1.1 * width, value.mean(axis=1)
+            panel.bar(at, np.nan_to_num(middle), width, color=COLOURS[place], label=words)
+            sides = np.maximum(np.stack([middle - interval[:, _LOWEST], interval[:, _HIGHEST] - middle]), 0.0)
+            panel.errorbar(at, middle, yerr=np.nan_to_num(sides), fmt="none", ecolor="0.2", elinewidth=1.0, capsize=3.0)
+        names = [str(name).replace("_", "\n") for name in point["input"].values]
+        panel.set_xticks(range(len(names)), names)
+        panel.set_ylim(0.0 if shares else -1.02, 1.02)
+        panel.grid(visible=False, axis="x")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("share of the variance" if shares else "rank correlation")
+    add_legend(figure)
+    told = _tell_rankings(shown)
+    what = (
+        "Share of the variance that each input decides, alone and with the others: first and total Sobol' index"
+        if shares
+        else "1 or -1 where the volume rises or falls with this input alone; an effect that rises and falls is not seen"
+    )
+    text = as_sentences(
+        *told, what, f"Lines: {100.0 * float(last.attrs['confidence']):g} % confidence intervals", left_out
+    )
+    return Drawing("deciding_inputs", title, text, figure)
+
+
+def _tell_rankings(shown: Shown) -> list[str]:
+    """Which input decides most, or that this is not known, of each combination."""
+    told = [(label, describe_ranking(point)) for _, label, point in shown]
+    return [f"{label}: {says}" if label else says[0].upper() + says[1:] for label, says in told if says]
+
+
+def groups_of(point: xr.Dataset, worn: FloatArray) -> NDArray[np.int_]:
+    """Group of each sample (n,): 0 where all are one, 1 the lower, 2 the upper, 3 between. worn: m3."""
+    lower, upper = (float(end) for end in point["group_gap"].values)
+    if np.isnan(lower):
+        return np.zeros(worn.size, int)
+    return np.select([worn <= lower, worn >= upper], [1, 2], 3)
+
+
+def _draw_samples(result: Result, last: xr.Dataset) -> Drawing:
+    """Worn volumes at the last count over the input with the largest index; of a single panel the density beside it."""
+    shown, left_out = _choose(result, last)
+    scale = scale_for("m3", result.worn)
+    if len(shown) == 1:
+        figure = new_figure(3.6)
+        first, density = figure.subplots(1, 2, sharey=True, width_ratios=(4.0, 1.0))
+        panels = np.array([[first]])
+        _draw_density(density, shown[0][2], scale)
+    else:
+        figure, panels = _panel_grid(shown, 3.0)
+    names, highest, groups = [], 0.0, []
+    for panel, (point, label, found) in zip(panels.flat, shown, strict=True):
+        names.append(str(found["input"].values[leading_input(found)]))
+        highest = max(highest, _draw_dots(panel, result, point, found, names[-1], scale))
+        groups += [_tell_groups(found, label, scale)]
+    for panel in panels[:, 0]:
+        panel.set_ylabel(scale.label(f"worn volume {result.when(-1)}"))
+    set_from_zero(panels[0, 0], scale(highest).item())
+    add_legend(figure)
+    unknown = _tell_rankings([each for each in shown if deciding_input(each[2]) is None])
+    text = as_sentences(
+        *(unknown or ["Over the input that decides most of it alone"]),
+        "Bars: numerical error of the sample" if np.isfinite(result.errors).any() else "",
+        *groups,
+        "Right: density of the samples" if len(shown) == 1 else "",
+        "Crosses: samples that ended early, at what was worn by then" if (result.held & ~result.computed).any() else "",
+        left_out,
+    )
+    words = " and ".join(dict.fromkeys(name.replace("_", " ") for name in names))
+    return Drawing("deciding_input", f"Worn volume of the samples over {words}", text, figure)
+
+
+def drawn_values(result: Result, name: str, point: Point) -> tuple[FloatArray, str, str]:
+    """What the samples draw of an input (n_samples,) at a point, its unit and its name in words.
+
+    Of an input with a draw for each pair it is the mean over the pairs.
+    """
+    drawn = result.dataset[f"{DRAWN}{name}"]
+    drawn = drawn.isel({axis: index for axis, index in point.items() if axis in drawn.dims and axis != SAMPLE})
+    words = name.replace("_", " ")
+    if "contact" in drawn.dims:
+        drawn, words = drawn.mean("contact", keep_attrs=True), f"mean {words} of the pairs"
+    units = str(drawn.attrs.get("units", ""))
+    return np.asarray(drawn.values, dtype=float), "" if units == "1" else units, words
+
+
+def _draw_dots(panel: Axes, result: Result, point: Point, found: xr.Dataset, name: str, scale: Scale) -> float:
+    """The samples of one panel; the largest volume, m3, with some room for its error."""
+    place = tuple(slice(None) if axis == SAMPLE else point[axis] for axis in result.axes)
+    worn, computed = result.worn[place], result.computed[place]
+    drawn, units, words = drawn_values(result, name, point)
+    across = scale_for(units, drawn)
+    at, wrong, group = across(drawn), worn * result.errors[place], groups_of(found, worn)
+    told = computed & np.isfinite(wrong) & (wrong > 0.0)
+    sides = scale(np.stack([np.minimum(wrong, worn)[told], wrong[told]]))
+    panel.errorbar(at[told], scale(worn[told]), yerr=sides, fmt="none", ecolor="0.7", elinewidth=0.9, zorder=1)
+    size = 16.0 if worn.size > 300 else 26.0
+    for number, (label, marker, colour) in enumerate(_GROUPS):
+        own = computed & (group == number)
+        if own.any():
+            style: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "edgecolors": "white", "label": label}
+            panel.scatter(at[own], scale(worn[own]), size, linewidths=0.4, **style)
+    early = ~computed & np.isfinite(worn)
+    if early.any():
+        panel.scatter(at[early], scale(worn[early]), size, color="black", marker="x", label="ended early")
+    panel.set_xlabel(across.label(words))
+    largest = float(np.nanmax(worn, initial=0.0))
+    return min(largest + float(np.max(wrong[told], initial=0.0)), 1.5 * largest)
+
+
+def _draw_density(panel: Axes, found: xr.Dataset, scale: Scale) -> None:
+    """The density of the samples, lying, beside them."""
+    grid, density = scale(found["worn_volume_grid"].values), found["worn_volume_density"].values / scale.factor
+    panel.fill_betweenx(grid, 0.0, density, color="0.8", lw=0.0)
+    panel.plot(density, grid, color="0.3", linewidth=1.0)
+    panel.set_xlim(left=0.0)
+    panel.set_xlabel(f"density\n(1/{scale.unit})")
+    panel.tick_params(labelleft=False)
+    panel.locator_params(axis="x", nbins=3)
+
+
+def _tell_groups(point: xr.Dataset, label: str, scale: Scale) -> str:
+    """Where samples fall into two groups: how many are in each, and the pair that tells them apart."""
+    n_lower, n_upper = (int(number) for number in point["group_size"].values)
+    if not n_upper:
+        return ""
+    lower, upper = (scale.show(float(end)) for end in point["group_gap"].values)
+    where, contact = f" at {label}" if label else "", int(point["deciding_contact"])
+    text = f"Two groups{where}: {count(n_lower, 'sample')} up to {lower}, {n_upper} from {upper}"
+    return text if contact < 0 else f"{text}; the wear depth of pair {contact} tells them apart"

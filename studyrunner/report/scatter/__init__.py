@@ -1,1 +1,0 @@
-"""Figures of studies with samples: what their scatter says of the worn volume."""

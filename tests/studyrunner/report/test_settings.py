@@ -1,0 +1,127 @@
+"""Error against run time, on files whose errors are known, against plain loops."""
+
+import math
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studyrunner.report.drawing import Missing, Table
+from studyrunner.report.figures.precision import draw_precision
+from studyrunner.report.figures.settings import Setting, compare_settings
+from studyrunner.report.reading.result import Result
+from tests.studyrunner.report.page_cases import build_file
+
+AXES = {
+    "frequency": (100.0, 200.0),
+    "step": (10.0, 20.0, 50.0, 100.0),
+    "scheme": ("explicit", "implicit", "adaptive"),
+    "harmonics": (1, 3, 5, 9),
+}
+SIGN = {"explicit": 1.0, "implicit": -1.0, "adaptive": 0.0}
+WORN, MOVED = 1e-9, 2e-3
+
+
+def error_of(frequency, step, scheme, harmonics):
+    """First order in the step, second in the harmonics; larger at the second frequency."""
+    return (1.0 if frequency == 100.0 else 2.0) * (SIGN[scheme] * 1e-4 * step + 0.03 / harmonics**2)
+
+
+def time_of(frequency, step, scheme, harmonics):
+    steps = 30.0 if scheme == "adaptive" else 1000.0 / step
+    return 0.1 + 0.01 * steps * harmonics**1.5 * (1.0 + 0.001 * frequency)
+
+
+def finest_file(estimate, exact=False):
+    """A file of these errors; estimate: of the error of each worn volume and response."""
+    dataset = build_file(AXES, cycles=(0.0, 500.0, 1000.0))
+    shape = dataset["outcome"].shape
+    for place in np.ndindex(shape):
+        at = [values[index] for values, index in zip(AXES.values(), place, strict=True)]
+        wrong = 1.0 + error_of(*at)
+        dataset["worn_volume"].values[place] = WORN * wrong * np.array([0.0, 0.5, 1.0])
+        dataset["response_amplitude"].values[place] = MOVED * wrong
+        dataset["run_time"].values[place] = time_of(*at)
+    dataset["error_estimate"][:] = estimate
+    dataset["response_error"][:] = estimate
+    dataset["oscillates"][:] = 0
+    if exact:
+        course = WORN * np.array([0.0, 0.5, 1.0])
+        dataset["exact_worn_volume"] = dataset["worn_volume"].copy(data=np.broadcast_to(course, (*shape, 3)))
+        dataset["exact_response_amplitude"] = dataset["response_amplitude"].copy(data=np.full((*shape, 3, 1), MOVED))
+    return Result(Path("settings.nc"), dataset)
+
+
+def values_of(setting):
+    return setting.step or 0.0, setting.scheme, setting.harmonics
+
+
+def test_errors_against_the_exact_answer_are_those_of_the_formula():
+    points = compare_settings(finest_file(math.nan, exact=True))
+    assert [point.label for point in points] == ["100 Hz", "200 Hz"]
+    for point, frequency in zip(points, AXES["frequency"], strict=True):
+        assert point.reference is None
+        assert len(point.settings) == (2 * 4 + 1) * 4  # the adaptive scheme uses no step
+        for row, setting in enumerate(point.settings):
+            expected = abs(error_of(frequency, *values_of(setting)))
+            assert point.errors["volume"][row] == pytest.approx(expected, rel=1e-9, abs=1e-14)
+            assert point.errors["response"][row] == pytest.approx(expected, rel=1e-9, abs=1e-14)
+
+
+def test_the_finest_setting_is_the_reference_and_what_it_does_not_resolve_is_not_clear():
+    for point, size in zip(compare_settings(finest_file(2e-4)), (1.0, 2.0), strict=True):
+        assert point.settings[point.reference] == Setting("adaptive", None, 9.0)
+        assert np.isnan(point.errors["volume"][point.reference])
+        own = 1.0 + size * 0.03 / 81
+        for row, setting in enumerate(point.settings):
+            if row != point.reference:
+                expected = abs(1.0 + error_of(100.0 * size, *values_of(setting)) - own) / own
+                assert point.errors["volume"][row] == pytest.approx(expected, rel=1e-9, abs=1e-14)
+                assert point.is_clear("volume")[row] == (expected >= 3.0 * 2e-4)
+
+
+@pytest.mark.parametrize(("scheme", "is_best"), [("implicit", True), ("explicit", False)])
+def test_of_the_finest_the_one_with_the_least_error_is_the_reference_but_no_explicit_one(scheme, is_best):
+    result = finest_file(2e-4)
+    best = {"step": 0, "scheme": AXES["scheme"].index(scheme), "harmonics": 3}
+    result.dataset["error_estimate"][best] = 1e-5
+    for point in compare_settings(result):
+        expected = Setting(scheme, 10.0, 9.0) if is_best else Setting("adaptive", None, 9.0)
+        assert point.settings[point.reference] == expected
+
+
+def test_the_front_is_that_of_all_pairs_compared():
+    (point, _) = compare_settings(finest_file(math.nan, exact=True))
+    time, error = point.values["run_time"], point.errors["volume"]
+    undominated = {
+        row
+        for row in range(len(time))
+        if not any((time[i] <= time[row] and error[i] < error[row]) for i in range(len(time)))
+    }
+    assert {(time[row], error[row]) for row in point.front("volume")} == {
+        (time[row], error[row]) for row in undominated
+    }
+
+
+def test_what_failed_is_listed_and_never_compared():
+    result = finest_file(1e-4)
+    failed = [place for place in product(range(2), range(4), range(3), range(4)) if place[3] == 3]
+    for place in failed:
+        result.dataset["outcome"].values[place] = 4
+        result.dataset["last_cycle"].values[place] = 500.0
+    drawing, *tables = draw_precision(Result(result.path, result.dataset))
+    assert drawing.name == "precision"
+    for table in tables:
+        assert isinstance(table, Table)
+        assert sum("failed: march failed" in row[-1] for row in table.rows) == 2 * 4 + 1
+        times = [float(row[3]) for row in table.rows if "failed" not in row[-1]]
+        assert times == sorted(times)
+
+
+def test_an_uncertain_reference_tells_no_setting_from_another():
+    (said,) = draw_precision(finest_file(0.5))
+    assert isinstance(said, Missing)
+    # schemes alone are compared with the exact answer only
+    alone = {**AXES, "step": (10.0,), "harmonics": (5,)}
+    assert compare_settings(Result(Path("alone.nc"), build_file(alone))) == ()
