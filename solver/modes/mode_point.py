@@ -133,7 +133,7 @@ def describe_loss(sweep: AmplitudeSweep) -> str:
     way = "up" if sweep.direction > 0.0 else "down"
     said = f"the mode is followed {way} to the amplitude {here.amplitude:.4g} m sqrt(kg), at {_hertz(here.omega)}"
     for order in (n for n in problem.case.resolution.orders if 1 < n <= MODES.resonant_order):
-        linear, _ = problem.model.harmonic_structure(order)
+        linear = problem.model.harmonic_structure(order)
         dofs = problem.model.contact.dofs.ravel()
         omegas, _ = natural_frequencies(linear, dofs[dofs >= 0])
         near = omegas[np.abs(omegas - order * here.omega) < MODES.near_resonance * order * here.omega]

@@ -37,11 +37,10 @@ from solver.contact.coulomb import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.newton.options import NEWTON, NewtonOptions
-from solver.structure.condensation import CondensedStructure
+from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.identity import Identity
 from solver.structure.joint import Joint
-from solver.structure.options import STRUCTURE
 from solver.structure.rough_forms import SingleArray
 
 
@@ -213,7 +212,7 @@ def stiffness_of_most(joint: Joint) -> FloatArray:
 
 
 # the marches of one history need the stiffness of a few structures only
-@lru_cache(maxsize=STRUCTURE.kept_structures)
+@lru_cache(maxsize=KEPT_STRUCTURES)
 def _stiffness_of_most(of: Identity) -> FloatArray:
     structure = cast("CondensedStructure", of.objects[0])
     moving = (structure.moving.matrix(place).real for place in range(structure.n_harmonics))
@@ -221,7 +220,7 @@ def _stiffness_of_most(of: Identity) -> FloatArray:
     return np.asarray(np.median(stacked, axis=0, overwrite_input=True))
 
 
-@lru_cache(maxsize=STRUCTURE.kept_structures)
+@lru_cache(maxsize=KEPT_STRUCTURES)
 def _resonances(of: Identity, relative_penalty: bytes, __: NewtonOptions) -> tuple[FloatArray, FloatArray]:
     structure, penalty = cast("CondensedStructure", of.objects[0]), np.frombuffer(relative_penalty)
     n_rel, m = penalty.size, 2 * structure.n_harmonics + 1

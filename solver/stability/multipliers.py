@@ -65,7 +65,7 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, budget: Budget) -
     switching, stuck = switching_pairs(at)
     period = 2.0 * np.pi / joint.omega
     if not switching.any():
-        linear = joint.model.harmonic_structure(1)[0]
+        linear = joint.model.harmonic_structure(1)
         return Multipliers(_sorted(np.exp(exponents(linear, moving(joint, stuck)) * period)), 0.0)
     travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
     if travels or 3 * np.count_nonzero(switching) > STABILITY.most_rows:

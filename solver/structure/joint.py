@@ -10,10 +10,10 @@ import numpy as np
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray, ReducedModel
 from solver.packing import packable
 from solver.settings import Resolution, SolverSettings, first_resolution
-from solver.structure.condensation import CondensedStructure, build_structure, relative_indices
+from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure, build_structure, relative_indices
 from solver.structure.fourier import FourierBasis, build_basis, from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
-from solver.structure.options import STRUCTURE
+
 from solver.structure.penalty import Penalty, build_penalty, static_penalty
 
 
@@ -212,7 +212,7 @@ class Case:
         if found is None:
             found = build_structure(self.model, *key)
             found = found if self.hold is None else self.hold.on(found)
-            while len(self._structures) >= STRUCTURE.kept_structures:
+            while len(self._structures) >= KEPT_STRUCTURES:
                 del self._structures[next(iter(self._structures))]
             self._structures[key] = found
         return found

@@ -112,7 +112,7 @@ def compliance_at(model: ReducedModel, rate: float) -> FloatArray:
 
 def _condensed_at(model: ReducedModel, rate: float) -> Matrix:
     relative, _ = relative_indices(model.contact)
-    linear, _ = model.harmonic_structure(1)
+    linear = model.harmonic_structure(1)
     full = linear.stiffness + rate**2 * linear.mass
     return condense(full, relative, np.zeros(full.shape[0])).stiffness
 
