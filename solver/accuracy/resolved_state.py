@@ -26,7 +26,7 @@ from solver.newton.linear_solver import JacobianSolver
 from solver.newton.options import NEWTON
 from solver.newton.solve_balance import Budget, solve_balance
 from solver.options import COMMON
-from solver.settings import RESOLUTION, Resolution, all_orders
+from solver.settings import FINE_SAMPLES, Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
@@ -75,7 +75,7 @@ class ResolvedState:
             level = self._solved(
                 case,
                 joint,
-                *start_with_tail(joint, self.point.evaluation, self.case.resolution.orders, self.case.penalty.inertial),
+                *start_with_tail(self.case, joint, self.point.evaluation),
                 budget,
             )
             if level is not None:
@@ -91,9 +91,7 @@ class ResolvedState:
         """State solved from a state with other harmonics or with another penalty."""
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
-        return self._solved(
-            case, joint, *transfer(case, joint, evaluation, old.resolution.orders, old.penalty.inertial), budget
-        )
+        return self._solved(case, joint, *transfer(old, joint, evaluation), budget)
 
     def _solved(
         self, case: Case, joint: Joint, balance: Balance, start: FloatArray, budget: Budget
@@ -142,7 +140,7 @@ class ResolvedState:
         none. Without an event the harmonics are exact, so that one solve with the finest samples is enough.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        finest = self.solve_at(Resolution(orders, max(RESOLUTION.fine_samples, 2 * samples)), budget)
+        finest = self.solve_at(Resolution(orders, max(FINE_SAMPLES, 2 * samples)), budget)
         if finest is None or nothing_happens(finest.point.evaluation):
             return None
         while (samples := 2 * samples) < finest.case.resolution.samples:

@@ -17,6 +17,10 @@ from solver.contact.coulomb import STICK, advance_monodromy, contact_sample
 from solver.model import FloatArray, IntArray
 from solver.options import COMMON
 
+MOST_PERIODS = 400
+"""Largest number of periods; then a state that is not periodic is accepted. Pairs with a turning slip direction need up
+to about 20 with Newton's method and above 40 without (`tests/solver/test_kernels.py`)."""
+
 PLAIN_PERIODS = 4  # periods before Newton's method is used on the periodicity; most pairs repeat within two
 SMALLEST_DETERMINANT = COMMON.round_off  # of 1 - monodromy: below it a part of the state does not fade
 

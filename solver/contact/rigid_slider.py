@@ -23,16 +23,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.contact import archard
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, across_slip, friction_force, friction_limit, slip_direction
-from solver.contact.options import CONTACT
+from solver.contact.period_march import MOST_PERIODS, slip_work_rate
 from solver.model import FloatArray, IntArray
 
 PARTS = 8  # parts of a step of a pair with two tangents
 SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
-MOST_MASS_PERIODS = CONTACT.most_periods  # far more than needed: the drag halves the change in each period
-
-slip_work_rate = njit()(archard.slip_work_rate)
 
 
 @njit(cache=True)
@@ -261,7 +257,8 @@ def march_masses(
         loss = mass[pair] / step - 0.5 * drag[pair]
         largest = np.abs(predicted_t[pair, 1:]).max()
         velocity = np.zeros(2)
-        for _ in range(MOST_MASS_PERIODS):
+        # far more periods than needed: the drag halves the change in each period
+        for _ in range(MOST_PERIODS):
             velocity_t[pair, 0, 0], velocity_t[pair, 1, 0] = velocity[0], velocity[1]
             slip_work[pair] = 0.0
             for n in range(n_samples):

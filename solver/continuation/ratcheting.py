@@ -30,9 +30,7 @@ from solver.structure.joint import Joint
 
 def ratcheting_work(joint: Joint, evaluation: Evaluation) -> float:
     """Mean normal force times ratcheting in a period, N m: the part of the slip work that is not periodic."""
-    on = joint.penalty.inertial
-    moved_on = evaluation.state_t[on, :, -1] - evaluation.state_t[on, :, 0]
-    return float(np.abs(evaluation.force_h[on, 0, 0]) @ np.hypot(moved_on[:, 0], moved_on[:, 1]))
+    return float(np.abs(evaluation.force_h[:, 0, 0]) @ np.hypot(*joint.law.drift(evaluation).T))
 
 
 def ratchets(joint: Joint, evaluation: Evaluation, fraction: float) -> bool:
@@ -62,7 +60,9 @@ def shake_down(joint: Joint, point: PathPoint, fraction: float, tolerance: float
     for _ in range(CONTINUATION.attempts):
         if not ratchets(joint, point.evaluation, fraction):
             break
-        homotopy = _MeanShift(joint, worn, point.evaluation.history, _mean_shift(joint, point))
+        # from the mean position of the masses in the history to the one reached
+        shift = joint.law.origin(point.evaluation.displacement_h[:, 1:, 0] - point.evaluation.history)
+        homotopy = _MeanShift(joint, worn, point.evaluation.history, shift)
         start = PathPoint(0.0, point.evaluation, point.evaluation.history)
         moved, arrived = follow_naturally(homotopy.at, start, 1.0, solver, tolerance, budget, keep_history=True)
         if not arrived:
@@ -70,12 +70,6 @@ def shake_down(joint: Joint, point: PathPoint, fraction: float, tolerance: float
         history = final_history(homotopy.at(1.0, start.history), moved.evaluation)
         point = PathPoint(point.parameter, moved.evaluation, history)
     return point
-
-
-def _mean_shift(joint: Joint, point: PathPoint) -> FloatArray:
-    """Shift (n_contact, 2), m, of the inertial pairs from the mean position in the history to the position reached."""
-    shift = point.evaluation.displacement_h[:, 1:, 0] - point.evaluation.history
-    return np.where(joint.penalty.inertial[:, None], shift, 0.0)
 
 
 @dataclass(frozen=True)

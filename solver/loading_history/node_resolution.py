@@ -13,7 +13,7 @@ from solver.harmonic_balance.converged import PathPoint
 from solver.harmonic_balance.prolongation import transfer
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.solve_balance import Budget, move_point, solve_linearised
-from solver.settings import RESOLUTION, Resolution, allowed, first_resolution
+from solver.settings import FINE_SAMPLES, Resolution, allowed, first_resolution
 from solver.structure.joint import Case, Joint
 
 
@@ -27,7 +27,7 @@ def resolution_holds(case: Case, joint: Joint, point: PathPoint, at_limit: bool,
     resolution, evaluation = case.resolution, point.evaluation
     fewest = resolution == first_resolution(case.settings)
     if nothing_happens(evaluation):
-        looked = Resolution(resolution.orders, max(RESOLUTION.fine_samples, 2 * resolution.samples))
+        looked = Resolution(resolution.orders, max(FINE_SAMPLES, 2 * resolution.samples))
         # an event that only more samples show is left to `refine`
         return fewest and nothing_happens(_moved(case, joint, point, looked, budget, 0).point.evaluation)
     above = shifted(resolution, 2)
@@ -47,7 +47,7 @@ def _moved(
     """A state with other harmonics and samples, improved by a number of Newton iterations."""
     other = case.at(resolution)
     other_joint = other.joint(joint.omega, joint.excitation_amplitude)
-    balance, start = transfer(other, other_joint, point.evaluation, case.resolution.orders, case.penalty.inertial)
+    balance, start = transfer(case, other_joint, point.evaluation)
     at = balance.evaluate(start)
     for _ in range(iterations):
         step = solve_linearised(balance, at, -at.residual, JacobianSolver(), budget)

@@ -210,7 +210,6 @@ class ModeProblem:
 
     def move(self, state: ModeState, other: ModeProblem, budget: Budget, tolerance: float) -> ModeState | None:
         """The mode with the harmonics and samples of another problem; None where it is not found."""
-        old, case = self.case, other.case_at(state.omega, state.damping_ratio)
-        joint = case.joint(state.omega, state.drive)
-        balance, start = transfer(case, joint, state.point.evaluation, old.resolution.orders, old.penalty.inertial)
+        joint = other.case_at(state.omega, state.damping_ratio).joint(state.omega, state.drive)
+        balance, start = transfer(self.case, joint, state.point.evaluation)
         return other.solve(state.amplitude, start, state.values, balance.history, JacobianSolver(), tolerance, budget)

@@ -15,7 +15,6 @@ from solver.accuracy.harmonic_levels import shifted
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
 from solver.accuracy.refinement import refine
-from solver.contact.alternating_frequency_time import friction_work
 from solver.model import FloatArray
 from solver.modes.amplitude_sweep import AmplitudeSweep
 from solver.modes.modal_model import natural_frequencies
@@ -95,7 +94,7 @@ def judge_point(
     if not certificate.holds(tolerance):
         return ModePoint(Outcome.CERTIFICATE_FAILED, certificate.sentence(tolerance))
     # the damping ratio is the sum of parts that may cancel: its error is judged against the part of friction
-    by_friction = float(friction_work(joint, found.point.evaluation).sum()) / (
+    by_friction = float(joint.law.friction_work(found.point.evaluation).sum()) / (
         2.0 * np.pi * (found.omega * found.amplitude) ** 2
     )
     damping = max(by_friction, abs(found.damping_ratio), COMMON.round_off)

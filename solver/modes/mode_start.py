@@ -127,7 +127,7 @@ def sliding_node(rest: Rest, amplitude: float, budget: Budget) -> Nodes | None:
         amplitudes = np.zeros((dofs.size, joint.basis.n_harmonics), complex)
         amplitudes[:, 0] = np.where(dofs.ravel() >= 0, shape[dofs.ravel()], 0.0)
         motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
-        start = rest.point.evaluation.predicted_h + joint.to_relative(joint.force_correction(motion))
+        start = rest.point.evaluation.predicted_h + joint.to_relative(joint.law.force(motion))
         values = np.array([mode.omega, mode.damping_ratio, size])
         found = problem.solve(size, start, values, rest.point.history, JacobianSolver(), tolerance, budget)
         if found is not None:

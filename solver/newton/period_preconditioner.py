@@ -132,7 +132,7 @@ class PeriodFactor:
 def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     """Factor of a Jacobian; None for pairs with sliding masses, or where the system of a sample is singular."""
     joint = tangent.joint
-    if joint.penalty.inertial.any():
+    if joint.law.rate_dependent:
         return None
     try:
         march = build_march(tangent)
@@ -160,7 +160,7 @@ def build_march(tangent: Linearisation) -> SampleMarch:
     n_samples = fewest_samples(joint.basis)
     at, stride = tangent.at, joint.basis.n_samples // n_samples
     own, carried = sample_tangents(
-        at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.has_normal, stride
+        at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.contact.has_normal, stride
     )
     pairs = np.flatnonzero(own.any(axis=(0, 2, 3)))
     own, carried = np.ascontiguousarray(own[:, pairs]), np.ascontiguousarray(carried[:, pairs])

@@ -144,7 +144,7 @@ def solve_linearised(
 
 def move_point(old: Case, case: Case, joint: Joint, point: PathPoint, budget: Budget) -> PathPoint | None:
     """The state with the harmonics and samples of another case; joint: of this case. None where not found."""
-    balance, start = transfer(case, joint, point.evaluation, old.resolution.orders, old.penalty.inertial)
+    balance, start = transfer(old, joint, point.evaluation)
     result = solve_balance(balance, start, JacobianSolver(), case.settings.tolerance, budget)
     if not result.converged:
         return None

@@ -63,7 +63,7 @@ def periodic_motion(joint: Joint, at: Evaluation) -> PeriodicMotion:
         response=_coefficients(response_h),
         relative_displacement=_coefficients(joint.to_pairs(moved)),
         contact_force=_coefficients(at.force_h),
-        time=np.asarray(joint.sample_step * np.arange(basis.n_samples)),
+        time=np.asarray(joint.law.sample_step * np.arange(basis.n_samples)),
         displacement_t=displacement_h @ basis.synthesis,
         velocity_t=derivative(displacement_h, rates) @ basis.synthesis,
         response_t=response_h @ basis.synthesis,

@@ -77,7 +77,7 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, budget: Budget) -
         if finer is None or _first(finer[1], at) > STABILITY.other_branch:
             return NOT_KNOWN
         joint, at = finer
-        if opens_and_closes(at) and hill_size(joint) <= NEWTON.dear_unknowns and not joint.penalty.inertial.any():
+        if opens_and_closes(at) and hill_size(joint) <= NEWTON.dear_unknowns and not joint.law.rate_dependent:
             return Multipliers(_sorted(hill_multipliers(joint, at)), 0.0)
     n_samples = march_samples(joint, linear, (stuck, stuck | switching), small) // 2
     found = _sorted(multipliers_of(build_monodromy(joint, linear, at, n_samples), small))

@@ -8,7 +8,7 @@ harmonic n means `x(t) = Re(X exp(i n w t))`, so `X = cosine - i sine`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -34,6 +34,16 @@ class FourierBasis:
     def n_harmonics(self) -> int:
         """Number H of harmonics above the static one."""
         return len(self.orders)
+
+    @cached_property
+    def step_mean(self) -> FloatArray:
+        """Ratio (2H+1,) of the harmonics of means over a step around each sample to the harmonics of the samples."""
+        angle = np.pi * np.array(self.orders) / self.n_samples
+        return np.concatenate([[1.0], np.repeat(np.sin(angle) / angle, 2)])
+
+    def at(self, phase: FloatArray) -> FloatArray:
+        """`synthesis` at other phases (n,), rad: (2H+1, n)."""
+        return synthesis(self.orders, phase)
 
 
 @lru_cache(maxsize=32)

@@ -15,34 +15,26 @@ harmonic:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from solver.model import BoolArray, FloatArray, Matrix, ReducedModel
+from solver.contact.law import Penalty
+from solver.model import FloatArray, Matrix, ReducedModel
 from solver.structure.condensation import condense, relative_indices
-from solver.structure.options import STRUCTURE
 
+INERTIAL_RATIO = 2.0
+"""Ratio of the stiffness at twice a rate to the stiffness at the rate, above which a pair is inertial: 1 for a spring,
+4 for a mass. With 4 no pair is inertial, and the motion of the two masses is 20 % off with H = 5."""
 
-@dataclass(frozen=True)
-class Penalty:
-    """Penalties of the pairs, Eq. (9), and masses of the inertial pairs.
+INERTIAL_RATE = 8.0
+"""Rate of the first test for `INERTIAL_RATIO` over the frequency, for any number of harmonics."""
 
-    - normal, tangential (n_contact,): eps, N/m; `tangential` for elastic pairs only.
-    - inertial (n_contact,): whether the pair is marched with its mass.
-    - mass (n_contact,): kg, for inertial pairs only.
-    - drag (n_contact,): N s/m, for inertial pairs only.
-    - mean (n_contact,): stiffness on the mean tangential position, N/m, for inertial pairs only. While such a pair
-      sticks, the friction force alone does not determine the mean position. The stiffness is too small to hold a pair
-      that slips.
-    """
+DRAG_FRACTION = 0.1
+"""Drag of an inertial pair over m w: the mean velocity falls to exp(-2 pi 0.1) = 0.53 of its value in a period. Half
+and twice the value change the motion of slider and two masses by 1e-4."""
 
-    normal: FloatArray
-    tangential: FloatArray
-    inertial: BoolArray
-    mass: FloatArray
-    drag: FloatArray
-    mean: FloatArray
+MEAN_STIFFNESS_FRACTION = 1e-5
+"""Stiffness on the mean position of an inertial pair over the stiffness of the joint at the frequency. It is too small
+to hold a pair that slips. Half and twice the value change states by at most 3e-6."""
 
 
 def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
@@ -61,12 +53,12 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     """
     rate = (highest + 1) * omega
     size = _stiffness_at(model, rate)
-    low, high = (_stiffness_at(model, times * STRUCTURE.inertial_rate * omega)[:, 1] for times in (1.0, 2.0))
+    low, high = (_stiffness_at(model, times * INERTIAL_RATE * omega)[:, 1] for times in (1.0, 2.0))
     has_tangent = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
-    inertial = has_tangent & (high > STRUCTURE.inertial_ratio * low)
-    if inertial.any() and highest + 1 > STRUCTURE.inertial_rate:
+    inertial = has_tangent & (high > INERTIAL_RATIO * low)
+    if inertial.any() and highest + 1 > INERTIAL_RATE:
         # a mass behind a spring: where the spring dominates in the harmonics left out, the pair is elastic
-        inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > STRUCTURE.inertial_ratio * size[:, 1]
+        inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > INERTIAL_RATIO * size[:, 1]
     mass = np.ones(size.shape[0])
     if inertial.any():
         mass[inertial] = _mass_at(model, rate)[inertial]
@@ -75,8 +67,8 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
         tangential=size[:, 1],
         inertial=inertial,
         mass=mass,
-        drag=STRUCTURE.drag_fraction * mass * omega,
-        mean=STRUCTURE.mean_stiffness_fraction * _stiffness_at(model, omega)[:, 1],
+        drag=DRAG_FRACTION * mass * omega,
+        mean=MEAN_STIFFNESS_FRACTION * _stiffness_at(model, omega)[:, 1],
     )
 
 
@@ -115,9 +107,3 @@ def _condensed_at(model: ReducedModel, rate: float) -> Matrix:
     linear = model.harmonic_structure(1)
     full = linear.stiffness + rate**2 * linear.mass
     return condense(full, relative, np.zeros(full.shape[0])).stiffness
-
-
-def static_penalty(penalty: Penalty) -> Penalty:
-    """The penalty for a static state: no pair is inertial, each pair is taken at displacement level."""
-    none = np.zeros_like(penalty.inertial)
-    return Penalty(penalty.normal, penalty.tangential, none, penalty.mass, penalty.drag, penalty.mean)

@@ -28,7 +28,7 @@ from solver.options import COMMON
 from solver.results.options import RESULTS
 from solver.stability.options import STABILITY
 from solver.structure.joint import Case, Hold, Joint
-from solver.structure.options import STRUCTURE
+from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
 from solver.wear.branch_loss import is_stable_when_held
 from solver.wear.euler import held_wear
 
@@ -38,7 +38,7 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
 
     None unless every pair slips at some time and the structure is free to slide in one direction.
     """
-    if (at.status_t == STICK).all(axis=1).any() or joint.penalty.inertial.any():
+    if (at.status_t == STICK).all(axis=1).any() or joint.law.rate_dependent:
         return None
     stiffness, directions = np.linalg.eigh(joint.structure.static_stiffness)
     # spin softening may give small negative eigenvalues
@@ -48,7 +48,7 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
     if np.count_nonzero(free) != 1 or closes > COMMON.negligible:
         return None
     motion = joint.to_relative(at.displacement_h)[:, 0]
-    return Hold(along, STRUCTURE.mean_stiffness_fraction * float(stiffness[-1]), float(along @ motion))
+    return Hold(along, MEAN_STIFFNESS_FRACTION * float(stiffness[-1]), float(along @ motion))
 
 
 def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from solver import Outcome, SolverSettings, backbone, build_model, frequency_response
-from solver.contact.alternating_frequency_time import friction_work
 from solver.modes.points import follow_mode
 from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import to_complex
@@ -171,7 +170,7 @@ def energies(problem, state):
         taken += np.pi * order * rate * float(np.vdot(x, drag @ x).real)
         taken += np.pi * order * float(np.imag(np.vdot(moved[:, place], force[:, place])))
     # the slip of the samples takes what the series of the balance does
-    friction = float(friction_work(joint, at).sum())
+    friction = float(joint.law.friction_work(at).sum())
     contact = float(np.pi * (np.imag(moved.conj() * force) * np.array(joint.basis.orders)).sum())
     assert friction == pytest.approx(contact, rel=1e-2, abs=1e-9 * taken)
     return fed, taken
