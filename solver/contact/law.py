@@ -18,7 +18,7 @@ import numpy as np
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_limit, mean_normal_force, mean_normal_tangent
 from solver.contact.period_march import MOST_PERIODS, integrate_slip_work, march_period
-from solver.contact.rigid_slider import march_masses
+from solver.contact.rigid_slider import Masses, march_masses
 from solver.contact.tangent import march_tangent, mass_tangent
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
 from solver.options import COMMON
@@ -163,13 +163,12 @@ class ContactLaw:
 
     def _march_masses(self, pairs: Chosen, predicted_t: FloatArray) -> list[np.ndarray]:
         force_t, velocity_t, place_t, status_t, slip_work, error = march_masses(
-            predicted_t[pairs], self.friction_coefficient[pairs], *self._masses(pairs), self.sample_step
+            predicted_t[pairs], self.friction_coefficient[pairs], self._masses(pairs), self.sample_step
         )
         once = np.ones(len(force_t), np.int64)
         return [force_t, place_t, velocity_t[:, :, 0], status_t, once, error, slip_work]
 
-    def _masses(self, pairs: Chosen | IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Mass, drag and line of inertial pairs, as `rigid_slider.march_masses` takes them."""
+    def _masses(self, pairs: Chosen | IntArray) -> Masses:
         return self.penalty.mass[pairs], self.penalty.drag[pairs], self.contact.line[pairs]
 
     def friction_work(self, at: Marched) -> FloatArray:
@@ -199,22 +198,19 @@ class ContactLaw:
                 at.state_t[elastic],
                 at.periods[elastic],
                 contact.line[elastic],
-                basis.synthesis,
-                basis.analysis,
                 contact.has_normal[elastic],
+                (basis.synthesis, basis.analysis),
             )
             work_tangent[elastic] /= self.penalty.tangential[elastic, None]
         if inertial.size:
             tangent[inertial], work_tangent[inertial] = mass_tangent(
                 at.predicted_t[inertial],
                 self.friction_coefficient[inertial],
-                *self._masses(inertial),
+                self._masses(inertial),
                 self.sample_step,
                 at.start[inertial],
-                basis.synthesis,
-                basis.synthesis * basis.step_mean[:, None],
-                basis.analysis / basis.step_mean,
                 contact.has_normal[inertial],
+                (basis.synthesis, basis.synthesis * basis.step_mean[:, None], basis.analysis / basis.step_mean),
             )
         normal = np.flatnonzero(contact.has_normal & switching)
         if normal.size:
@@ -285,13 +281,23 @@ class ContactLaw:
         middle[slips] = 0.5 * (low + high) / self.penalty.tangential[slips, None]
         return middle
 
-    def next_history(self, predicted_t: FloatArray, history: FloatArray, pairs: BoolArray) -> FloatArray:
-        """The history after a march under a predicted force (n_contact, 3, N), N, of the elastic ones among `pairs`."""
-        moving = pairs & ~self.penalty.inertial
-        found = history.copy()
+    def history_along(
+        self, history: FloatArray, pairs: BoolArray, first: FloatArray, last: FloatArray, parts: FloatArray
+    ) -> FloatArray:
+        """The history after a march at each of some `parts` of the way between two predicted forces.
+
+        pairs (n_contact,): pairs that are marched; inertial ones keep their history. first, last (n_contact, 3, N), N.
+        """
+        moving, found = pairs & ~self.penalty.inertial, history.copy()
         if moving.any():
-            _, state_t, *_ = self._march_elastic(moving, predicted_t, history)
-            found[moving] = state_t[:, :, -1] / self.penalty.tangential[moving, None]
+            first, last = first[moving], last[moving]
+            friction, stiffness = self.friction_coefficient[moving], self.penalty.tangential[moving, None]
+            periodicity = COMMON.round_off * float(friction_limit(friction, last[:, 0].max(axis=1)).max())
+            state = history[moving] * stiffness
+            for part in parts:
+                between = first + part * (last - first)
+                state = march_period(between, friction, state, periodicity, MOST_PERIODS)[1][:, :, -1]
+            found[moving] = state / stiffness
         return found
 
     def history_from(self, other: Penalty, history: FloatArray, mean: FloatArray, last: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ import numpy as np
 
 from solver.contact.coulomb import friction_limit, sample_tangents
 from solver.contact.law import ContactLaw, Marched
-from solver.contact.rigid_slider import step_mass
+from solver.contact.rigid_slider import step_gains, step_mass
 from solver.model import FloatArray, IntArray
 
 
@@ -60,8 +60,7 @@ def sampled_law(law: ContactLaw, at: Marched, pairs: IntArray) -> SampledLaw:
 def _take_mass_law(found: SampledLaw, place: int, law: ContactLaw, at: Marched, pair: int) -> None:
     """Tangential rows of the law of a mass on a slider, in place; `place`: index among the switching pairs."""
     step, line = law.sample_step, int(law.contact.line[pair])
-    mass, drag = law.penalty.mass[pair], law.penalty.drag[pair]
-    gain, loss = mass / step + 0.5 * drag, mass / step - 0.5 * drag
+    gain, loss = step_gains(law.penalty.mass[pair], law.penalty.drag[pair], step)
     there = np.array([0, 1]) if line < 0 else np.array([line])
     rows, friction = 1 + there, float(law.friction_coefficient[pair])
     for part in (found.by_force, found.by_motion, found.by_last_motion):

@@ -39,7 +39,5 @@ def history_along(joint: Joint, before: Marched, history: FloatArray, ahead: Mar
     """
     # a pair that sticks with one history at both ends sticks everywhere between: its force lies on a straight line
     sticks = (before.status_t == STICK).all(axis=1) & (ahead.status_t == STICK).all(axis=1) & (ahead.periods == 1)
-    for part in np.linspace(0.0, 1.0, WEAR.parts_of_step + 1)[1:-1]:
-        between = before.predicted_t + part * (ahead.predicted_t - before.predicted_t)
-        history = joint.law.next_history(between, history, ~sticks)
-    return history
+    parts = np.linspace(0.0, 1.0, WEAR.parts_of_step + 1)[1:-1]
+    return joint.law.history_along(history, ~sticks, before.predicted_t, ahead.predicted_t, parts)
