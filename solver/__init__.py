@@ -16,9 +16,9 @@ For use in Python, from this package itself:
 - `SolverSettings`: resolution and accuracy; `Outcome`: how a computation ended.
 
 The rooms, from the ground up: `contact` (Coulomb friction and unilateral contact through a period), `structure`
-(Fourier basis, condensation, penalty, the joint), `harmonic_balance` (the DLFT balance and its Jacobian), `newton` (iteration,
-linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first state,
-transient), `accuracy` (number of harmonics, refinement, reference solution and errors, certificate), `results`,
+(Fourier basis, condensation, penalty, the joint), `harmonic_balance` (the DLFT balance and its Jacobian), `newton`
+(iteration, linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first
+state, transient), `accuracy` (number of harmonics, refinement, reference solution and errors, certificate), `results`,
 `loading_history` (the unworn states of a sweep or a ramp), `modes` (nonlinear modes), `wear` (the integration over the
 slow time), `missions` (blocks in order). On top: `forced_response`, `nonlinear_modes`, `single_mode_theory`,
 `wear_history`, `mission_history`, `balance_functions`, `whole_response`. On the ground: `model`,

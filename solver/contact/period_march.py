@@ -38,31 +38,14 @@ def march_period(
 ) -> tuple[FloatArray, FloatArray, IntArray, IntArray, FloatArray]:
     """March every pair through the period until its tangential state repeats, Eqs. (11)-(15).
 
-    Parameters
-    ----------
-    predicted_t : array (n_contact, 3, N)
-        Predicted force, N, normal first.
-    friction : array (n_contact,)
-        Friction coefficient.
-    start : array (n_contact, 2)
-        Tangential state at the start of the first period, N.
-    periodicity : float
-        Accepted difference of the state over a period, N.
-    most_periods : int
-        Largest number of periods; then a state that is not periodic is accepted.
+    - predicted_t (n_contact, 3, N): predicted force, N, normal first.
+    - friction (n_contact,): friction coefficient.
+    - start (n_contact, 2): tangential state at the start of the first period, N.
+    - periodicity: accepted difference of the state over a period, N.
+    - most_periods: largest number of periods.
 
-    Returns
-    -------
-    force_t : array (n_contact, 3, N)
-        Contact force, N, compression positive.
-    state_t : array (n_contact, 2, N+1)
-        Tangential state of the last period, beginning with its start, N.
-    status_t : array (n_contact, N)
-        SEPARATED, STICK or SLIP.
-    periods : array (n_contact,)
-        Number of periods marched.
-    periodicity_error : array (n_contact,)
-        Change of the state over the last period, N.
+    Returns `force_t`, `state_t` of the last period, `status_t` and `periods` of `law.Marched`, and the change of the
+    state over the last period (n_contact,), N.
     """
     n_contact, _, n_samples = predicted_t.shape
     force_t = np.zeros((n_contact, 3, n_samples))

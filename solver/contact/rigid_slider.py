@@ -212,31 +212,13 @@ def march_masses(
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
     """March every pair through the period until its velocity repeats.
 
-    Parameters
-    ----------
-    predicted_t : array (n_contact, 3, N)
-        Predicted force, N: normal component at the samples, tangential components as means over the steps.
-    friction : array (n_contact,)
-        Friction coefficient.
-    masses : tuple of array (n_contact,)
-        Mass, drag and line.
-    step : float
-        dt, s.
+    - predicted_t (n_contact, 3, N): predicted force, N, the tangential ones as means over the steps.
+    - friction (n_contact,): friction coefficient.
+    - step: dt, s.
 
-    Returns
-    -------
-    force_t : array (n_contact, 3, N)
-        Contact force, N, compression positive; tangential components as means over the steps.
-    velocity_t : array (n_contact, 2, N+1)
-        Velocity at the ends of the steps, m/s.
-    place_t : array (n_contact, 2, N+1)
-        Displacement since the start of the period, m.
-    status_t : array (n_contact, N)
-        SEPARATED, STICK or SLIP.
-    slip_work : array (n_contact,)
-        Integral of normal force times speed over the period, J.
-    periodicity_error : array (n_contact,)
-        Change of the velocity over the last period, as a force m v / dt, N.
+    Returns the contact force (n_contact, 3, N), N, as the predicted one; velocity, m/s, and displacement since the
+    start of the period, m, at the ends of the steps (n_contact, 2, N+1); status (n_contact, N); slip work (n_contact,),
+    J; and the change of the velocity over the last period as a force m v / dt (n_contact,), N.
     """
     mass, drag, line = masses
     n_contact, _, n_samples = predicted_t.shape

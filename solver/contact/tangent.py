@@ -32,26 +32,12 @@ def march_tangent(
     Where the periodicity does not determine the start of the last period (the pair has come to stick), the derivative
     of the start follows from the periods before.
 
-    Parameters
-    ----------
-    predicted_t, friction, start : array
-        Arguments of `march_period`.
-    state_t, periods : array
-        Results of `march_period`.
-    line : array (n_contact,)
-        As in `rigid_slider.step_mass`.
-    has_normal : array (n_contact,)
-        False where the normal force is constant.
-    series : array (m, N), array (N, m)
-        Synthesis and analysis of the Fourier basis.
+    - predicted_t, friction, start: arguments of `march_period`; state_t, periods: its results.
+    - line, has_normal (n_contact,): as in `model.ContactInterface`.
+    - series (m, N), (N, m): synthesis and analysis of the Fourier basis.
 
-    Returns
-    -------
-    force_tangent : array (n_contact, 3m, 3m)
-        d(harmonics of the tangential force)/d(harmonics of the predicted force) of each pair, dimensionless; the rows
-        of the normal force and of tangents that do not exist are zero.
-    slip_work_tangent : array (n_contact, 3m)
-        Derivative of the slip work (N * N), N.
+    Returns the derivatives of the harmonics of the friction force (n_contact, 3m, 3m), dimensionless, where the rows of
+    the normal force and of tangents that do not exist are zero, and of the slip work (N * N), (n_contact, 3m), N.
     """
     # rows of the transposes are contiguous, as the loops over columns need
     basis_t, analysis_t = np.ascontiguousarray(series[0].T), np.ascontiguousarray(series[1].T)
@@ -225,22 +211,13 @@ def mass_tangent(
 ) -> tuple[FloatArray, FloatArray]:
     """Exact derivative of the periodic motion of `march_masses` with respect to the harmonics of the predicted force.
 
-    Parameters
-    ----------
-    predicted_t, friction, masses, step
-        Arguments of `march_masses`.
-    start : array (n_contact, 2)
-        Velocity at the start of the period, m/s.
-    has_normal : array (n_contact,)
-        False where the normal force is constant.
-    series : array (m, N), array (m, N), array (N, m)
-        From the harmonics to the normal force at the samples and to the means of the tangential forces over the steps,
-        and from these means back to their harmonics.
+    - predicted_t, friction, masses, step: arguments of `march_masses`.
+    - start (n_contact, 2): velocity at the start of the period, m/s.
+    - has_normal (n_contact,): as in `model.ContactInterface`.
+    - series (m, N), (m, N), (N, m): from the harmonics to the normal force at the samples and to the means of the
+      tangential forces over the steps, and from these means back to their harmonics.
 
-    Returns
-    -------
-    force_tangent, slip_work_tangent
-        As `march_tangent`; the derivative of the slip work in m.
+    Returns what `march_tangent` returns; the derivative of the slip work is in m.
     """
     point_t, mean_t = np.ascontiguousarray(series[0].T), np.ascontiguousarray(series[1].T)
     analysis_t = np.ascontiguousarray(series[2].T)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, TypedDict, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -104,21 +104,8 @@ def build_structure(
 ) -> CondensedStructure:
     """Condense the dynamic stiffness `K + i n w C - (n w)^2 M`, Eq. (1), at the harmonics n to Z_r of Eq. (8).
 
-    Parameters
-    ----------
-    model : ReducedModel
-        Matrices, loads and contact pairs.
-    omega : float
-        Angular frequency w, rad/s.
-    excitation_amplitude : float
-        Amplitude, N.
-    orders : tuple of int
-        Harmonics above the static one, ascending, beginning with 1. The excitation acts in harmonic 1.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The structure with its joint held is singular at a harmonic.
+    omega: w, rad/s. excitation_amplitude: N, in harmonic 1. orders: harmonics above the static one, ascending.
+    Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
     """
     relative, _ = relative_indices(model.contact)
     still = model.linear[0]
@@ -131,44 +118,28 @@ def build_structure(
         moving = _condense_shared(still, relative, omega * np.array(orders, np.float64), excitation_amplitude)
     else:
         moving = _condense_each(model, relative, omega, excitation_amplitude, orders)
-    return CondensedStructure(**_static(Identity(still), tuple(relative.tolist()))._asdict(), **moving)
-
-
-class _Static(NamedTuple):
-    """The static attributes of a `CondensedStructure`."""
-
-    static_stiffness: FloatArray
-    static_force: FloatArray
-    static_response: FloatArray
-    static_offset: FloatArray
+    return CondensedStructure(**_static(Identity(still), tuple(relative.tolist())), **moving)
 
 
 @lru_cache(maxsize=2)
-def _static(structure: Identity, relative: tuple[int, ...]) -> _Static:
-    """Static condensation of a linear model, which is the same at all frequencies."""
+def _static(structure: Identity, relative: tuple[int, ...]) -> dict[str, Any]:
+    """The static attributes of a `CondensedStructure`, which are the same at all frequencies."""
     linear, chosen = cast("LinearModel", structure.objects[0]), np.array(relative, np.intp)
     found = condense(np.real(linear.stiffness), chosen, linear.load_static)
     rows = np.real(linear.response)[:, relative_first(len(linear.mass), chosen)]
     of_pairs, of_others = np.split(rows, [chosen.size], axis=1)
-    parts = (found.stiffness, found.force, of_pairs - of_others @ found.behind, of_others @ found.held)
-    return _Static(*(np.asarray(np.real(part)) for part in parts))
-
-
-class _Moving(TypedDict):
-    """The attributes of a `CondensedStructure` for the harmonics above the static one."""
-
-    moving: HarmonicStiffness
-    harmonic_force: ComplexArray
-    dynamic_response: ComplexArray
-    harmonic_offset: ComplexArray
-    drive: ComplexArray
-    drive_offset: complex
+    return {
+        "static_stiffness": np.asarray(np.real(found.stiffness)),
+        "static_force": np.asarray(np.real(found.force)),
+        "static_response": np.asarray(np.real(of_pairs - of_others @ found.behind)),
+        "static_offset": np.asarray(np.real(of_others @ found.held)),
+    }
 
 
 def _condense_each(
     model: ReducedModel, relative: IntArray, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
-) -> _Moving:
-    """Condensation with a matrix for each harmonic; arguments as in `build_structure`."""
+) -> dict[str, Any]:
+    """The other attributes, with a matrix for each harmonic; arguments as in `build_structure`."""
     n_rel, n_response = relative.size, model.linear[0].response.shape[0]
     every = relative_first(len(model.linear[0].mass), relative)
     stiffness = np.empty((len(orders), n_rel, n_rel), complex)
@@ -186,20 +157,20 @@ def _condense_each(
             force, offset = found.force[0], of_others @ found.held[0]
             drive = load[0, :n_rel].conj() - load[0, n_rel:].conj() @ found.behind[0]
             drive_offset = complex(load[0, n_rel:].conj() @ found.held[0])
-    return _Moving(
-        moving=DenseStiffness(stiffness),
-        harmonic_force=force,
-        dynamic_response=response,
-        harmonic_offset=offset,
-        drive=drive,
-        drive_offset=drive_offset,
-    )
+    return {
+        "moving": DenseStiffness(stiffness),
+        "harmonic_force": force,
+        "dynamic_response": response,
+        "harmonic_offset": offset,
+        "drive": drive,
+        "drive_offset": drive_offset,
+    }
 
 
 def _condense_shared(
     linear: LinearModel, relative: IntArray, rates: FloatArray, excitation_amplitude: float
-) -> _Moving:
-    """Condensation of a real structure with matrices shared by all harmonics, at the rates n w (H,), rad/s."""
+) -> dict[str, Any]:
+    """As `_condense_each`, of a real structure, with matrices shared by all harmonics, at the rates n w (H,), rad/s."""
     others = relative_first(len(linear.mass), relative)[relative.size :]
     compliance = cast("ComplexArray", np.linalg.inv(dynamic_stiffness(linear, rates, others, others)))
     coupling = dynamic_stiffness(linear, rates, others, relative)
@@ -208,14 +179,14 @@ def _condense_shared(
     seen = rows[:, others] @ compliance
     by_load = load[others].conj() @ compliance[0]
     held = compliance[0] @ load[others]
-    return _Moving(
-        moving=share_matrices(linear, relative, others, rates, compliance),
-        harmonic_force=load[relative] - dynamic_stiffness(linear, rates[:1], relative, others)[0] @ held,
-        dynamic_response=rows[:, relative] - seen @ coupling,
-        harmonic_offset=rows[:, others] @ held,
-        drive=load[relative].conj() - by_load @ coupling[0],
-        drive_offset=complex(load[others].conj() @ held),
-    )
+    return {
+        "moving": share_matrices(linear, relative, others, rates, compliance),
+        "harmonic_force": load[relative] - dynamic_stiffness(linear, rates[:1], relative, others)[0] @ held,
+        "dynamic_response": rows[:, relative] - seen @ coupling,
+        "harmonic_offset": rows[:, others] @ held,
+        "drive": load[relative].conj() - by_load @ coupling[0],
+        "drive_offset": complex(load[others].conj() @ held),
+    }
 
 
 def dynamic_stiffness(linear: LinearModel, rates: FloatArray, rows: IntArray, columns: IntArray) -> ComplexArray:
@@ -235,11 +206,7 @@ def whole_motion(
     """All displacements (n, ...), m, whose relative ones are `moved` (n_rel, ...), m, under a load (n, ...), N.
 
     For motions and loads with exp(s t), s the `exponent`, 1/s: `i n w` in harmonic n of a periodic motion.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The structure with its joint held is singular.
+    Raises numpy.linalg.LinAlgError where the structure with its joint held is singular.
     """
     others = relative_first(len(linear.mass), relative)[relative.size :]
 
@@ -284,21 +251,9 @@ class Condensed(NamedTuple):
 
 
 def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
-    """Condensation of static or dynamic stiffnesses on some displacements (Schur complement).
+    """Condensation of stiffnesses `full` (..., n, n), N/m, and loads (..., n), N, on some displacements (n_rel,).
 
-    Parameters
-    ----------
-    full : array (..., n, n)
-        Stiffness, N/m.
-    relative : array (n_rel,)
-        Indices of the displacements that remain.
-    load : array (..., n)
-        Load, N.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The block of the other displacements is singular.
+    Raises numpy.linalg.LinAlgError where the block of the other displacements is singular.
     """
     every = relative_first(full.shape[-1], relative)
     return _condense_ordered(full[..., every[:, None], every], relative.size, load[..., every])

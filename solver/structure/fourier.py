@@ -48,19 +48,9 @@ class FourierBasis:
 
 @lru_cache(maxsize=32)
 def build_basis(orders: tuple[int, ...], n_samples: int) -> FourierBasis:
-    """Fourier basis, Eq. (5).
+    """Fourier basis, Eq. (5), of harmonics above the static one, ascending, and of N samples.
 
-    Parameters
-    ----------
-    orders : tuple of int
-        Harmonics above the static one, ascending.
-    n_samples : int
-        Number N of samples, equally spaced over the period.
-
-    Raises
-    ------
-    ValueError
-        The highest order is not below N/2: aliasing.
+    Raises ValueError where the highest order is not below N/2: aliasing.
     """
     highest = max(orders, default=0)
     if n_samples <= 2 * highest:

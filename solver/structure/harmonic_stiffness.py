@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, cast
+from typing import cast
 
 import numpy as np
 
@@ -13,42 +13,24 @@ from solver.structure.fourier import to_complex
 from solver.structure.rough_forms import RoughStiffness, rough_of_each, rough_of_shared
 
 
-class HarmonicStiffness(Protocol):
-    """Z_r at H harmonics above the static one."""
-
-    @property
-    def dense(self) -> ComplexArray:
-        """Matrices (H, n_rel, n_rel), N/m; computed at each call where they are not stored."""
-
-    def matrix(self, place: int) -> ComplexArray:
-        """Matrix (n_rel, n_rel), N/m, of the harmonic at index `place`."""
-
-    def apply(self, displacement_h: FloatArray) -> ComplexArray:
-        """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
-
-    @property
-    def rough(self) -> RoughStiffness:
-        """Z_r in single precision, for directions of Newton's method, not for the residual."""
-
-
 @dataclass(frozen=True)
 class DenseStiffness:
-    """A matrix for each harmonic, for any structure. dense (H, n_rel, n_rel): N/m."""
+    """Z_r at H harmonics above the static one, for any structure. dense (H, n_rel, n_rel): matrices, N/m."""
 
     dense: ComplexArray
 
     def matrix(self, place: int) -> ComplexArray:
-        """As in HarmonicStiffness."""
+        """Matrix (n_rel, n_rel), N/m, of the harmonic at index `place`."""
         return cast("ComplexArray", self.dense[place])
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
-        """As in HarmonicStiffness."""
+        """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
         moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
         return cast("ComplexArray", np.matmul(self.dense, moving)[:, :, 0].T)
 
     @cached_property
     def rough(self) -> RoughStiffness:
-        """As in HarmonicStiffness."""
+        """Z_r in single precision, for directions of Newton's method, not for the residual."""
         return rough_of_each(self.dense)
 
 
@@ -82,11 +64,11 @@ class SharedStiffness:
 
     @property
     def dense(self) -> ComplexArray:
-        """As in HarmonicStiffness. Not stored: all harmonics together may need as much memory as all other data."""
+        """As in DenseStiffness; computed at each call: the matrices may need as much memory as all other data."""
         return np.array([self.matrix(place) for place in range(self.rates.size)]).reshape(-1, self.n_rel, self.n_rel)
 
     def matrix(self, place: int) -> ComplexArray:
-        """As in HarmonicStiffness."""
+        """As in DenseStiffness."""
         rate = self.rates[place]
         stiffness, mass, damping = self.columns
         columns = stiffness - rate**2 * mass + 1j * rate * damping
@@ -95,13 +77,13 @@ class SharedStiffness:
         return cast("ComplexArray", columns[: self.n_rel] - back @ held)
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
-        """As in HarmonicStiffness."""
+        """As in DenseStiffness."""
         forces = self._combine(*_products(self.columns, displacement_h[:, 1:]))
         return forces[: self.n_rel] - self._combine(*_products(self.back, self._behind(forces[self.n_rel :])))
 
     @cached_property
     def rough(self) -> RoughStiffness:
-        """As in HarmonicStiffness."""
+        """As in DenseStiffness."""
         few = rough_of_shared(self.linear, self.relative, self.internal, self.rates, self.held_compliance)
         return rough_of_each(self.dense) if few is None else few
 
@@ -143,3 +125,6 @@ def share_matrices(
         relative,
         internal,
     )
+
+
+HarmonicStiffness = DenseStiffness | SharedStiffness

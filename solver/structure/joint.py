@@ -172,23 +172,11 @@ def build_case(
 ) -> Case:
     """Case of a scene.
 
-    Parameters
-    ----------
-    model : ReducedModel
-        The scene.
-    friction_coefficient : float, array (n_contact,) or None
-        One number for all pairs or one for each pair; None where the scene has its own.
-    omega : float
-        Angular frequency for which the penalty is built, rad/s; equal for states that are compared.
-    settings : SolverSettings
-        Settings of the solver.
-    resolution : Resolution, optional
-        First harmonics and samples; by default from the settings.
+    - friction_coefficient: one number for all pairs or (n_contact,); None where the scene has its own.
+    - omega: angular frequency for which the penalty is built, rad/s; equal for states that are compared.
+    - resolution: first harmonics and samples; by default from the settings.
 
-    Raises
-    ------
-    ValueError
-        The friction coefficient is given twice, not at all, or not for each pair.
+    Raises ValueError where the friction coefficient is given twice, not at all, or not for each pair.
     """
     chosen = resolution or first_resolution(settings)
     penalty = build_penalty(model, omega, chosen.highest)

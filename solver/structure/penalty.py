@@ -41,15 +41,7 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     """Penalty from the condensed `K + s^2 M` at the real rate s = `(highest + 1) omega`, the first harmonic left out.
 
     At a real rate the structure has no resonances: an elastic joint acts as a stiffness, a slider as a mass.
-
-    Parameters
-    ----------
-    model : ReducedModel
-        The structure.
-    omega : float
-        Angular frequency, rad/s.
-    highest : int
-        Highest harmonic of the balance.
+    omega: rad/s. highest: highest harmonic of the balance.
     """
     rate = (highest + 1) * omega
     size = _stiffness_at(model, rate)
