@@ -10,7 +10,7 @@ of pairs stand behind the methods of `ContactLaw`. `solver.structure.penalty` ch
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -25,38 +25,10 @@ from solver.options import COMMON
 
 if TYPE_CHECKING:
     from solver.structure.fourier import FourierBasis
+    from solver.structure.penalty import Penalty
 
 Chosen = slice | BoolArray
 """Pairs of one kind."""
-
-
-@dataclass(frozen=True)
-class Penalty:
-    """Penalties of the pairs, Eq. (9), and masses of the inertial pairs.
-
-    - normal, tangential (n_contact,): eps, N/m; `tangential` for elastic pairs only.
-    - inertial (n_contact,): whether the pair is marched with its mass.
-    - mass (n_contact,): kg, for inertial pairs only.
-    - drag (n_contact,): N s/m, for inertial pairs only.
-    - mean (n_contact,): stiffness on the mean tangential position, N/m, for inertial pairs only. While such a pair
-      sticks, the friction force alone does not determine the mean position. The stiffness is too small to hold a pair
-      that slips.
-    """
-
-    normal: FloatArray
-    tangential: FloatArray
-    inertial: BoolArray
-    mass: FloatArray
-    drag: FloatArray
-    mean: FloatArray
-
-    def static(self) -> Penalty:
-        """The penalty for a static state, which has no velocity: each pair is taken at displacement level."""
-        return replace(self, inertial=np.zeros_like(self.inertial))
-
-    def at_rate(self, rate: float) -> FloatArray:
-        """E (n_contact, 2), N/m, normal and tangential, of a motion that grows at a real rate, 1/s."""
-        return np.stack([self.normal, np.where(self.inertial, self.mass * rate**2, self.tangential)], axis=1)
 
 
 @dataclass(frozen=True)

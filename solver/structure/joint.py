@@ -7,14 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.contact.law import ContactLaw, Penalty
+from solver.contact.law import ContactLaw
 from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
 from solver.packing import packable
 from solver.settings import Resolution, SolverSettings, first_resolution
 from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure, build_structure, relative_indices
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.harmonic_stiffness import DenseStiffness
-from solver.structure.penalty import build_penalty
+from solver.structure.penalty import Penalty, build_penalty
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,11 @@ harmonic:
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
-from solver.contact.law import Penalty
-from solver.model import FloatArray, Matrix, ReducedModel
+from solver.model import BoolArray, FloatArray, Matrix, ReducedModel
 from solver.structure.condensation import condense, relative_indices
 
 INERTIAL_RATIO = 2.0
@@ -35,6 +36,35 @@ and twice the value change the motion of slider and two masses by 1e-4."""
 MEAN_STIFFNESS_FRACTION = 1e-5
 """Stiffness on the mean position of an inertial pair over the stiffness of the joint at the frequency. It is too small
 to hold a pair that slips. Half and twice the value change states by at most 3e-6."""
+
+
+@dataclass(frozen=True)
+class Penalty:
+    """Penalties of the pairs, Eq. (9), and masses of the inertial pairs.
+
+    - normal, tangential (n_contact,): eps, N/m; `tangential` for elastic pairs only.
+    - inertial (n_contact,): whether the pair is marched with its mass.
+    - mass (n_contact,): kg, for inertial pairs only.
+    - drag (n_contact,): N s/m, for inertial pairs only.
+    - mean (n_contact,): stiffness on the mean tangential position, N/m, for inertial pairs only. While such a pair
+      sticks, the friction force alone does not determine the mean position. The stiffness is too small to hold a pair
+      that slips.
+    """
+
+    normal: FloatArray
+    tangential: FloatArray
+    inertial: BoolArray
+    mass: FloatArray
+    drag: FloatArray
+    mean: FloatArray
+
+    def static(self) -> Penalty:
+        """The penalty for a static state, which has no velocity: each pair is taken at displacement level."""
+        return replace(self, inertial=np.zeros_like(self.inertial))
+
+    def at_rate(self, rate: float) -> FloatArray:
+        """E (n_contact, 2), N/m, normal and tangential, of a motion that grows at a real rate, 1/s."""
+        return np.stack([self.normal, np.where(self.inertial, self.mass * rate**2, self.tangential)], axis=1)
 
 
 def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
