@@ -78,8 +78,9 @@ class SharedStiffness:
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """As in DenseStiffness."""
-        forces = self._combine(*_products(self.columns, displacement_h[:, 1:]))
-        return forces[: self.n_rel] - self._combine(*_products(self.back, self._behind(forces[self.n_rel :])))
+        forces = self._products(self.columns, to_complex(displacement_h))
+        behind = np.matmul(self.held_compliance, forces[self.n_rel :].T[:, :, None])[:, :, 0].T
+        return forces[: self.n_rel] - self._products(self.back, behind)
 
     @cached_property
     def rough(self) -> RoughStiffness:
@@ -87,26 +88,16 @@ class SharedStiffness:
         few = rough_of_shared(self.linear, self.relative, self.internal, self.rates, self.held_compliance)
         return rough_of_each(self.dense) if few is None else few
 
-    def _behind(self, forces: ComplexArray) -> FloatArray:
-        """`A_ii^-1 f` as harmonics cosine, sine, ... (n_i, 2H) from the complex f (n_i, H)."""
-        behind = np.matmul(self.held_compliance, forces.T[:, :, None])[:, :, 0].T
-        parts = np.empty((behind.shape[0], 2 * self.rates.size))
-        parts[:, ::2], parts[:, 1::2] = behind.real, -behind.imag
-        return parts
+    def _products(self, parts: FloatArray, amplitudes: ComplexArray) -> ComplexArray:
+        """`(K + i n w C - (n w)^2 M) u` (rows, H) of real parts K, M, C (3, rows, n) and complex u (n, H).
 
-    def _combine(self, by_stiffness: FloatArray, by_mass: FloatArray, by_damping: FloatArray) -> ComplexArray:
-        """`(K + i n w C - (n w)^2 M) u` (rows, H) from `K u`, `M u`, `C u`, harmonics cosine, sine, ... (rows, 2H)."""
-        spring, inertia, drag = (part.reshape(part.shape[0], -1, 2) for part in (by_stiffness, by_mass, by_damping))
-        spring = spring - self.rates[:, None] ** 2 * inertia
-        drag = self.rates[:, None] * drag
-        # i (cosine - i sine) = sine + i cosine
-        return cast("ComplexArray", spring[..., 0] + drag[..., 1] - 1j * (spring[..., 1] - drag[..., 0]))
-
-
-def _products(forms: FloatArray, moving: FloatArray) -> FloatArray:
-    """`K u`, `M u`, `C u` (3, rows, k) in one product."""
-    _, n_rows, n_columns = forms.shape
-    return (forms.reshape(3 * n_rows, n_columns) @ moving).reshape(3, n_rows, moving.shape[1])
+        One real product for all harmonics: real and imaginary parts are columns side by side.
+        """
+        _, n_rows, n = parts.shape
+        columns = np.ascontiguousarray(amplitudes).view(np.float64)
+        found = (parts.reshape(3 * n_rows, n) @ columns).view(np.complex128)
+        spring, inertia, drag = found.reshape(3, n_rows, self.rates.size)
+        return np.asarray(spring + 1j * self.rates * drag - self.rates**2 * inertia)
 
 
 def share_matrices(
