@@ -36,7 +36,8 @@ from solver.wear.euler import held_wear
 def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
     """Hold of the mean position of a state.
 
-    None unless every pair slips at some time and the structure is free to slide in one direction.
+    None unless every pair slips at some time and the structure is free to slide in one direction; masses on rigid
+    ground have a hold of their own (`Penalty.mean`).
     """
     if (at.status_t == STICK).all(axis=1).any() or joint.law.rate_dependent:
         return None
