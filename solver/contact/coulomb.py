@@ -197,12 +197,16 @@ def sample_tangents(
             status = status_t[pair, n]
             trial_1 = predicted_t[pair, 1, n] - state_t[pair, 0, n]
             trial_2 = predicted_t[pair, 2, n] - state_t[pair, 1, n]
-            pull_1, pull_2, across_11, across_12, across_22 = contact_tangent(
+            pull_1, pull_2, across_11, _, across_22 = contact_tangent(
                 status, predicted_t[pair, 0, n], trial_1, trial_2, friction[pair]
             )
             across = carried[place, pair]
             across[0, 0], across[1, 1] = across_11, across_22
-            across[0, 1] = across[1, 0] = across_12
+            if status == SLIP:
+                # entry 12 of `across_slip`, with the order of the products (round-off) of the preconditioner
+                limit = friction_limit(friction[pair], predicted_t[pair, 0, n])
+                unit_1, unit_2, ratio = slip_direction(trial_1, trial_2, limit)
+                across[0, 1] = across[1, 0] = -ratio * (unit_1 * unit_2)
             if status == SEPARATED:
                 own[place, pair, 0, 0] = 1.0
             for i in range(2):
