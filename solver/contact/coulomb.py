@@ -151,16 +151,20 @@ def advance_tangent(
     """
     m, width = basis.size, dstate.shape[1]
     pull_1, pull_2, across_11, across_12, across_22 = by
-    for column in range(width):
-        dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
-        dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
+    if status == STICK:
+        for column in range(width):
+            dforce[0, column] = -dstate[0, column]
+            dforce[1, column] = -dstate[1, column]
+    else:
+        for column in range(width):
+            dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
+            dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
     for component, by_1, by_2 in ((0, pull_1, pull_2), (1, across_11, across_12), (2, across_12, across_22)):
         place = first[component]
-        if place >= 0 and (by_1 != 0.0 or by_2 != 0.0):
-            force_1, force_2 = dforce[0, place : place + m], dforce[1, place : place + m]
-            for k in range(m):
-                force_1[k] += by_1 * basis[k]
-                force_2[k] += by_2 * basis[k]
+        if place >= 0 and by_1 != 0.0:
+            _add(dforce[0, place : place + m], by_1, basis)
+        if place >= 0 and by_2 != 0.0:
+            _add(dforce[1, place : place + m], by_2, basis)
     if status == STICK:
         return
     for component in range(2):
@@ -168,9 +172,14 @@ def advance_tangent(
             dstate[component, column] = -dforce[component, column]
         place = first[1 + component]
         if place >= 0:
-            own = dstate[component, place : place + m]
-            for k in range(m):
-                own[k] += basis[k]
+            _add(dstate[component, place : place + m], 1.0, basis)
+
+
+@njit(cache=True)
+def _add(row: FloatArray, times: float, basis: FloatArray) -> None:
+    """Add `times` the basis (m,) to a row (m,)."""
+    for k in range(basis.size):
+        row[k] += times * basis[k]
 
 
 @njit(cache=True)

@@ -191,9 +191,9 @@ class ContactLaw:
             )
         passes = stuck[:, None] | (contact.dofs < 0)
         passes[:, 0] = stuck & contact.has_normal
-        for component in range(3):
-            own = np.arange(component * m, (component + 1) * m)
-            tangent[np.ix_(passes[:, component], own, own)] = np.eye(m)
+        pair, component = np.nonzero(passes)
+        own = m * component[:, None] + np.arange(m)
+        tangent[pair[:, None], own, own] = 1.0
         return tangent, work_tangent
 
     # --- motion ---

@@ -57,9 +57,11 @@ def march_tangent(
             normal, _, _, _, _, status = contact_sample(normal, force_1, force_2, friction[pair], first, second)
             by = contact_tangent(status, normal, force_1 - first, force_2 - second, friction[pair])
             before[:, :] = dstate
-            advance_tangent(dstate, dforce, basis_t[n], columns, status, by)
-            for place, tangent in enumerate(tangents):
-                dforce_t[n, place] = dforce[tangent]
+            if tangents.size == 2:
+                advance_tangent(dstate, dforce_t[n], basis_t[n], columns, status, by)
+            else:
+                advance_tangent(dstate, dforce, basis_t[n], columns, status, by)
+                dforce_t[n, 0] = dforce[tangents[0]]
             _add_slip_work(work, n, predicted_t[pair, 0], state_t[pair], before, dstate, basis_t, has_normal[pair])
         plain = min(periods[pair] - 1, PLAIN_PERIODS)
         _start_tangent(dstart, dstate, predicted_t[pair], friction[pair], start[pair], plain, basis_t, columns)
