@@ -13,16 +13,15 @@ For use in Python, from this package itself:
   multipliers, a `ResponseCurve`;
 - `balance_of`: the equations of a periodic state, a `HarmonicBalance`, with residual, exact Jacobian, and all Fourier
   coefficients and time signals of a state as a `PeriodicMotion`;
-- `tuned`: other limits of the solver for hard cases;
 - `SolverSettings`: resolution and accuracy; `Outcome`: how a computation ended.
 
-The rooms, from the ground up: `structure` (Fourier basis, condensation, penalty), `contact` (Coulomb friction and
-unilateral contact through a period), `harmonic_balance` (the DLFT balance and its Jacobian), `newton` (iteration,
-linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first state,
-transient), `accuracy` (number of harmonics, refinement, reference solution and errors, certificate), `results`,
+The rooms, from the ground up: `contact` (Coulomb friction and unilateral contact through a period), `structure`
+(Fourier basis, condensation, penalty, the joint), `harmonic_balance` (the DLFT balance and its Jacobian), `newton`
+(iteration, linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first
+state, transient), `accuracy` (number of harmonics, refinement, reference solution and errors, certificate), `results`,
 `loading_history` (the unworn states of a sweep or a ramp), `modes` (nonlinear modes), `wear` (the integration over the
 slow time), `missions` (blocks in order). On top: `forced_response`, `nonlinear_modes`, `single_mode_theory`,
-`wear_history`, `mission_history`, `balance_functions`, `whole_response`, `tuning`. On the ground: `model`,
+`wear_history`, `mission_history`, `balance_functions`, `whole_response`. On the ground: `model`,
 `model_from_matrices`, `compliant_contact`, `settings`, `outcome`, `clock`, `packing`. `PHYSICS.md` has the equations in
 one sign convention, the misprints of the paper, and measurements.
 """
@@ -47,7 +46,6 @@ if TYPE_CHECKING:
     from solver.results.periodic_motion import PeriodicMotion
     from solver.settings import SolverSettings
     from solver.single_mode_theory import ModalResponse, modal_response
-    from solver.tuning import tuned
     from solver.wear_history import march_wear
     from solver.whole_response import ResponseCurve, response_curve
 
@@ -73,7 +71,6 @@ __all__ = [
     "march_wear",
     "modal_response",
     "response_curve",
-    "tuned",
     "with_contact_stiffness",
 ]
 
@@ -100,7 +97,6 @@ _PLACES = {
     "march_wear": "wear_history",
     "modal_response": "single_mode_theory",
     "response_curve": "whole_response",
-    "tuned": "tuning",
     "with_contact_stiffness": "compliant_contact",
 }
 

@@ -38,17 +38,8 @@ def with_contact_stiffness(model: ReducedModel, contact_stiffness: float) -> Red
     of the model follow the scaled compressions of the springs, one for each relative displacement. Responses, loads and
     all else are the same.
 
-    Parameters
-    ----------
-    model : ReducedModel
-        The model of the joint without the springs.
-    contact_stiffness : float
-        Normal stiffness kappa_N per area, N/m3. The tangential one is `TANGENTIAL_RATIO` times as large.
-
-    Raises
-    ------
-    ValueError
-        The stiffness is not between 0 and `LARGEST_CONTACT_STIFFNESS`.
+    contact_stiffness: kappa_N per area, N/m3; the tangential one is `TANGENTIAL_RATIO` times as large.
+    Raises ValueError where it is not between 0 and `LARGEST_CONTACT_STIFFNESS`.
     """
     if not 0.0 < contact_stiffness <= LARGEST_CONTACT_STIFFNESS:
         remedy = f"give a positive number, at most {LARGEST_CONTACT_STIFFNESS:g} N/m3"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,17 @@ class ContactInterface:
         """Number of contact pairs."""
         return len(self.area)
 
+    @cached_property
+    def has_normal(self) -> BoolArray:
+        """False (n_contact,) for pairs without a closing displacement, whose normal force is constant."""
+        return np.asarray(self.dofs[:, 0] >= 0)
+
+    @cached_property
+    def line(self) -> IntArray:
+        """0 or 1 (n_contact,) where a pair has the first or the second tangent only, else -1."""
+        tangents = self.dofs[:, 1:] >= 0
+        return np.where(tangents.sum(axis=1) == 1, np.argmax(tangents, axis=1), -1)
+
 
 @dataclass(frozen=True)
 class LinearModel:
@@ -68,6 +80,12 @@ class LinearModel:
     load_static: FloatArray
     load_harmonic: ComplexArray
     response: Matrix
+
+    @cached_property
+    def conjugate(self) -> LinearModel:
+        """The structure of a harmonic whose nodal diameter is folded back: conjugate matrices, so damping is kept."""
+        parts = (self.mass, self.damping, self.stiffness, self.load_static, self.load_harmonic, self.response)
+        return LinearModel(*(np.conj(part) for part in parts))
 
 
 @dataclass(frozen=True)
@@ -88,8 +106,8 @@ class ReducedModel:
     n_sectors: int = 0
     nodal_diameter: int = 0
 
-    def harmonic_structure(self, harmonic: int) -> tuple[LinearModel, bool]:
-        """Linear model for a harmonic, and whether its conjugate is meant (nodal diameter folded back).
+    def harmonic_structure(self, harmonic: int) -> LinearModel:
+        """Linear model in which a harmonic moves.
 
         Harmonic n of a travelling wave of nodal diameter d has the interblade phase `2 pi n d / N`. The wave moves in
         nodal diameter `n d` modulo N; above N/2 this is the conjugate of nodal diameter N - n d.
@@ -97,11 +115,11 @@ class ReducedModel:
         Raises KeyError where the scene does not hold that nodal diameter.
         """
         if self.n_sectors == 0 or self.nodal_diameter == 0:
-            return self.linear[0], False
+            return self.linear[0]
         wrapped = (harmonic * self.nodal_diameter) % self.n_sectors
         if 2 * wrapped > self.n_sectors:
-            return self.linear[self.n_sectors - wrapped], True
-        return self.linear[wrapped], False
+            return self.linear[self.n_sectors - wrapped].conjugate
+        return self.linear[wrapped]
 
     def holds(self, n_harmonics: int) -> bool:
         """Whether the scene has the nodal diameters of all harmonics 0..n_harmonics."""

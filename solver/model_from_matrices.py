@@ -75,14 +75,13 @@ def build_model(
     areas = _numbers("area", area, (n_contact,))
     if (areas <= 0.0).any():
         raise ValueError("area: give a positive area, m2, to every contact pair")
+    nowhere = np.full((n_contact, 3), np.nan)
     contact = ContactInterface(
         dofs=dofs,
         area=areas,
         gap=_numbers("gap", gap, (n_contact,)),
         normal_load=_numbers("normal_load", normal_load, (n_contact,)),
-        position=np.full((n_contact, 3), np.nan)
-        if position is None
-        else _numbers("position", position, (n_contact, 3)),
+        position=nowhere if position is None else _numbers("position", position, (n_contact, 3)),
         surface=_names("surface", ("",) * n_contact if surface is None else surface, n_contact),
     )
     default_names = tuple(f"response {index}" for index in range(len(rows)))
@@ -128,9 +127,8 @@ def _array(name: str, given: ArrayLike, kinds: str = "biuf") -> np.ndarray:
 def _pairs(given: ArrayLike, n: int) -> IntArray:
     name = "contact_dofs"
     found = _array(name, given)
-    _check(
-        name, found.ndim == 2 and found.shape[1:] == (3,) and len(found) > 0, "give a row of 3 indices for each pair"
-    )
+    rows = found.ndim == 2 and found.shape[1:] == (3,) and len(found) > 0
+    _check(name, rows, "give a row of 3 indices for each pair")
     _check(name, found.dtype.kind in "iu", "give whole numbers")
     _check(name, bool(((found >= -1) & (found < n)).all()), f"give -1 or an index from 0 to {n - 1}")
     used = found[found >= 0]
@@ -147,15 +145,12 @@ def _load(given: ArrayLike, n: int) -> ComplexArray:
 
 
 def _response(given: ArrayLike, n: int) -> FloatArray:
-    found = _array("response", given)
+    found, name = _array("response", given), "response"
     if found.ndim == 2:
-        return _numbers("response", found, (len(found), n))
-    _check(
-        "response",
-        found.ndim == 1 and found.dtype.kind in "iu",
-        f"give a list of indices, or a matrix (n_response, {n})",
-    )
-    _check("response", bool(((found >= 0) & (found < n)).all()), f"give indices from 0 to {n - 1}")
+        return _numbers(name, found, (len(found), n))
+    whole = found.ndim == 1 and found.dtype.kind in "iu"
+    _check(name, whole, f"give a list of indices, or a matrix (n_response, {n})")
+    _check(name, bool(((found >= 0) & (found < n)).all()), f"give indices from 0 to {n - 1}")
     rows: FloatArray = np.eye(n)[found]
     return rows
 

@@ -26,13 +26,7 @@ def pack_model(model: ReducedModel) -> Packed | None:
 
 
 def unpack_model(packed: Packed) -> ReducedModel:
-    """The model that was packed, equal to the last bit.
-
-    Raises
-    ------
-    ValueError, KeyError, TypeError, IndexError
-        Text and arrays do not describe a model.
-    """
+    """The model that was packed, equal to the last bit; errors as `unpack`, where it does not describe a model."""
     linear, model = unpack(packed)
     if not isinstance(model, ReducedModel):
         raise TypeError(type(model).__name__)

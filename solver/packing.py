@@ -42,17 +42,8 @@ def packable(known: type[T]) -> type[T]:
 
 
 def pack(value: object) -> Packed:
-    """Text and arrays of a value.
-
-    Parameters
-    ----------
-    value
-        Numbers, texts, None, arrays, tuples, lists, dicts with text keys, outcomes and packable classes.
-
-    Raises
-    ------
-    TypeError
-        For any other value: a bug.
+    """Text and arrays of a value: numbers, texts, None, arrays, tuples, lists, dicts with text keys, outcomes and
+    packable classes. Raises TypeError for any other value: a bug.
     """
     arrays: list[NDArray[np.generic]] = []
     text = json.dumps(_described(value, arrays))
@@ -62,10 +53,7 @@ def pack(value: object) -> Packed:
 def unpack(packed: Packed) -> Any:
     """The value that was packed.
 
-    Raises
-    ------
-    ValueError, KeyError, TypeError, IndexError
-        Text and arrays do not describe a value.
+    Raises ValueError, KeyError, TypeError or IndexError where text and arrays do not describe a value.
     """
     return _rebuilt(json.loads(packed.text), packed.arrays)
 

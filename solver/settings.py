@@ -112,33 +112,30 @@ def all_orders(n_harmonics: int) -> tuple[int, ...]:
     return tuple(range(1, n_harmonics + 1))
 
 
-@dataclass(frozen=True)
-class ResolutionOptions:
-    """First values of automatic harmonics and samples, each with the evidence for its value."""
+FIRST_HARMONICS = 3
+"""Harmonics of the first state with automatic harmonics: the smallest number that shows friction."""
 
-    first_harmonics: int = 3
-    """Harmonics of the first state: the smallest number that shows friction."""
-    fewest_samples: int = 64
-    """Samples in a period. With fewer, the samples and not the harmonics limit the accuracy of a slider with H = 1."""
-    samples_per_harmonic: int = 8
-    """Samples in one period of the highest harmonic."""
-    fine_samples: int = 2048
-    """Points of a period in the search for a missed event and for the largest response: a sine can exceed a limit
-    between them by 1e-6 only, and a peak of harmonic 20 is found to 0.05 %."""
+FEWEST_SAMPLES = 64
+"""Automatic samples in a period. With fewer, the samples and not the harmonics limit the accuracy of a slider with
+H = 1."""
 
+SAMPLES_PER_HARMONIC = 8
+"""Automatic samples in one period of the highest harmonic."""
 
-RESOLUTION = ResolutionOptions()
+FINE_SAMPLES = 2048
+"""Points of a period in the search for a missed event and for the largest response: a sine can exceed a limit between
+them by 1e-6 only, and a peak of harmonic 20 is found to 0.05 %."""
 
 
 def samples_for(highest: int) -> int:
     """Number of samples, a power of two, that resolves the harmonics up to `highest`."""
-    wanted = max(RESOLUTION.fewest_samples, RESOLUTION.samples_per_harmonic * highest)
+    wanted = max(FEWEST_SAMPLES, SAMPLES_PER_HARMONIC * highest)
     return 1 << (wanted - 1).bit_length()
 
 
 def first_resolution(settings: SolverSettings) -> Resolution:
     """The fixed resolution of the settings, or the first one of automatic settings."""
-    n_harmonics = RESOLUTION.first_harmonics if settings.harmonics == "auto" else settings.harmonics
+    n_harmonics = FIRST_HARMONICS if settings.harmonics == "auto" else settings.harmonics
     samples = samples_for(n_harmonics) if settings.samples == "auto" else settings.samples
     return Resolution(all_orders(n_harmonics), samples)
 

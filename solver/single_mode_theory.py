@@ -60,7 +60,7 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
         The mode has fewer than two amplitudes with a state, the excitation is not above 0, or mode and model do not
         belong together.
     """
-    linear, folded = model.harmonic_structure(1)
+    linear = model.harmonic_structure(1)
     order = _usable(mode, excitation_amplitude, len(linear.mass))
     known = np.log(mode.amplitude[order])
     at = np.unique(np.concatenate([np.linspace(*ends, points + 1) for ends in pairwise(known.tolist())]))
@@ -73,8 +73,7 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
     size = np.exp(at)
     omega, zeta = 2.0 * np.pi * between(mode.frequency)[:, 0].real, between(mode.damping_ratio)[:, 0].real
     shape = between(mode.shape / mode.amplitude[:, None])
-    load = linear.load_harmonic.conj() if folded else linear.load_harmonic
-    force = excitation_amplitude * (shape.conj() @ load)
+    force = excitation_amplitude * (shape.conj() @ linear.load_harmonic)
     # Omega^4 - 2 middle Omega^2 + omega^4 = |force|^2 / a^2
     middle = omega**2 * (1.0 - 2.0 * zeta**2)
     inside = middle**2 - omega**4 + (np.abs(force) / size) ** 2

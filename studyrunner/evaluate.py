@@ -151,7 +151,7 @@ def follow_amplitudes(model: ReducedModel, task: BranchTask, keep: Keep) -> Iter
     ):
         values = values_of(model, point)
         _raise_fault(values)
-        n_unknowns = 0 if point.state is None else point.state.point.evaluation.predicted_h.size
+        n_unknowns = 0 if point.state is None else point.state.state.evaluation.predicted_h.size
         yield StartResult(wanted[place], pack(values), moves=False, n_unknowns=n_unknowns)
 
 

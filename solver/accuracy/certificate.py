@@ -41,7 +41,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.accuracy.options import ACCURACY
-from solver.contact.alternating_frequency_time import friction_work
 from solver.contact.coulomb import friction_limit
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
@@ -121,6 +120,7 @@ def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
     normal = float(largest.max(initial=0.0))
     # without friction there is no limit to compare with: any tangential force is too much
     limit = float(friction_limit(friction, largest).max(initial=0.0)) if friction.any() else normal
+    drive = max(limit, joint.law.driving_force(evaluation))
     smooth_t = _fejer_mean(joint, evaluation.force_h)
     both = np.concatenate([force_t, smooth_t], axis=2)
     excess = np.hypot(both[:, 1], both[:, 2]) - friction_limit(friction[:, None], both[:, 0])
@@ -130,7 +130,7 @@ def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
         tension=_relative(float((-both[:, 0]).max(initial=0.0)), normal),
         cone_violation=_relative(float(excess.max(initial=0.0)), limit),
         energy_error=_energy_error(joint, evaluation),
-        periodicity_error=_relative(_periodicity_error(joint, evaluation), max(limit, _drive(joint, evaluation))),
+        periodicity_error=_relative(_periodicity_error(joint, evaluation), drive),
     )
 
 
@@ -175,14 +175,14 @@ def _vibrating(values_h: FloatArray) -> FloatArray:
 
 def _flexed(joint: Joint, force_h: FloatArray) -> FloatArray:
     """Motion (n_contact, 3, m), m, that the contact forces cause by the stiffness of the pairs alone."""
-    return joint.to_pairs(joint.to_relative(joint.motion(force_h)))
+    return joint.to_pairs(joint.to_relative(joint.law.motion(force_h)))
 
 
 def _penetration(joint: Joint, evaluation: Evaluation) -> float:
     """Largest penetration over the largest vibration: the relative one, or the elastic one by the contact forces."""
     closing = evaluation.displacement_h[:, 0].copy()
     closing[:, 0] -= joint.contact.gap + evaluation.wear_depth
-    depth = _series(joint, closing[joint.has_normal])
+    depth = _series(joint, closing[joint.contact.has_normal])
     moved = np.linalg.norm(_series(joint, _vibrating(evaluation.displacement_h)), axis=1)
     flexed = _flexed(joint, evaluation.force_h)
     elastic = np.linalg.norm(_series(joint, _vibrating(flexed)), axis=1)
@@ -209,7 +209,7 @@ def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
     excitation = _work(joint, joint.structure.force_h(), motion)
     damping = _work(joint, joint.structure.apply(motion), motion)
     contact = _work(joint, force, motion)
-    dissipation = float(friction_work(joint, evaluation).sum())
+    dissipation = float(joint.law.friction_work(evaluation).sum())
     flexed = _flexed(joint, evaluation.force_h)
     elastic = np.pi * float((_amplitude(evaluation.force_h) * _amplitude(flexed)).sum())
     # largest possible work of the excitation: away from a resonance its actual work is almost zero
@@ -219,17 +219,7 @@ def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
     return _relative(abs(excitation - damping - dissipation), size)
 
 
-def _drive(joint: Joint, evaluation: Evaluation) -> float:
-    """Largest force, N, that drives a sliding mass (`rigid_slider`), to which a drift of this mass is compared."""
-    driven = evaluation.predicted_t[joint.penalty.inertial, 1:]
-    return float(np.abs(driven).max(initial=0.0))
-
-
 def _periodicity_error(joint: Joint, evaluation: Evaluation) -> float:
     """Change of the tangential state over the last period, N, of pairs that touch."""
-    change = np.hypot(*(evaluation.state_t[:, :, -1] - evaluation.state_t[:, :, 0]).T)
-    # the state of an inertial pair is its displacement: its drift is converted to the mean force on its drag
-    creep = change * joint.penalty.drag * joint.omega / (2.0 * np.pi)
-    change = np.where(joint.penalty.inertial, creep, change)
     touches = evaluation.force_t[:, 0].max(axis=1) > 0.0
-    return max(evaluation.periodicity_error, float(change[touches].max(initial=0.0)))
+    return max(evaluation.periodicity_error, float(joint.law.change_force(evaluation)[touches].max(initial=0.0)))

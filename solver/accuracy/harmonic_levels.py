@@ -84,12 +84,10 @@ def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
     """
     penalty = build_penalty(model, omega, highest)
     _, component_index = relative_indices(model.contact)
-    pair, tangent = component_index // 3, component_index % 3 > 0
-    held = np.where(tangent, penalty.tangential[pair], penalty.normal[pair])
-    marched = tangent & penalty.inertial[pair]
+    pair, tangent = component_index // 3, np.minimum(component_index % 3, 1)
     half_octaves = np.arange(0.0, 2.0 * np.log2(ACCURACY.harmonic_levels[-1] / (highest + 1)) + 1.0)
     for rate in (highest + 1) * omega * 2.0 ** (0.5 * half_octaves):
-        acts = np.where(marched, penalty.mass[pair] * rate**2, held)
+        acts = penalty.at_rate(rate)[pair, tangent]
         if np.abs(1.0 - acts * compliance_at(model, rate)).max(initial=0.0) > ACCURACY.stiffness_mismatch:
             return False
     return True

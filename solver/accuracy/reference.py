@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from solver.accuracy.harmonic_levels import fewer, shifted
 from solver.model import ReducedModel
-from solver.settings import RESOLUTION, Resolution, SolverSettings
+from solver.settings import FIRST_HARMONICS, Resolution, SolverSettings
 
 RTOL_RATIO = 2.0
 """Ratio of the step tolerances of reference solution and history: BDF2 steps are then a quarter longer. With 4 the
@@ -35,5 +35,5 @@ def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
     harmonics or one has the next higher level, where the model has matrices for it.
     """
     richer = shifted(resolution, 1)
-    few = resolution.highest <= RESOLUTION.first_harmonics
+    few = resolution.highest <= FIRST_HARMONICS
     return richer if few and model.holds(richer.highest) else fewer(resolution, AUTOMATIC)

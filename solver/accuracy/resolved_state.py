@@ -25,7 +25,7 @@ from solver.model import ComplexArray, FloatArray
 from solver.newton.options import NEWTON
 from solver.newton.run import Run
 from solver.options import COMMON
-from solver.settings import RESOLUTION, Resolution, all_orders
+from solver.settings import FINE_SAMPLES, Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
@@ -74,7 +74,7 @@ class ResolvedState:
             level = self._solved(
                 case,
                 joint,
-                *start_with_tail(joint, self.point.evaluation, self.case.resolution.orders, self.case.penalty.inertial),
+                *start_with_tail(self.case, joint, self.point.evaluation),
                 run,
             )
             if level is not None:
@@ -88,9 +88,7 @@ class ResolvedState:
         """State solved from a state with other harmonics or with another penalty."""
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
-        return self._solved(
-            case, joint, *transfer(case, joint, evaluation, old.resolution.orders, old.penalty.inertial), run
-        )
+        return self._solved(case, joint, *transfer(old, joint, evaluation), run)
 
     def _solved(self, case: Case, joint: Joint, balance: Balance, start: FloatArray, run: Run) -> ResolvedState | None:
         point = run.fresh().state(balance, start, self.point.parameter)
@@ -134,7 +132,7 @@ class ResolvedState:
         none. Without an event the harmonics are exact, so that one solve with the finest samples is enough.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        finest = self.solve_at(Resolution(orders, max(RESOLUTION.fine_samples, 2 * samples)), run)
+        finest = self.solve_at(Resolution(orders, max(FINE_SAMPLES, 2 * samples)), run)
         if finest is None or nothing_happens(finest.point.evaluation):
             return None
         while (samples := 2 * samples) < finest.case.resolution.samples:

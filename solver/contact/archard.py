@@ -14,7 +14,7 @@ Two quantities in J must not be confused:
   force.
 - *friction work*: energy dissipated by friction, the integral of lambda_T . dX_T. The friction force is at its limit
   during slip, so that friction work is friction coefficient times slip work
-  (`alternating_frequency_time.friction_work`).
+  (`law.ContactLaw.friction_work`).
 
 In an implicit step of h cycles, Eq. (24), the depth grows with the slip work of the unknown state at the end of the
 step. The gain is the derivative of the growth with respect to the slip work (the print of (26b) lacks h).

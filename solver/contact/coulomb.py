@@ -133,14 +133,11 @@ def advance_monodromy(
 @njit(cache=True)
 def advance_tangent(
     dstate: FloatArray,
-    basis: FloatArray,
-    status: int,
-    normal: float,
-    trial_1: float,
-    trial_2: float,
-    friction: float,
-    first: IntArray,
     dforce: FloatArray,
+    basis: FloatArray,
+    first: IntArray,
+    status: int,
+    by: tuple[float, float, float, float, float],
 ) -> None:
     """Derivatives of one sample, in place: `dforce` (2, w) of the tangential force, `dstate` (2, w) of the state.
 
@@ -150,45 +147,39 @@ def advance_tangent(
     - basis (m,): derivative of a time sample with respect to its harmonics.
     - first (3,): first of the m columns of each component of the predicted force (normal, tangent 1, tangent 2); -1
       where the force does not depend on the component.
-    - The last two columns are the derivatives with respect to the state at the start of the period.
+    - status, by: of the sample; as `contact_tangent` returns `by`.
     """
     m, width = basis.size, dstate.shape[1]
+    pull_1, pull_2, across_11, across_12, across_22 = by
     if status == STICK:
         for column in range(width):
             dforce[0, column] = -dstate[0, column]
             dforce[1, column] = -dstate[1, column]
-        for component in range(2):
-            place = first[1 + component]
-            if place >= 0:
-                own = dforce[component, place : place + m]
-                for k in range(m):
-                    own[k] += basis[k]
-        return
-    pull_1, pull_2, across_11, across_12, across_22 = contact_tangent(status, normal, trial_1, trial_2, friction)
-    if status == SLIP and friction_limit(friction, normal) > 0.0:
+    else:
         for column in range(width):
             dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
             dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
-        for component, by_1, by_2 in ((0, pull_1, pull_2), (1, across_11, across_12), (2, across_12, across_22)):
-            place = first[component]
-            if place >= 0:
-                force_1, force_2 = dforce[0, place : place + m], dforce[1, place : place + m]
-                for k in range(m):
-                    force_1[k] += by_1 * basis[k]
-                    force_2[k] += by_2 * basis[k]
-    else:
-        for column in range(width):
-            dforce[0, column] = 0.0
-            dforce[1, column] = 0.0
-    for column in range(width):
-        dstate[0, column] = -dforce[0, column]
-        dstate[1, column] = -dforce[1, column]
+    for component, by_1, by_2 in ((0, pull_1, pull_2), (1, across_11, across_12), (2, across_12, across_22)):
+        place = first[component]
+        if place >= 0 and by_1 != 0.0:
+            _add(dforce[0, place : place + m], by_1, basis)
+        if place >= 0 and by_2 != 0.0:
+            _add(dforce[1, place : place + m], by_2, basis)
+    if status == STICK:
+        return
     for component in range(2):
+        for column in range(width):
+            dstate[component, column] = -dforce[component, column]
         place = first[1 + component]
         if place >= 0:
-            own = dstate[component, place : place + m]
-            for k in range(m):
-                own[k] += basis[k]
+            _add(dstate[component, place : place + m], 1.0, basis)
+
+
+@njit(cache=True)
+def _add(row: FloatArray, times: float, basis: FloatArray) -> None:
+    """Add `times` the basis (m,) to a row (m,)."""
+    for k in range(basis.size):
+        row[k] += times * basis[k]
 
 
 @njit(cache=True)

@@ -17,6 +17,10 @@ from solver.contact.coulomb import STICK, advance_monodromy, contact_sample
 from solver.model import FloatArray, IntArray
 from solver.options import COMMON
 
+MOST_PERIODS = 400
+"""Largest number of periods; then a state that is not periodic is accepted. Pairs with a turning slip direction need up
+to about 20 with Newton's method and above 40 without (`tests/solver/test_kernels.py`)."""
+
 PLAIN_PERIODS = 4  # periods before Newton's method is used on the periodicity; most pairs repeat within two
 SMALLEST_DETERMINANT = COMMON.round_off  # of 1 - monodromy: below it a part of the state does not fade
 
@@ -34,31 +38,14 @@ def march_period(
 ) -> tuple[FloatArray, FloatArray, IntArray, IntArray, FloatArray]:
     """March every pair through the period until its tangential state repeats, Eqs. (11)-(15).
 
-    Parameters
-    ----------
-    predicted_t : array (n_contact, 3, N)
-        Predicted force, N, normal first.
-    friction : array (n_contact,)
-        Friction coefficient.
-    start : array (n_contact, 2)
-        Tangential state at the start of the first period, N.
-    periodicity : float
-        Accepted difference of the state over a period, N.
-    most_periods : int
-        Largest number of periods; then a state that is not periodic is accepted.
+    - predicted_t (n_contact, 3, N): predicted force, N, normal first.
+    - friction (n_contact,): friction coefficient.
+    - start (n_contact, 2): tangential state at the start of the first period, N.
+    - periodicity: accepted difference of the state over a period, N.
+    - most_periods: largest number of periods.
 
-    Returns
-    -------
-    force_t : array (n_contact, 3, N)
-        Contact force, N, compression positive.
-    state_t : array (n_contact, 2, N+1)
-        Tangential state of the last period, beginning with its start, N.
-    status_t : array (n_contact, N)
-        SEPARATED, STICK or SLIP.
-    periods : array (n_contact,)
-        Number of periods marched.
-    periodicity_error : array (n_contact,)
-        Change of the state over the last period, N.
+    Returns `force_t`, `state_t` of the last period, `status_t` and `periods` of `law.Marched`, and the change of the
+    state over the last period (n_contact,), N.
     """
     n_contact, _, n_samples = predicted_t.shape
     force_t = np.zeros((n_contact, 3, n_samples))

@@ -23,16 +23,22 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.contact import archard
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, across_slip, friction_force, friction_limit, slip_direction
-from solver.contact.options import CONTACT
+from solver.contact.period_march import MOST_PERIODS, slip_work_rate
 from solver.model import FloatArray, IntArray
 
 PARTS = 8  # parts of a step of a pair with two tangents
 SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
-MOST_MASS_PERIODS = CONTACT.most_periods  # far more than needed: the drag halves the change in each period
 
-slip_work_rate = njit()(archard.slip_work_rate)
+
+Masses = tuple[FloatArray, FloatArray, IntArray]
+"""Mass, kg, drag, N s/m, and line, as in `step_mass`, of each pair."""
+
+
+@njit(cache=True)
+def step_gains(mass: float, drag: float, step: float) -> tuple[float, float]:
+    """`m/dt + c/2` and `m/dt - c/2`, so that `gain * velocity after = force - friction + loss * velocity before`."""
+    return mass / step + 0.5 * drag, mass / step - 0.5 * drag
 
 
 @njit(cache=True)
@@ -45,67 +51,54 @@ def step_line(
     resolved.
 
     - force, velocity, limit: mean force, N, velocity before the step, m/s, and friction limit, N.
-    - gain, loss: `m/dt + c/2` and `m/dt - c/2`, so that `gain after = force - friction + loss before`.
+    - gain, loss: as `step_gains` returns them.
     - tangent (3, 3): receives the derivatives of (friction, velocity after, mean speed) with respect to (force,
       velocity, limit).
     """
     tangent[:, :] = 0.0
-    if velocity == 0.0:
-        if abs(force) <= limit:
-            tangent[0, 0] = 1.0
-            return force, 0.0, 0.0, 0.0
-        sign = 1.0 if force > 0.0 else -1.0
-        after = (force - sign * limit) / gain
-        tangent[0, 2] = sign
-        tangent[1, 0] = 1.0 / gain
-        tangent[1, 1] = loss / gain
-        tangent[1, 2] = -sign / gain
-        tangent[2, 0] = 0.5 * sign / gain
-        tangent[2, 1] = 0.5 * sign * (1.0 + loss / gain)
-        tangent[2, 2] = -0.5 / gain
-        return sign * limit, after, 0.5 * after, 0.5 * abs(after)
-    sign = 1.0 if velocity > 0.0 else -1.0
+    if velocity == 0.0 and abs(force) <= limit:
+        tangent[0, 0] = 1.0
+        return force, 0.0, 0.0, 0.0
+    sign = 1.0 if velocity > 0.0 or (velocity == 0.0 and force > 0.0) else -1.0
     after = (force - sign * limit + loss * velocity) / gain
     if after * sign > 0.0:
         tangent[0, 2] = sign
-        tangent[1, 0] = 1.0 / gain
-        tangent[1, 1] = loss / gain
-        tangent[1, 2] = -sign / gain
-        tangent[2, 0] = 0.5 * sign * tangent[1, 0]
-        tangent[2, 1] = 0.5 * sign * (1.0 + tangent[1, 1])
-        tangent[2, 2] = 0.5 * sign * tangent[1, 2]
+        _add_velocity(tangent, gain, loss)
+        for k in range(3):
+            tangent[2, k] = 0.5 * sign * (tangent[1, k] + (k == 1))
         return sign * limit, after, 0.5 * (velocity + after), 0.5 * abs(velocity + after)
     # the mass comes to rest after the fraction of the step in which the retarding force takes its momentum
-    retarding = limit - sign * force
+    retarding, speed = limit - sign * force, sign * velocity
     fraction = sign * loss * velocity / retarding
-    fraction_force = sign * fraction / retarding
-    fraction_velocity = sign * loss / retarding
-    fraction_limit = -fraction / retarding
-    speed = sign * velocity
+    by = (sign * fraction / retarding, sign * loss / retarding, -fraction / retarding)  # of the fraction
     if sign * force >= -limit:
         # the mass remains at rest: in the rest of the step friction equals the force
         tangent[0, 0] = 1.0
         tangent[0, 1] = loss
-        tangent[2, 0] = 0.5 * fraction_force * speed
-        tangent[2, 1] = 0.5 * (fraction_velocity * speed + fraction * sign)
-        tangent[2, 2] = 0.5 * fraction_limit * speed
+        for k in range(3):
+            tangent[2, k] = 0.5 * (by[k] * speed + (fraction * sign if k == 1 else 0.0))
         return force + loss * velocity, 0.0, 0.5 * fraction * velocity, 0.5 * fraction * speed
     friction = (2.0 * fraction - 1.0) * sign * limit
-    tangent[0, 0] = 2.0 * sign * limit * fraction_force
-    tangent[0, 1] = 2.0 * sign * limit * fraction_velocity
-    tangent[0, 2] = 2.0 * sign * limit * fraction_limit + (2.0 * fraction - 1.0) * sign
+    for k in range(3):
+        tangent[0, k] = 2.0 * sign * limit * by[k]
+    tangent[0, 2] += (2.0 * fraction - 1.0) * sign
+    _add_velocity(tangent, gain, loss)
     after = (force - friction + loss * velocity) / gain
-    tangent[1, 0] = (1.0 - tangent[0, 0]) / gain
-    tangent[1, 1] = (loss - tangent[0, 1]) / gain
-    tangent[1, 2] = -tangent[0, 2] / gain
     backward = -sign * after
-    tangent[2, 0] = 0.5 * (fraction_force * (speed - backward) - (1.0 - fraction) * sign * tangent[1, 0])
-    tangent[2, 1] = 0.5 * (
-        fraction_velocity * (speed - backward) + fraction * sign - (1.0 - fraction) * sign * tangent[1, 1]
-    )
-    tangent[2, 2] = 0.5 * (fraction_limit * (speed - backward) - (1.0 - fraction) * sign * tangent[1, 2])
+    for k in range(3):
+        tangent[2, k] = 0.5 * (by[k] * (speed - backward) - (1.0 - fraction) * sign * tangent[1, k])
+    tangent[2, 1] += 0.5 * fraction * sign
     mean = 0.5 * (fraction * velocity + (1.0 - fraction) * after)
     return friction, after, mean, 0.5 * (fraction * speed + (1.0 - fraction) * backward)
+
+
+@njit(cache=True)
+def _add_velocity(tangent: FloatArray, gain: float, loss: float) -> None:
+    """Derivative of the velocity after a step, row 1, from that of the friction, row 0 of `tangent` (3, 3)."""
+    for k in range(3):
+        tangent[1, k] = -tangent[0, k] / gain
+    tangent[1, 0] += 1.0 / gain
+    tangent[1, 1] += loss / gain
 
 
 @njit(cache=True)
@@ -215,38 +208,19 @@ def step_mass(
 
 @njit(cache=True)
 def march_masses(
-    predicted_t: FloatArray, friction: FloatArray, mass: FloatArray, drag: FloatArray, line: IntArray, step: float
+    predicted_t: FloatArray, friction: FloatArray, masses: Masses, step: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
     """March every pair through the period until its velocity repeats.
 
-    Parameters
-    ----------
-    predicted_t : array (n_contact, 3, N)
-        Predicted force, N: normal component at the samples, tangential components as means over the steps.
-    friction : array (n_contact,)
-        Friction coefficient.
-    mass, drag : array (n_contact,)
-        Mass, kg, and drag, N s/m.
-    line : array (n_contact,)
-        As in `step_mass`.
-    step : float
-        dt, s.
+    - predicted_t (n_contact, 3, N): predicted force, N, the tangential ones as means over the steps.
+    - friction (n_contact,): friction coefficient.
+    - step: dt, s.
 
-    Returns
-    -------
-    force_t : array (n_contact, 3, N)
-        Contact force, N, compression positive; tangential components as means over the steps.
-    velocity_t : array (n_contact, 2, N+1)
-        Velocity at the ends of the steps, m/s.
-    place_t : array (n_contact, 2, N+1)
-        Displacement since the start of the period, m.
-    status_t : array (n_contact, N)
-        SEPARATED, STICK or SLIP.
-    slip_work : array (n_contact,)
-        Integral of normal force times speed over the period, J.
-    periodicity_error : array (n_contact,)
-        Change of the velocity over the last period, as a force m v / dt, N.
+    Returns the contact force (n_contact, 3, N), N, as the predicted one; velocity, m/s, and displacement since the
+    start of the period, m, at the ends of the steps (n_contact, 2, N+1); status (n_contact, N); slip work (n_contact,),
+    J; and the change of the velocity over the last period as a force m v / dt (n_contact,), N.
     """
+    mass, drag, line = masses
     n_contact, _, n_samples = predicted_t.shape
     force_t = np.zeros((n_contact, 3, n_samples))
     velocity_t = np.zeros((n_contact, 2, n_samples + 1))
@@ -257,11 +231,11 @@ def march_masses(
     out = np.empty(7)
     tangent = np.empty((5, 5))
     for pair in range(n_contact):
-        gain = mass[pair] / step + 0.5 * drag[pair]
-        loss = mass[pair] / step - 0.5 * drag[pair]
+        gain, loss = step_gains(mass[pair], drag[pair], step)
         largest = np.abs(predicted_t[pair, 1:]).max()
         velocity = np.zeros(2)
-        for _ in range(MOST_MASS_PERIODS):
+        # far more periods than needed: the drag halves the change in each period
+        for _ in range(MOST_PERIODS):
             velocity_t[pair, 0, 0], velocity_t[pair, 1, 0] = velocity[0], velocity[1]
             slip_work[pair] = 0.0
             for n in range(n_samples):

@@ -7,7 +7,7 @@ The wear depth of a pair grows in a cycle by `k_w / alpha` times the *wearing wo
 with the slip work S, J, the mean pressure over the period p, Pa, the depth W, m, and the area of the pair alpha, m2:
 
 - `archard`: X = S.
-- `energy`: c = mu, so that X = mu S is the energy dissipated by friction (`alternating_frequency_time.friction_work`).
+- `energy`: c = mu, so that X = mu S is the energy dissipated by friction (`law.ContactLaw.friction_work`).
   k_w is then the energy wear coefficient, volume over dissipated energy (Fouvry, Liskiewicz, Kapsa, Hannel, Sauger,
   Wear 255 (2003) 287).
 - `threshold`: q, J/m2, is a density of slip work per cycle. Only slip work above this threshold wears.

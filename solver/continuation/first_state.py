@@ -116,4 +116,4 @@ def _free_motion(balance: Balance) -> FloatArray:
     amplitudes = np.zeros((joint.component_index.size, joint.basis.n_harmonics), complex)
     amplitudes[:, 0] = np.linalg.lstsq(joint.structure.dynamic_stiffness[0], joint.structure.harmonic_force)[0]
     motion = joint.to_pairs(from_complex(np.zeros(joint.component_index.size), amplitudes))
-    return joint.to_relative(joint.force_correction(motion))
+    return joint.to_relative(joint.law.force(motion))

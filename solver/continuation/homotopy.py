@@ -21,7 +21,7 @@ from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.prolongation import carried_history
 from solver.harmonic_balance.state import State
-from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
+from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.run import Run
 from solver.settings import Resolution
 from solver.structure.fourier import build_basis, change_orders, to_complex
@@ -62,9 +62,7 @@ def add_harmonics(
     return last.evaluation if arrived else None
 
 
-def start_with_tail(
-    joint: Joint, evaluation: Evaluation, old: tuple[int, ...], inertial: BoolArray | None = None
-) -> tuple[Balance, FloatArray]:
+def start_with_tail(old: Case, joint: Joint, evaluation: Evaluation) -> tuple[Balance, FloatArray]:
     """Balance with more harmonics, and a predicted force (n_rel, m), N, to start from.
 
     The new harmonics of the force are taken from the force samples, and the new harmonics of the motion are the motion
@@ -72,21 +70,19 @@ def start_with_tail(
 
     Parameters
     ----------
+    old, evaluation : Case, Evaluation
+        The known state.
     joint : Joint
         The joint with all harmonics.
-    evaluation, old : Evaluation, tuple of int
-        The known state and its harmonics.
-    inertial : array (n_contact,), optional
-        As in `carried_history`; by default the inertial pairs of the joint.
     """
-    history = carried_history(evaluation, old, joint.penalty.inertial if inertial is None else inertial, joint)
-    balance = Balance.frozen(joint, history, evaluation.wear_depth)
-    orders = joint.basis.orders
+    balance = Balance.frozen(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
+    orders, known = joint.basis.orders, old.resolution.orders
     force = joint.to_relative(evaluation.force_t @ build_basis(orders, evaluation.force_t.shape[2]).analysis)
     motion_h, force_h = (
-        joint.to_relative(change_orders(part, old, orders)) for part in (evaluation.displacement_h, evaluation.force_h)
+        change_orders(joint.to_relative(part), known, orders)
+        for part in (evaluation.displacement_h, evaluation.force_h)
     )
-    for place in np.flatnonzero(~np.isin(orders, old)):
+    for place in np.flatnonzero(~np.isin(orders, known)):
         both = slice(2 * place + 1, 2 * place + 3)
         force_h[:, both] = force[:, both]
         amplitude = force[:, 2 * place + 1] - 1j * force[:, 2 * place + 2]
@@ -102,7 +98,7 @@ def compliances(joint: Joint, places: IntArray) -> tuple[ComplexArray, ComplexAr
     """
     unit = np.zeros((joint.contact.n_contact, 3, 2 * joint.basis.n_harmonics + 1))
     unit[:, :, 1::2] = 1.0
-    penalty = to_complex(joint.to_relative(joint.force_correction(unit)))[:, places]
+    penalty = to_complex(joint.to_relative(joint.law.force(unit)))[:, places]
     return np.stack([np.diag(1.0 / column) for column in penalty.T]), np.linalg.inv(
         joint.structure.dynamic_stiffness[places]
     ).astype(complex)

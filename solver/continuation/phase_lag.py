@@ -108,7 +108,7 @@ def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencyDerivativ
     amplitude, orders, u = joint.excitation_amplitude, joint.basis.orders, joint.to_relative(at.displacement_h)
     slope = frequency_slope(joint.model, joint.omega, amplitude, orders, u)
     residual, product, response = slope.force, slope.product, complex(slope.response[0])
-    if joint.penalty.inertial.any():
+    if joint.law.rate_dependent:
         # longer than usual: the round-off of the static forces is small against the change of all others
         length = 10.0 * COMMON.difference * joint.omega
         ahead = replace(balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)

@@ -29,9 +29,7 @@ from solver.structure.joint import Joint
 
 def ratcheting_work(joint: Joint, evaluation: Evaluation) -> float:
     """Mean normal force times ratcheting in a period, N m: the part of the slip work that is not periodic."""
-    on = joint.penalty.inertial
-    moved_on = evaluation.state_t[on, :, -1] - evaluation.state_t[on, :, 0]
-    return float(np.abs(evaluation.force_h[on, 0, 0]) @ np.hypot(moved_on[:, 0], moved_on[:, 1]))
+    return float(np.abs(evaluation.force_h[:, 0, 0]) @ np.hypot(*joint.law.drift(evaluation).T))
 
 
 def ratchets(joint: Joint, evaluation: Evaluation, fraction: float) -> bool:
@@ -60,7 +58,9 @@ def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
     for _ in range(CONTINUATION.attempts):
         if not ratchets(joint, state.evaluation, fraction):
             break
-        homotopy = _MeanShift(joint, worn, state.evaluation.history, _mean_shift(joint, state))
+        # from the mean position of the masses in the history to the one reached
+        shift = joint.law.origin(state.evaluation.displacement_h[:, 1:, 0] - state.evaluation.history)
+        homotopy = _MeanShift(joint, worn, state.evaluation.history, shift)
         start = State(state.evaluation, state.evaluation.history, 0.0)
         moved, arrived = follow_naturally(homotopy.at, start, 1.0, run, keep_history=True)
         if not arrived:
@@ -68,12 +68,6 @@ def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
         history = final_history(homotopy.at(1.0, start.history), moved.evaluation)
         state = State(moved.evaluation, history, state.parameter)
     return state
-
-
-def _mean_shift(joint: Joint, state: State) -> FloatArray:
-    """Shift (n_contact, 2), m, of the inertial pairs from the mean position in the history to the position reached."""
-    shift = state.evaluation.displacement_h[:, 1:, 0] - state.evaluation.history
-    return np.where(joint.penalty.inertial[:, None], shift, 0.0)
 
 
 @dataclass(frozen=True)

@@ -31,13 +31,13 @@ import numpy as np
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, final_history
-from solver.model import ComplexArray, FloatArray, Matrix
+from solver.model import ComplexArray, FloatArray, LinearModel, Matrix
 from solver.newton.options import NEWTON
 from solver.newton.run import Run
 from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.stability.hill import is_stable
-from solver.structure.condensation import CondensedStructure, condense, relative_indices
+from solver.structure.condensation import CondensedStructure, condense, relative_indices, whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Case, Joint
@@ -69,27 +69,23 @@ class Transient:
         self.relative, _ = relative_indices(case.model.contact)
         orders = (0, *joint.basis.orders)
         self.rates = 1j * joint.omega * np.array(orders)
-        self.parts: list[tuple[Matrix, Matrix, Matrix, Matrix]] = []
+        self.parts: list[tuple[LinearModel, Matrix]] = []
         for order in orders:
-            linear, conjugate = (case.model.linear[0], False) if order == 0 else case.model.harmonic_structure(order)
+            linear = case.model.harmonic_structure(order)
             load: Matrix = np.zeros(linear.mass.shape[0])
             if order == 0:
                 load = linear.load_static
             elif order == 1:
                 load = joint.excitation_amplitude * linear.load_harmonic
-            mass, damping, stiffness = (
-                np.real(part) if order == 0 else part.conj() if conjugate else part
-                for part in (linear.mass, linear.damping, linear.stiffness)
-            )
-            self.parts.append((mass, damping, stiffness, load.conj() if conjugate else load))
+            self.parts.append((linear, load))
 
     def periodic(self, evaluation: Evaluation) -> Motion:
         """Motion of the whole structure in a periodic state of this joint."""
-        return self._motion(evaluation, self.rates, [load for *_, load in self.parts], None, 0.0)
+        return self._motion(evaluation, self.rates, [load for _, load in self.parts], None, 0.0)
 
     def rest(self) -> Motion:
         """No displacement, no velocity."""
-        none = np.zeros((len(self.parts), self.parts[0][0].shape[0]), complex)
+        none = np.zeros((len(self.parts), len(self.parts[0][0].mass)), complex)
         return Motion(none, none)
 
     def resumed(self, motion: Motion) -> Motion:
@@ -119,14 +115,14 @@ class Transient:
         )
 
     def _full(self, place: int, rate: complex) -> Matrix:
-        mass, damping, stiffness, _ = self.parts[place]
-        return cast("Matrix", stiffness + rate * damping + rate**2 * mass)
+        linear, _ = self.parts[place]
+        return cast("Matrix", linear.stiffness + rate * linear.damping + rate**2 * linear.mass)
 
     def _loads(self, before: Motion, inverse: float) -> list[Matrix]:
         loads: list[Matrix] = []
-        for place, (mass, damping, _, load) in enumerate(self.parts):
+        for place, (linear, load) in enumerate(self.parts):
             moved, velocity = before.displacement[place], before.velocity[place]
-            inertia = mass @ ((self.rates[place] + inverse) * moved + velocity) + damping @ moved
+            inertia = linear.mass @ ((self.rates[place] + inverse) * moved + velocity) + linear.damping @ moved
             loads.append(load + inverse * inertia)
         return loads
 
@@ -137,10 +133,8 @@ class Transient:
         amplitudes = np.concatenate([relative_h[:, :1].astype(complex), to_complex(relative_h)], axis=1)
         displacement = np.array(
             [
-                condensed.motion @ amplitudes[:, place] + condensed.held_motion
-                for place, condensed in enumerate(
-                    condense(self._full(place, rates[place]), self.relative, load) for place, load in enumerate(loads)
-                )
+                whole_motion(linear, rate, self.relative, cast("ComplexArray", load), amplitude)
+                for (linear, _), rate, load, amplitude in zip(self.parts, rates, loads, amplitudes.T, strict=True)
             ]
         )
         velocity = rates[:, None] * displacement

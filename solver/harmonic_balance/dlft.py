@@ -22,7 +22,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from solver.contact.alternating_frequency_time import Marched, law_tangent, march_law
+from solver.contact.law import Marched
 from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
 from solver.model import BoolArray, FloatArray, IntArray
 from solver.options import COMMON
@@ -61,9 +61,8 @@ class Balance:
         """Predicted force (n_rel, m), N, Eq. (10), of a motion, m, and a contact force, N, both (n_contact, 3, m)."""
         motion = displacement_h.copy()
         motion[:, 0, 0] -= self.joint.contact.gap + self.wear_depth
-        held = self.joint.penalty.inertial
-        motion[held, 1:, 0] -= self.history[held]
-        return self.joint.to_relative(force_h + self.joint.force_correction(motion))
+        motion[:, 1:, 0] -= self.joint.law.origin(self.history)
+        return self.joint.to_relative(force_h + self.joint.law.force(motion))
 
     def evaluate(self, predicted_h: FloatArray) -> Evaluation:
         """Residual, Eq. (8), and all intermediate results, for a predicted force (n_rel, 2H+1), N.
@@ -72,15 +71,15 @@ class Balance:
         """
         joint = self.joint
         pairs = joint.to_pairs(predicted_h)
-        pairs[~joint.has_normal, 0, 0] = joint.contact.normal_load[~joint.has_normal]
-        marched = march_law(joint, pairs, self.history)
+        given = ~joint.contact.has_normal
+        pairs[given, 0, 0] = joint.contact.normal_load[given]
+        marched = joint.law.march(pairs, self.history)
         wear_depth = self.wear_depth + self.wearing.growth(
             self.wear_gain, marched.slip_work, marched.force_h[:, 0, 0], self.wear_depth
         )
-        displacement_h = joint.motion(pairs - marched.force_h)
+        displacement_h = joint.law.motion(pairs - marched.force_h)
         displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
-        inertial = joint.penalty.inertial
-        displacement_h[inertial, 1:, 0] += self.history[inertial]
+        displacement_h[:, 1:, 0] += joint.law.origin(self.history)
         motion, force = joint.to_relative(displacement_h), joint.to_relative(marched.force_h)
         reduced_force = joint.structure.force_h()
         residual = joint.structure.apply(motion) + force - reduced_force
@@ -96,12 +95,11 @@ class Balance:
 
     def linearise(self, at: Evaluation) -> Linearisation:
         """Exact derivative of the residual, Eqs. (16)-(18), including wear and the periodicity of friction."""
-        joint = self.joint
-        force_tangent, slip_work_tangent = law_tangent(joint, at)
+        force_tangent, slip_work_tangent = self.joint.law.tangent(at)
         growth_tangent = self.wearing.growth_tangent(
             self.wear_gain, worn_by(at), slip_work_tangent, force_tangent[:, 0, :]
         )
-        return Linearisation(joint, at, force_tangent, growth_tangent)
+        return Linearisation(self.joint, at, force_tangent, growth_tangent)
 
 
 @packable
@@ -171,7 +169,7 @@ class Linearisation:
         """`du/dp` (n_contact, 3m, 3m), m/N, by Eq. (12), including the wear."""
         size = self.force_tangent.shape[1]
         correction = (np.eye(size) - self.force_tangent).reshape(-1, 3, size // 3, size)
-        tangent = self.joint.motion(correction).reshape(-1, size, size)
+        tangent = self.joint.law.motion(correction).reshape(-1, size, size)
         tangent[:, 0, :] += self.growth_tangent
         return tangent
 
@@ -188,7 +186,7 @@ class Linearisation:
         joint = self.joint
         spread = joint.to_pairs(step)
         force = np.matmul(self.force_tangent, spread.reshape(joint.contact.n_contact, -1, 1)).reshape(spread.shape)
-        motion = joint.motion(spread - force)
+        motion = joint.law.motion(spread - force)
         motion[:, 0, 0] += (self.growth_tangent * spread.reshape(joint.contact.n_contact, -1)).sum(axis=1)
         return motion, force
 
@@ -202,9 +200,9 @@ class Linearisation:
         joint = self.joint
         pairs, held_back = self._held_back
         held, motion = hold_back(step, self._rows_of_pairs, pairs, held_back, *self._compliance, self.growth_tangent)
-        if joint.penalty.inertial.any():
-            # inertial pairs move by Newton's law
-            motion_h = joint.motion(joint.to_pairs(held))
+        if joint.law.rate_dependent:
+            # masses move by Newton's law
+            motion_h = joint.law.motion(joint.to_pairs(held))
             motion_h[:, 0, 0] += (self.growth_tangent * joint.to_pairs(step).reshape(len(motion_h), -1)).sum(axis=1)
             motion = joint.to_relative(motion_h)
         return joint.structure.apply_roughly(motion) + step - held

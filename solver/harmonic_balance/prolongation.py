@@ -9,43 +9,24 @@ from __future__ import annotations
 import numpy as np
 
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.model import BoolArray, FloatArray
+from solver.model import FloatArray
 from solver.structure.fourier import change_orders, synthesis
 from solver.structure.joint import Case, Joint
 
 
-def transfer(
-    case: Case, joint: Joint, evaluation: Evaluation, old_orders: tuple[int, ...], inertial: BoolArray | None = None
-) -> tuple[Balance, FloatArray]:
-    """Balance in the case, and a predicted force (n_rel, m), N, to start from, for a state of other harmonics.
-
-    inertial (n_contact,): inertial pairs of the state; by default the inertial pairs of `joint`.
-    """
-    was = joint.penalty.inertial if inertial is None else inertial
-    history = carried_history(evaluation, old_orders, was, joint)
-    balance = Balance.frozen(joint, history, evaluation.wear_depth)
-    orders = case.resolution.orders
-    return balance, balance.predict(
-        change_orders(evaluation.displacement_h, old_orders, orders),
-        change_orders(evaluation.force_h, old_orders, orders),
+def transfer(old: Case, joint: Joint, evaluation: Evaluation) -> tuple[Balance, FloatArray]:
+    """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old`."""
+    balance = Balance.frozen(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
+    motion_h, force_h = (
+        change_orders(part, old.resolution.orders, joint.basis.orders)
+        for part in (evaluation.displacement_h, evaluation.force_h)
     )
+    return balance, balance.predict(motion_h, force_h)
 
 
-def carried_history(evaluation: Evaluation, orders: tuple[int, ...], inertial: BoolArray, joint: Joint) -> FloatArray:
-    """Tangential history (n_contact, 2), m, of a state, converted for a joint in which other pairs may be inertial.
-
-    - orders: harmonics of the state.
-    - inertial (n_contact,): inertial pairs of the state.
-
-    The history of a pair that becomes inertial is its mean position. The history of a pair that becomes elastic is its
-    position at the end of the period, which equals the corrected slip (`coulomb`: the tangential state is the penalty
-    times the motion).
-    """
-    now = joint.penalty.inertial
-    if np.array_equal(inertial, now):
-        return evaluation.history
+def carried_history(old: Case, joint: Joint, evaluation: Evaluation) -> FloatArray:
+    """Tangential history (n_contact, 2), m, of a state of the case `old`, converted for the law of `joint`."""
     tangential = evaluation.displacement_h[:, 1:]
-    n_samples = evaluation.force_t.shape[2]
-    at_end = (tangential @ synthesis(orders, np.array([-2.0 * np.pi / n_samples])))[:, :, 0]
-    changed = np.where(now[:, None], tangential[:, :, 0], at_end)
-    return np.where((inertial == now)[:, None], evaluation.history, changed)
+    end = np.array([-2.0 * np.pi / evaluation.force_t.shape[2]])
+    last = (tangential @ synthesis(old.resolution.orders, end))[:, :, 0]
+    return joint.law.history_from(old.penalty, evaluation.history, tangential[:, :, 0], last)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
 from solver.outcome import Outcome
@@ -48,9 +47,7 @@ def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
 
     Elastic pairs: the corrected slip X_T at the end of the period. Inertial pairs: the mean position.
     """
-    joint = balance.joint
-    at_end = evaluation.state_t[:, :, -1] / joint.state_stiffness[:, None]
-    return np.where(joint.penalty.inertial[:, None], evaluation.displacement_h[:, 1:, 0], at_end)
+    return balance.joint.law.final_history(evaluation, evaluation.displacement_h)
 
 
 def history_at_rest(joint: Joint, state: State) -> FloatArray:
@@ -61,13 +58,7 @@ def history_at_rest(joint: Joint, state: State) -> FloatArray:
     its history. Behind the resonance of the dovetail the motion after a sweep is 0.5 % wrong with the middle, and 2.3 %
     with `final_history`, for an equal number of states.
     """
-    evaluation, history = state.evaluation, state.history.copy()
-    slips = (evaluation.status_t == SLIP).any(axis=1) & ~joint.penalty.inertial
-    closed = (evaluation.status_t[slips] != SEPARATED)[:, None, :]
-    slip = evaluation.state_t[slips, :, 1:]
-    low, high = np.where(closed, slip, np.inf).min(axis=2), np.where(closed, slip, -np.inf).max(axis=2)
-    history[slips] = 0.5 * (low + high) / joint.state_stiffness[slips, None]
-    return history
+    return joint.law.middle_history(state.evaluation, state.history)
 
 
 def vibration_change(before: Evaluation, after: Evaluation) -> float:

@@ -301,7 +301,7 @@ class FrequencySweep:
         _, resolution = min(self.known, key=lambda each: abs(each[0] - frequency))
         wanted = case.at(resolution)
         if resolution != case.resolution:
-            moved = self.run.move(case, wanted, wanted.joint(omega, self.excitation_amplitude), state)
+            moved = self.run.move(case, wanted.joint(omega, self.excitation_amplitude), state)
             return None if moved is None else Refined(wanted, moved, NOTHING, accurate=True)
         return Refined(case, state, NOTHING, accurate=True)
 
@@ -326,7 +326,7 @@ class FrequencySweep:
             found = nodes.reference_at(1.0 if self.sweep == "ramp" else omega, self.run.fresh())
             if found is not None and nodes.reference is not None:
                 joint = case.joint(omega, self.excitation_amplitude)
-                return self.run.move(_path(nodes.reference).case, case, joint, found)
+                return self.run.move(_path(nodes.reference).case, joint, found)
         return None
 
 

@@ -12,7 +12,7 @@ from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.state import State
 from solver.newton.run import Run
-from solver.settings import RESOLUTION, Resolution, allowed, first_resolution
+from solver.settings import FINE_SAMPLES, Resolution, allowed, first_resolution
 from solver.structure.joint import Case, Joint
 
 
@@ -26,7 +26,7 @@ def resolution_holds(case: Case, joint: Joint, point: State, at_limit: bool, run
     resolution, evaluation = case.resolution, point.evaluation
     fewest = resolution == first_resolution(case.settings)
     if nothing_happens(evaluation):
-        looked = Resolution(resolution.orders, max(RESOLUTION.fine_samples, 2 * resolution.samples))
+        looked = Resolution(resolution.orders, max(FINE_SAMPLES, 2 * resolution.samples))
         # an event that only more samples show is left to `refine`
         return fewest and nothing_happens(_moved(case, joint, point, looked, run, 0).point.evaluation)
     above = shifted(resolution, 2)
@@ -44,7 +44,7 @@ def _moved(case: Case, joint: Joint, point: State, resolution: Resolution, run: 
     """A state with other harmonics and samples, improved by a number of Newton iterations."""
     other = case.at(resolution)
     other_joint = other.joint(joint.omega, joint.excitation_amplitude)
-    balance, start = transfer(other, other_joint, point.evaluation, case.resolution.orders, case.penalty.inertial)
+    balance, start = transfer(case, other_joint, point.evaluation)
     at = balance.evaluate(start)
     for _ in range(iterations):
         step = run.fresh().step(balance, at, -at.residual)
@@ -65,5 +65,5 @@ def choose_resolution(case: Case, joint: Joint, point: State, run: Run) -> Refin
         return replace(refined, case=case, point=point)
     moved = case.at(fewest)
     moved_joint = moved.joint(joint.omega, joint.excitation_amplitude)
-    level = run.move(refined.case, moved, moved_joint, refined.point)
+    level = run.move(refined.case, moved_joint, refined.point)
     return refined if level is None else replace(refined, case=moved, point=level)

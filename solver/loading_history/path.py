@@ -163,7 +163,7 @@ class LoadingPath:
 
     def move(self, state: State, other: LoadingPath, run: Run) -> State | None:
         """The state with the harmonics and samples of another path; None where it is not found."""
-        return run.move(self.case, other.case, other.joint_at(state.parameter), state)
+        return run.move(self.case, other.joint_at(state.parameter), state)
 
     def choose(self, state: State, run: Run) -> tuple[LoadingPath, State, bool, float]:
         """Path and state with the harmonics and samples that the state needs, whether they suffice, and the relative

@@ -26,7 +26,7 @@ import scipy.linalg
 
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.options import COMMON
-from solver.structure.condensation import condense, relative_indices
+from solver.structure.condensation import relative_indices, whole_motion
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def nearest_mode(model: ReducedModel, omega: float, closed: BoolArray, friction:
 
 def _modes(model: ReducedModel, closed: BoolArray, friction: FloatArray) -> tuple[FloatArray, Matrix]:
     """Natural frequencies, rad/s, and modes of harmonic 1 with closed pairs held."""
-    linear, _ = model.harmonic_structure(1)
+    linear = model.harmonic_structure(1)
     dofs = model.contact.dofs
     held = np.concatenate([dofs[closed, 0], dofs[closed & (friction > 0.0), 1:].ravel()])
     return natural_frequencies(linear, held[held >= 0])
@@ -102,7 +102,7 @@ def _modes(model: ReducedModel, closed: BoolArray, friction: FloatArray) -> tupl
 
 def _mode(model: ReducedModel, omega: float, shape: Matrix) -> LinearMode:
     """The mode with a real largest component."""
-    linear, _ = model.harmonic_structure(1)
+    linear = model.harmonic_structure(1)
     largest = shape[np.argmax(np.abs(shape))]
     shape = cast("Matrix", shape * (np.conj(largest) / np.abs(largest)))
     return LinearMode(omega, shape, float(np.real(np.vdot(shape, linear.damping @ shape))) / (2.0 * omega))
@@ -117,10 +117,9 @@ class ModalModel(ReducedModel):
 
     first: LinearModel = field(kw_only=True)
 
-    def harmonic_structure(self, harmonic: int) -> tuple[LinearModel, bool]:
+    def harmonic_structure(self, harmonic: int) -> LinearModel:
         """As in ReducedModel."""
-        linear, folded = super().harmonic_structure(harmonic)
-        return (self.first, folded) if harmonic == 1 else (linear, folded)
+        return self.first if harmonic == 1 else super().harmonic_structure(harmonic)
 
 
 def modal_model(model: ReducedModel, mode: LinearMode, damping_rate: float) -> ModalModel:
@@ -128,7 +127,7 @@ def modal_model(model: ReducedModel, mode: LinearMode, damping_rate: float) -> M
 
     damping_rate: `2 zeta omega`, rad/s.
     """
-    first, _ = model.harmonic_structure(1)
+    first = model.harmonic_structure(1)
     force = mode.omega**2 * (first.mass @ mode.shape)
 
     def damped(linear: LinearModel) -> LinearModel:
@@ -174,10 +173,8 @@ class FirstHarmonic:
 def first_harmonic(model: ReducedModel, mode: LinearMode, omega: float, drive: float) -> FirstHarmonic:
     """The displacements of harmonic 1 of a modal model at a frequency, rad/s, and a drive, m sqrt(kg)."""
     relative, _ = relative_indices(model.contact)
-    linear, folded = model.harmonic_structure(1)
-    mass, damping, stiffness, load, shape = (
-        part.conj() if folded else part
-        for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, mode.shape)
-    )
-    found = condense(stiffness + 1j * omega * damping - omega**2 * mass, relative, drive * load)
-    return FirstHarmonic(found.motion, found.held_motion, mass, shape.conj() @ mass)
+    linear = model.harmonic_structure(1)
+    # a unit of each relative displacement in turn, and at last the drive alone
+    load = np.outer(drive * linear.load_harmonic, np.arange(relative.size + 1) == relative.size)
+    found = whole_motion(linear, 1j * omega, relative, load, np.eye(relative.size, relative.size + 1, dtype=complex))
+    return FirstHarmonic(found[:, :-1], found[:, -1], linear.mass, mode.shape.conj() @ linear.mass)

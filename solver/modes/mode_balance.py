@@ -112,10 +112,8 @@ class ModeProblem:
 
     def move(self, at: ModeState, other: ModeProblem, run: Run) -> ModeState | None:
         """The mode with the harmonics and samples of another problem; None where it is not found."""
-        case = other.case_at(at.omega, at.damping_ratio)
-        joint = case.joint(at.omega, at.drive)
-        was = self.case.penalty.inertial
-        balance, start = transfer(case, joint, at.state.evaluation, self.case.resolution.orders, was)
+        joint = other.case_at(at.omega, at.damping_ratio).joint(at.omega, at.drive)
+        balance, start = transfer(self.case, joint, at.state.evaluation)
         return other.solve(at.parameter, start, at.values, balance.history, run.fresh())
 
 

@@ -15,7 +15,6 @@ from solver.accuracy.harmonic_levels import shifted
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
 from solver.accuracy.refinement import refine
-from solver.contact.alternating_frequency_time import friction_work
 from solver.loading_history.sweep import Step, Sweep
 from solver.model import FloatArray
 from solver.modes.modal_model import natural_frequencies
@@ -104,7 +103,7 @@ def judge_point(
     if not certificate.holds(tolerance):
         return ModePoint(Outcome.CERTIFICATE_FAILED, certificate.sentence(tolerance))
     # the damping ratio is the sum of parts that may cancel: its error is judged against the part of friction
-    by_friction = float(friction_work(joint, found.state.evaluation).sum()) / (
+    by_friction = float(joint.law.friction_work(found.state.evaluation).sum()) / (
         2.0 * np.pi * (found.omega * found.parameter) ** 2
     )
     damping = max(by_friction, abs(found.damping_ratio), COMMON.round_off)
@@ -143,7 +142,7 @@ def describe_loss(sweep: Sweep[ModeState]) -> str:
     way = "up" if sweep.direction > 0.0 else "down"
     said = f"the mode is followed {way} to the amplitude {here.parameter:.4g} m sqrt(kg), at {_hertz(here.omega)}"
     for order in (n for n in problem.case.resolution.orders if 1 < n <= MODES.resonant_order):
-        linear, _ = problem.model.harmonic_structure(order)
+        linear = problem.model.harmonic_structure(order)
         dofs = problem.model.contact.dofs.ravel()
         omegas, _ = natural_frequencies(linear, dofs[dofs >= 0])
         near = omegas[np.abs(omegas - order * here.omega) < MODES.near_resonance * order * here.omega]

@@ -112,16 +112,15 @@ def first_node(rest: Rest, amplitude: float, run: Run) -> ModeState | None:
 def sliding_node(rest: Rest, amplitude: float, run: Run) -> ModeState | None:
     """The mode at a large amplitude, at which the joint slides as in its linear mode; None where not found."""
     problem, mode = rest.problem, rest.problem.mode
-    _, folded = problem.model.harmonic_structure(1)
     dofs = problem.model.contact.dofs
     for attempt in range(MODES.sliding_starts):
         size = amplitude * MODES.top_base**attempt
         joint = problem.case.joint(mode.omega, size)
-        shape = size * (mode.shape.conj() if folded else mode.shape)
+        shape = size * mode.shape
         amplitudes = np.zeros((dofs.size, joint.basis.n_harmonics), complex)
         amplitudes[:, 0] = np.where(dofs.ravel() >= 0, shape[dofs.ravel()], 0.0)
         motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
-        start = rest.state.evaluation.predicted_h + joint.to_relative(joint.force_correction(motion))
+        start = rest.state.evaluation.predicted_h + joint.to_relative(joint.law.force(motion))
         values = np.array([mode.omega, mode.damping_ratio, size])
         found = problem.solve(size, start, values, rest.state.history, run.fresh())
         if found is not None:

@@ -38,7 +38,7 @@ def worthwhile_directions(tangent: Linearisation) -> int:
     """
     joint, most = tangent.joint, NEWTON.most_directions
     small = joint.component_index.size <= NEWTON.small_joint_displacements
-    if small or joint.penalty.inertial.any():
+    if small or joint.law.rate_dependent:
         return most
     n_pairs, m = tangent.active().size, joint.basis.synthesis.shape[0]
     n = 3 * n_pairs * m

@@ -37,11 +37,10 @@ from solver.contact.coulomb import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.newton.options import NEWTON, NewtonOptions
-from solver.structure.condensation import CondensedStructure
+from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.identity import Identity
 from solver.structure.joint import Joint
-from solver.structure.options import STRUCTURE
 from solver.structure.rough_forms import SingleArray
 
 
@@ -133,7 +132,7 @@ class PeriodFactor:
 def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     """Factor of a Jacobian; None for pairs with sliding masses, or where the system of a sample is singular."""
     joint = tangent.joint
-    if joint.penalty.inertial.any():
+    if joint.law.rate_dependent:
         return None
     try:
         march = build_march(tangent)
@@ -161,7 +160,7 @@ def build_march(tangent: Linearisation) -> SampleMarch:
     n_samples = fewest_samples(joint.basis)
     at, stride = tangent.at, joint.basis.n_samples // n_samples
     own, carried = sample_tangents(
-        at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.has_normal, stride
+        at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.contact.has_normal, stride
     )
     pairs = np.flatnonzero(own.any(axis=(0, 2, 3)))
     own, carried = np.ascontiguousarray(own[:, pairs]), np.ascontiguousarray(carried[:, pairs])
@@ -213,7 +212,7 @@ def stiffness_of_most(joint: Joint) -> FloatArray:
 
 
 # the marches of one history need the stiffness of a few structures only
-@lru_cache(maxsize=STRUCTURE.kept_structures)
+@lru_cache(maxsize=KEPT_STRUCTURES)
 def _stiffness_of_most(of: Identity) -> FloatArray:
     structure = cast("CondensedStructure", of.objects[0])
     moving = (structure.moving.matrix(place).real for place in range(structure.n_harmonics))
@@ -221,7 +220,7 @@ def _stiffness_of_most(of: Identity) -> FloatArray:
     return np.asarray(np.median(stacked, axis=0, overwrite_input=True))
 
 
-@lru_cache(maxsize=STRUCTURE.kept_structures)
+@lru_cache(maxsize=KEPT_STRUCTURES)
 def _resonances(of: Identity, relative_penalty: bytes, __: NewtonOptions) -> tuple[FloatArray, FloatArray]:
     structure, penalty = cast("CondensedStructure", of.objects[0]), np.frombuffer(relative_penalty)
     n_rel, m = penalty.size, 2 * structure.n_harmonics + 1

@@ -141,9 +141,9 @@ class Run:
         """Step (n_rel, m), N, with Jacobian times step = right (n_rel, m), N, in a state, to a relative residual."""
         return self.solver.solve(balance.linearise(at), right, rtol)
 
-    def move(self, old: Case, case: Case, joint: Joint, state: State) -> State | None:
-        """The state with the harmonics and samples of another case; joint: of this case. None where not found."""
-        balance, start = transfer(case, joint, state.evaluation, old.resolution.orders, old.penalty.inertial)
+    def move(self, old: Case, joint: Joint, state: State) -> State | None:
+        """The state of a case with the harmonics and samples of another joint; None where it is not found."""
+        balance, start = transfer(old, joint, state.evaluation)
         return self.fresh().state(balance, start, state.parameter)
 
     def _forcing(self, residual: float) -> float:

@@ -15,7 +15,6 @@ import numpy as np
 
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
-from solver.structure.fourier import synthesis
 from solver.structure.joint import Joint
 
 LOOP_PHASES = 128
@@ -45,17 +44,8 @@ def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) 
         displacement and force are 0, but for a constant normal load.
     """
     chosen = list(pairs)
-    orders, n_samples = joint.basis.orders, joint.basis.n_samples
-    series = evaluation.displacement_h[chosen]
-    displacement = series @ synthesis(orders, loop_phases())
-    for place, pair in enumerate(chosen):
-        if joint.penalty.inertial[pair]:
-            # sample n lies in the middle of step n
-            ends = 2.0 * np.pi * (np.arange(n_samples) - 0.5) / n_samples
-            beyond = evaluation.state_t[pair, :, :-1] - series[place, 1:] @ synthesis(orders, ends)
-            # the march begins at an arbitrary position: the mean comes from the series
-            beyond -= beyond.mean(axis=1, keepdims=True)
-            displacement[place, 1:] += at_phases(beyond, 0.5)
+    displacement = evaluation.displacement_h[chosen] @ joint.basis.at(loop_phases())
+    displacement[:, 1:] += at_phases(joint.law.beyond_series(evaluation, evaluation.displacement_h)[chosen], 0.5)
     displacement *= (joint.contact.dofs[chosen] >= 0)[:, :, None]
     force = at_phases(evaluation.force_t[chosen], 0.0)
     return displacement.transpose(0, 2, 1), force.transpose(0, 2, 1)

@@ -94,9 +94,9 @@ def find_other_peak(model: ReducedModel, state: PeriodicState, follow: FollowedF
 
 def _linear_joint(model: ReducedModel, state: PeriodicState) -> _LinearJoint | None:
     """The linear joint that moves as the state; None without an excitation."""
-    linear, conjugate = model.harmonic_structure(1)
+    linear = model.harmonic_structure(1)
     mass, damping, stiffness, shape, rows = (
-        np.array(part.conj() if conjugate else part, complex)
+        np.array(part, complex)
         for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, linear.response)
     )
     relative, components = relative_indices(model.contact)

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import ComplexArray, FloatArray, IntArray
-from solver.structure.condensation import condense, relative_indices
+from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import derivative, from_complex, to_complex
 from solver.structure.joint import Joint
 
@@ -63,7 +63,7 @@ def periodic_motion(joint: Joint, at: Evaluation) -> PeriodicMotion:
         response=_coefficients(response_h),
         relative_displacement=_coefficients(joint.to_pairs(moved)),
         contact_force=_coefficients(at.force_h),
-        time=np.asarray(joint.sample_step * np.arange(basis.n_samples)),
+        time=np.asarray(joint.law.sample_step * np.arange(basis.n_samples)),
         displacement_t=displacement_h @ basis.synthesis,
         velocity_t=derivative(displacement_h, rates) @ basis.synthesis,
         response_t=response_h @ basis.synthesis,
@@ -79,20 +79,11 @@ def _coefficients(values_h: FloatArray) -> ComplexArray:
 
 def _all_displacements(joint: Joint, moved: FloatArray) -> FloatArray:
     """Displacements (n, 2H+1), m, of the whole model from the relative displacements (n_rel, 2H+1), m."""
-    model = joint.model
-    relative, _ = relative_indices(model.contact)
-    still = model.linear[0]
-    held = condense(np.real(still.stiffness), relative, still.load_static)
-    amplitudes = np.empty((len(still.mass), joint.basis.n_harmonics), np.complex128)
-    relative_h = to_complex(moved)
-    for place, order in enumerate(joint.basis.orders):
-        linear, folded = model.harmonic_structure(order)
-        mass, damping, stiffness, load = (
-            np.conj(part) if folded else part
-            for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic)
-        )
-        rate = order * joint.omega
-        full = stiffness + 1j * rate * damping - rate**2 * mass
-        one = condense(full, relative, (joint.excitation_amplitude if order == 1 else 0.0) * load)
-        amplitudes[:, place] = one.motion @ relative_h[:, place] + one.held_motion
-    return from_complex(np.real(held.motion @ moved[:, 0] + held.held_motion), amplitudes)
+    relative, _ = relative_indices(joint.contact)
+    found = []
+    for order, amplitude in zip((0, *joint.basis.orders), _coefficients(moved).T, strict=True):
+        linear = joint.model.harmonic_structure(order)
+        none = np.zeros(len(linear.mass), np.complex128)
+        load = {0: linear.load_static + none, 1: joint.excitation_amplitude * linear.load_harmonic}.get(order, none)
+        found.append(whole_motion(linear, 1j * order * joint.omega, relative, load, amplitude))
+    return from_complex(np.real(found[0]), np.array(found[1:]).reshape(-1, len(found[0])).T)

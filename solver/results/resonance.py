@@ -15,13 +15,10 @@ with the matrices.
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 
 from solver.harmonic_balance.dlft import Evaluation
-from solver.model import ComplexArray, IntArray
-from solver.structure.condensation import relative_indices
+from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Joint
 
@@ -31,25 +28,12 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
 
     The latter is `|x^H F| / (2 w_r^2 x^H M x)`. Both are NaN where no mass moves, or where w_r^2 is not positive.
     """
-    linear, conjugate = joint.model.harmonic_structure(1)
-    mass, damping, stiffness, shape = (
-        np.conj(part) if conjugate else part
-        for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic)
-    )
+    linear = joint.model.harmonic_structure(1)
     relative, _ = relative_indices(joint.contact)
-    internal = np.setdiff1d(np.arange(len(shape)), relative)
-    force = joint.excitation_amplitude * shape
-    moved = np.zeros(len(shape), complex)
-    moved[relative] = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
-    if internal.size:
-
-        def block(columns: IntArray) -> ComplexArray:
-            at = np.ix_(internal, columns)
-            whole = stiffness[at] + 1j * joint.omega * damping[at] - joint.omega**2 * mass[at]
-            return cast("ComplexArray", whole)
-
-        moved[internal] = np.linalg.solve(block(internal), force[internal] - block(relative) @ moved[relative])
-    inertia, work = float(np.real(np.vdot(moved, mass @ moved))), complex(np.vdot(moved, force))
+    force = joint.excitation_amplitude * linear.load_harmonic
+    first = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
+    moved = whole_motion(linear, 1j * joint.omega, relative, force, first)
+    inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
     if not inertia > 0.0:
         return float("nan"), float("nan")
     square = joint.omega**2 + work.real / inertia

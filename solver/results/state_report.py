@@ -86,7 +86,7 @@ def report_state(
     return StateReport(
         wear_depth=evaluation.wear_depth,
         mean_pressure=evaluation.force_h[:, 0, 0] / joint.contact.area,
-        slip_range=largest_distance(evaluation.state_t) / joint.state_stiffness,
+        slip_range=largest_distance(evaluation.state_t) / joint.law.state_stiffness,
         open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),
         response=to_complex(response_h)[:, 0],
         response_peak=largest_responses(joint, evaluation),

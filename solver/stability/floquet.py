@@ -102,7 +102,7 @@ def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: 
     switching, stuck = switching_pairs(at)
     frequency = joint.omega / (2.0 * np.pi)
     if not switching.any():
-        exponents = growing_exponents(joint.model.harmonic_structure(1)[0], moving(joint, stuck))
+        exponents = growing_exponents(joint.model.harmonic_structure(1), moving(joint, stuck))
         return _judge(np.exp(exponents / frequency), 0.0, joint, by_structure=True)
     travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
     if travels or 3 * np.count_nonzero(switching) > STABILITY.most_rows:
@@ -133,7 +133,7 @@ def sharper(case: Case, joint: Joint, at: Evaluation, run: Run) -> tuple[Joint, 
     samples = max(case.resolution.samples, samples_for(STABILITY.opening_harmonics))
     sharp = case.at(Resolution(all_orders(STABILITY.opening_harmonics), samples))
     finer = sharp.joint(joint.omega, joint.excitation_amplitude)
-    moved = run.move(case, sharp, finer, State(at, at.history))
+    moved = run.move(case, finer, State(at, at.history))
     return None if moved is None else (finer, moved.evaluation)
 
 
@@ -159,7 +159,7 @@ def _is_driven(joint: Joint) -> bool:
     True where a motion grows with all pairs held, or where a vibration grows with no pair held. A motion without
     vibration that grows with no pair held does not count: a free blade leaves its spinning disk.
     """
-    linear = joint.model.harmonic_structure(1)[0]
+    linear = joint.model.harmonic_structure(1)
     held = moving(joint, np.ones(joint.contact.n_contact, bool))
     free = growing_exponents(linear, np.ones(len(linear.mass), bool))
     return growing_exponents(linear, held).size > 0 or bool((np.abs(free.imag) > free.real).any())

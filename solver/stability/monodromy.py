@@ -4,14 +4,7 @@ A disturbance (dy, dlambda) of the displacements y, m, and of the contact force,
 
     M dy'' + C dy' + K dy + dlambda = 0,                                                                     (1)
 
-and at each sample the derivative of the contact law, Eqs. (9)-(15), with the statuses of the periodic state. Let
-`p = lambda + x`, with the state `x = eps u` of an elastic pair. Let A be the derivative of x with respect to p, and B
-the derivative with respect to x at the sample before (`coulomb.sample_tangents`). The law of the disturbance is
-
-    (1 - A) eps du - A dlambda = B eps du'.                                                                  (2)
-
-A mass on a slider has its own steps (`rigid_slider.step_mass`). Their derivatives T include the instants at which the
-mass turns or stops: `dlambda = T_p dp + T_v dv' + T_l mu dlambda_N` with `dp = dlambda + gain dv - loss dv'`.
+and at each sample the derivative of the contact law with the statuses of the periodic state (`contact.sampled_law`).
 
 Equation (1) is integrated by backward differences of second order (BDF2). The contact holds displacements suddenly,
 which needs a scheme with damping at high rates. In a period of N samples the scheme damps a vibration at r times the
@@ -27,29 +20,12 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from solver.contact.coulomb import SEPARATED, STICK, friction_limit, sample_tangents
-from solver.contact.rigid_slider import step_mass
+from solver.contact.coulomb import SEPARATED, STICK
+from solver.contact.sampled_law import SampledLaw, sampled_law
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, FloatArray, IntArray, LinearModel
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Joint
-
-
-@dataclass(frozen=True)
-class SampledLaw:
-    """Derivative of the contact law of the p switching pairs at N samples, in blocks (N, p, 3, 3) of the pairs:
-
-        by_force dlambda + by_motion du + by_speed dv = by_last_motion du' + by_last_speed dv'.
-
-    A prime marks the sample before. Velocities are in m per sample. Displacements that a pair does not have take no
-    force.
-    """
-
-    by_force: FloatArray
-    by_motion: FloatArray
-    by_speed: FloatArray
-    by_last_motion: FloatArray
-    by_last_speed: FloatArray
 
 
 @dataclass(frozen=True)
@@ -142,59 +118,16 @@ def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples
         np.ascontiguousarray(np.real(part)[np.ix_(moves, moves)])
         for part in (linear.mass, linear.damping, linear.stiffness)
     )
-    inertia, drag = mass / fine.sample_step**2, damping / fine.sample_step
+    inertia, drag = mass / fine.law.sample_step**2, damping / fine.law.sample_step
     compliance = np.linalg.inv(2.25 * inertia + 1.5 * drag + stiffness)
     chosen = dofs[switching].ravel()
     rows = np.flatnonzero(chosen >= 0)
     place = (np.cumsum(moves) - 1)[chosen[rows]]
     select = csr_array((np.ones(rows.size), (rows, place)), shape=(chosen.size, len(mass)))
-    return Monodromy(inertia, drag, compliance, select, _sample_law(fine, state, np.flatnonzero(switching)))
+    return Monodromy(inertia, drag, compliance, select, sampled_law(fine.law, state, np.flatnonzero(switching)))
 
 
 def switching_pairs(at: Evaluation) -> tuple[BoolArray, BoolArray]:
     """Pairs (n_contact,) that slip or open in a part of the period; pairs that stick during the whole period."""
     stuck = (at.status_t == STICK).all(axis=1)
     return ~stuck & ~(at.status_t == SEPARATED).all(axis=1), stuck
-
-
-def _sample_law(joint: Joint, at: Evaluation, pairs: IntArray) -> SampledLaw:
-    """Derivative of the contact law of the switching pairs."""
-    n = at.status_t.shape[1]
-    own, carried = sample_tangents(
-        at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.has_normal, 1
-    )
-    penalty = joint.penalty
-    eps = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)[pairs, None, :]
-    there = joint.contact.dofs[pairs] >= 0
-    # a displacement that does not exist has no disturbance of the force
-    passed = np.where(there[:, :, None] & there[:, None, :], own[:, pairs], -np.eye(3) * ~there[:, :, None])
-    last = np.zeros((n, pairs.size, 3, 3))
-    last[:, :, 1:, 1:] = carried[:, pairs]
-    none = np.zeros_like(last)
-    law = SampledLaw(-passed, (np.eye(3) - passed) * eps, none, last * eps, none.copy())
-    for place, pair in enumerate(pairs.tolist()):
-        if penalty.inertial[pair]:
-            _take_mass_law(law, place, joint, at, pair)
-    return law
-
-
-def _take_mass_law(law: SampledLaw, place: int, joint: Joint, at: Evaluation, pair: int) -> None:
-    """Tangential rows of the law of a mass on a slider, in place; `place`: index among the switching pairs."""
-    step, line = joint.sample_step, int(joint.line[pair])
-    mass, drag = joint.penalty.mass[pair], joint.penalty.drag[pair]
-    gain, loss = mass / step + 0.5 * drag, mass / step - 0.5 * drag
-    there = np.array([0, 1]) if line < 0 else np.array([line])
-    rows, friction = 1 + there, float(joint.friction_coefficient[pair])
-    for part in (law.by_force, law.by_motion, law.by_last_motion):
-        part[:, place, rows] = 0.0
-    velocity, out, slopes = at.start[pair].copy(), np.empty(7), np.empty((5, 5))
-    for n in range(at.status_t.shape[1]):
-        limit = friction_limit(friction, max(float(at.predicted_t[pair, 0, n]), 0.0))
-        step_mass(at.predicted_t[pair, 1:, n], velocity, limit, gain, loss, line, out, slopes)
-        velocity[:] = out[2:4]
-        by_predicted, by_before = slopes[np.ix_(there, there)], slopes[np.ix_(there, 2 + there)]
-        law.by_force[n, place][np.ix_(rows, rows)] = np.eye(there.size) - by_predicted
-        if joint.has_normal[pair] and limit > 0.0:
-            law.by_force[n, place, rows, 0] = -friction * slopes[there, 4]
-        law.by_speed[n, place][np.ix_(rows, rows)] = -gain / step * by_predicted
-        law.by_last_speed[n, place][np.ix_(rows, rows)] = (by_before - loss * by_predicted) / step

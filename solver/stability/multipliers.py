@@ -65,7 +65,7 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run) -> Mult
     switching, stuck = switching_pairs(at)
     period = 2.0 * np.pi / joint.omega
     if not switching.any():
-        linear = joint.model.harmonic_structure(1)[0]
+        linear = joint.model.harmonic_structure(1)
         return Multipliers(_sorted(np.exp(exponents(linear, moving(joint, stuck)) * period)), 0.0)
     travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
     if travels or 3 * np.count_nonzero(switching) > STABILITY.most_rows:
@@ -77,7 +77,7 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run) -> Mult
         if finer is None or _first(finer[1], at) > STABILITY.other_branch:
             return NOT_KNOWN
         joint, at = finer
-        if opens_and_closes(at) and hill_size(joint) <= NEWTON.dear_unknowns and not joint.penalty.inertial.any():
+        if opens_and_closes(at) and hill_size(joint) <= NEWTON.dear_unknowns and not joint.law.rate_dependent:
             return Multipliers(_sorted(hill_multipliers(joint, at)), 0.0)
     n_samples = march_samples(joint, linear, (stuck, stuck | switching), small) // 2
     found = _sorted(multipliers_of(build_monodromy(joint, linear, at, n_samples), small))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -13,8 +13,15 @@ from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, L
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, HarmonicStiffness, share_matrices
 from solver.structure.identity import Identity
-from solver.structure.options import STRUCTURE
 from solver.structure.rough_forms import multiply_roughly
+
+DENSE_BYTES = 2e6
+"""Bytes of the matrices of all harmonics up to which a product with each matrix is fastest: larger matrices do not fit
+into the cache of the processor. Does not change results."""
+
+KEPT_STRUCTURES = 8
+"""Condensed structures of a case in its cache, and low-rank differences of their harmonics. A wear history with its
+errors uses six. Does not change results."""
 
 
 @dataclass(frozen=True)
@@ -97,205 +104,143 @@ def build_structure(
 ) -> CondensedStructure:
     """Condense the dynamic stiffness `K + i n w C - (n w)^2 M`, Eq. (1), at the harmonics n to Z_r of Eq. (8).
 
-    Parameters
-    ----------
-    model : ReducedModel
-        Matrices, loads and contact pairs.
-    omega : float
-        Angular frequency w, rad/s.
-    excitation_amplitude : float
-        Amplitude, N.
-    orders : tuple of int
-        Harmonics above the static one, ascending, beginning with 1. The excitation acts in harmonic 1.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The structure with its joint held is singular at a harmonic.
+    omega: w, rad/s. excitation_amplitude: N, in harmonic 1. orders: harmonics above the static one, ascending.
+    Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
     """
     relative, _ = relative_indices(model.contact)
     still = model.linear[0]
-    static = _static(Identity(still), tuple(relative.tolist()))
-    first = model.harmonic_structure(1)[0] if orders else still
-    n_bytes = 16 * len(orders) * relative.size**2
-    small = n_bytes <= max(STRUCTURE.dense_bytes, _shared_bytes(len(still.mass), relative.size, len(orders)))
-    if not small and first is still and _is_real(still) and not model.nodal_diameter:
+    first = model.harmonic_structure(1) if orders else still
+    n, n_rel = len(still.mass), relative.size
+    # bytes that a product with a `SharedStiffness` reads: many where much lies behind the joint
+    shared_bytes = 24 * (2 * n - n_rel) * n_rel + 16 * len(orders) * (n - n_rel) ** 2
+    shares = 16 * len(orders) * n_rel**2 > max(DENSE_BYTES, shared_bytes)
+    if shares and first is still and _is_real(still) and not model.nodal_diameter:
         moving = _condense_shared(still, relative, omega * np.array(orders, np.float64), excitation_amplitude)
     else:
         moving = _condense_each(model, relative, omega, excitation_amplitude, orders)
-    return CondensedStructure(
-        static_stiffness=np.real(static.stiffness),
-        static_force=np.real(static.force),
-        static_response=np.real(still.response @ static.motion),
-        static_offset=np.real(still.response @ static.held_motion),
-        **vars(moving),
-    )
-
-
-def _shared_bytes(n: int, n_rel: int, n_harmonics: int) -> int:
-    """Bytes that a product with a `SharedStiffness` reads: many where much lies behind the joint."""
-    behind = n - n_rel
-    return 24 * (n + behind) * n_rel + 16 * n_harmonics * behind**2
+    return CondensedStructure(**_static(Identity(still), tuple(relative.tolist())), **moving)
 
 
 @lru_cache(maxsize=2)
-def _static(structure: Identity, relative: tuple[int, ...]) -> Condensed:
-    """Static condensation of a linear model, which is the same at all frequencies."""
-    linear = cast("LinearModel", structure.objects[0])
-    return condense(np.real(linear.stiffness), np.array(relative, np.intp), linear.load_static)
-
-
-@dataclass(frozen=True)
-class _Moving:
-    """The attributes of a `CondensedStructure` for the harmonics above the static one."""
-
-    moving: HarmonicStiffness
-    harmonic_force: ComplexArray
-    dynamic_response: ComplexArray
-    harmonic_offset: ComplexArray
-    drive: ComplexArray
-    drive_offset: complex
+def _static(structure: Identity, relative: tuple[int, ...]) -> dict[str, Any]:
+    """The static attributes of a `CondensedStructure`, which are the same at all frequencies."""
+    linear, chosen = cast("LinearModel", structure.objects[0]), np.array(relative, np.intp)
+    found = condense(np.real(linear.stiffness), chosen, linear.load_static)
+    rows = np.real(linear.response)[:, relative_first(len(linear.mass), chosen)]
+    of_pairs, of_others = np.split(rows, [chosen.size], axis=1)
+    return {
+        "static_stiffness": np.asarray(np.real(found.stiffness)),
+        "static_force": np.asarray(np.real(found.force)),
+        "static_response": np.asarray(np.real(of_pairs - of_others @ found.behind)),
+        "static_offset": np.asarray(np.real(of_others @ found.held)),
+    }
 
 
 def _condense_each(
     model: ReducedModel, relative: IntArray, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
-) -> _Moving:
-    """Condensation with a matrix for each harmonic; arguments as in `build_structure`."""
-    n_response = model.linear[0].response.shape[0]
-    stiffness = np.empty((len(orders), relative.size, relative.size), complex)
-    response = np.empty((len(orders), n_response, relative.size), complex)
-    force, offset = np.zeros(relative.size, complex), np.zeros(n_response, complex)
-    drive, drive_offset = np.zeros(relative.size, complex), 0.0 + 0.0j
-    for (linear, conjugate), places in by_structure(model, orders):
-        every = relative_first(len(linear.mass), relative)
-        # a folded nodal diameter has conjugate matrices, not the conjugate of the sum: damping remains positive
-        mass, damping, elastic, shape, rows = (
-            (part.conj() if conjugate else part)[..., every]
-            for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, linear.response)
-        )
+) -> dict[str, Any]:
+    """The other attributes, with a matrix for each harmonic; arguments as in `build_structure`."""
+    n_rel, n_response = relative.size, model.linear[0].response.shape[0]
+    every = relative_first(len(model.linear[0].mass), relative)
+    stiffness = np.empty((len(orders), n_rel, n_rel), complex)
+    response = np.empty((len(orders), n_response, n_rel), complex)
+    force, offset = np.zeros(n_rel, complex), np.zeros(n_response, complex)
+    drive, drive_offset = np.zeros(n_rel, complex), 0.0 + 0.0j
+    for linear, places in by_structure(model, orders):
         harmonics = np.array(orders)[places]
-        full = dynamic_stiffness(elastic[every], damping[every], mass[every], omega * harmonics)
-        load = np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * shape
-        moving = _condense_ordered(full, relative.size, load)
-        stiffness[places] = moving.stiffness
-        of_pairs, of_others = rows[:, : relative.size], rows[:, relative.size :]
-        response[places] = of_pairs - of_others @ moving.behind
+        load = np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * linear.load_harmonic[every]
+        found = _condense_ordered(dynamic_stiffness(linear, omega * harmonics, every, every), n_rel, load)
+        stiffness[places] = found.stiffness
+        of_pairs, of_others = linear.response[:, every[:n_rel]], linear.response[:, every[n_rel:]]
+        response[places] = of_pairs - of_others @ found.behind
         if harmonics[0] == 1:
-            force, offset = moving.force[0], of_others @ moving.held[0]
-            drive = load[0, : relative.size].conj() - load[0, relative.size :].conj() @ moving.behind[0]
-            drive_offset = complex(load[0, relative.size :].conj() @ moving.held[0])
-    return _Moving(DenseStiffness(stiffness), force, response, offset, drive, drive_offset)
+            force, offset = found.force[0], of_others @ found.held[0]
+            drive = load[0, :n_rel].conj() - load[0, n_rel:].conj() @ found.behind[0]
+            drive_offset = complex(load[0, n_rel:].conj() @ found.held[0])
+    return {
+        "moving": DenseStiffness(stiffness),
+        "harmonic_force": force,
+        "dynamic_response": response,
+        "harmonic_offset": offset,
+        "drive": drive,
+        "drive_offset": drive_offset,
+    }
 
 
 def _condense_shared(
     linear: LinearModel, relative: IntArray, rates: FloatArray, excitation_amplitude: float
-) -> _Moving:
-    """Condensation of a real structure with matrices shared by all harmonics, at the rates n w (H,), rad/s."""
-    n = linear.mass.shape[0]
-    internal = np.setdiff1d(np.arange(n), relative)
-    rate = rates[:, None, None]
-
-    def block(rows: IntArray, columns: IntArray) -> ComplexArray:
-        stiffness, damping, mass = (
-            part[rows[:, None], columns] for part in (linear.stiffness, linear.damping, linear.mass)
-        )
-        return cast("ComplexArray", stiffness + 1j * rate * damping - rate**2 * mass)
-
-    compliance = cast("ComplexArray", np.linalg.inv(block(internal, internal)))
-    coupling = block(internal, relative)
+) -> dict[str, Any]:
+    """As `_condense_each`, of a real structure, with matrices shared by all harmonics, at the rates n w (H,), rad/s."""
+    others = relative_first(len(linear.mass), relative)[relative.size :]
+    compliance = cast("ComplexArray", np.linalg.inv(dynamic_stiffness(linear, rates, others, others)))
+    coupling = dynamic_stiffness(linear, rates, others, relative)
     load, rows = excitation_amplitude * linear.load_harmonic, linear.response
     # effect of a unit load on the displacements behind the joint, on the responses and on the work of the excitation
-    seen = rows[:, internal] @ compliance
-    by_load = load[internal].conj() @ compliance[0]
-    held = compliance[0] @ load[internal]
-    return _Moving(
-        moving=share_matrices(linear, relative, internal, rates, compliance),
-        harmonic_force=load[relative] - block(relative, internal)[0] @ held,
-        dynamic_response=rows[:, relative] - seen @ coupling,
-        harmonic_offset=rows[:, internal] @ held,
-        drive=load[relative].conj() - by_load @ coupling[0],
-        drive_offset=complex(load[internal].conj() @ held),
-    )
+    seen = rows[:, others] @ compliance
+    by_load = load[others].conj() @ compliance[0]
+    held = compliance[0] @ load[others]
+    return {
+        "moving": share_matrices(linear, relative, others, rates, compliance),
+        "harmonic_force": load[relative] - dynamic_stiffness(linear, rates[:1], relative, others)[0] @ held,
+        "dynamic_response": rows[:, relative] - seen @ coupling,
+        "harmonic_offset": rows[:, others] @ held,
+        "drive": load[relative].conj() - by_load @ coupling[0],
+        "drive_offset": complex(load[others].conj() @ held),
+    }
 
 
-def dynamic_stiffness(stiffness: Matrix, damping: Matrix, mass: Matrix, rates: FloatArray) -> ComplexArray:
-    """`K + i r C - r^2 M` (H, n, n) at the rates r (H,), rad/s."""
-    rate = rates[:, None, None]
+def dynamic_stiffness(linear: LinearModel, rates: FloatArray, rows: IntArray, columns: IntArray) -> ComplexArray:
+    """Rows and columns of `K + i r C - r^2 M`, (H, n_rows, n_columns), N/m, at the rates r (H,), rad/s."""
+    at, rate = np.ix_(rows, columns), rates[:, None, None]
+    mass, damping, stiffness = linear.mass[at], linear.damping[at], linear.stiffness[at]
     if any(np.iscomplexobj(part) for part in (stiffness, damping, mass)):
         return cast("ComplexArray", stiffness + 1j * rate * damping - rate**2 * mass)
-    full = np.empty((rates.size, *stiffness.shape), complex)
+    full = np.empty((rates.size, rows.size, columns.size), complex)
     full.real, full.imag = stiffness - rate**2 * mass, rate * damping
     return full
+
+
+def whole_motion(
+    linear: LinearModel, exponent: complex, relative: IntArray, load: ComplexArray, moved: ComplexArray
+) -> ComplexArray:
+    """All displacements (n, ...), m, whose relative ones are `moved` (n_rel, ...), m, under a load (n, ...), N.
+
+    For motions and loads with exp(s t), s the `exponent`, 1/s: `i n w` in harmonic n of a periodic motion.
+    Raises numpy.linalg.LinAlgError where the structure with its joint held is singular.
+    """
+    others = relative_first(len(linear.mass), relative)[relative.size :]
+
+    def behind(columns: IntArray) -> ComplexArray:
+        at = np.ix_(others, columns)
+        found = linear.stiffness[at] + exponent * linear.damping[at] + exponent**2 * linear.mass[at]
+        return cast("ComplexArray", found)
+
+    whole = np.zeros(load.shape, complex)
+    whole[relative] = moved
+    if others.size:
+        whole[others] = np.linalg.solve(behind(others), load[others] - behind(relative) @ moved)
+    return whole
 
 
 def _is_real(linear: LinearModel) -> bool:
     return not any(np.iscomplexobj(part) for part in (linear.mass, linear.damping, linear.stiffness, linear.response))
 
 
-def by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[tuple[LinearModel, bool], IntArray]]:
-    """Each linear model (and whether its conjugate is meant) with the indices of its harmonics in `orders`."""
+def by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[LinearModel, IntArray]]:
+    """Each linear model with the indices of its harmonics in `orders`."""
     seen = [model.harmonic_structure(harmonic) for harmonic in orders]
-    for number, (linear, conjugate) in enumerate(seen):
-        same = [other is linear and folded == conjugate for other, folded in seen]
+    for number, linear in enumerate(seen):
+        same = [other is linear for other in seen]
         if same.index(True) == number:
-            yield (linear, conjugate), np.flatnonzero(same)
+            yield linear, np.flatnonzero(same)
 
 
-@dataclass(frozen=True)
-class Condensed:
+class Condensed(NamedTuple):
     """Matrices (..., n, n) and loads (..., n) reduced to the relative displacements u (n_rel,).
 
     - stiffness (..., n_rel, n_rel): Schur complement, N/m.
     - force (..., n_rel): reduced load, N.
-    - motion (..., n, n_rel): all displacements for a unit u.
-    - held_motion (..., n): all displacements under the load with u = 0, m.
-    """
-
-    stiffness: Matrix
-    force: Matrix
-    motion: Matrix
-    held_motion: Matrix
-
-
-def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
-    """Condensation of static or dynamic stiffnesses on some displacements (Schur complement).
-
-    Parameters
-    ----------
-    full : array (..., n, n)
-        Stiffness, N/m.
-    relative : array (n_rel,)
-        Indices of the displacements that remain.
-    load : array (..., n)
-        Load, N.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The block of the other displacements is singular.
-    """
-    every = relative_first(full.shape[-1], relative)
-    ordered = _condense_ordered(full[..., every[:, None], every], relative.size, load[..., every])
-    motion = cast("Matrix", np.zeros((*full.shape[:-1], relative.size), full.dtype))
-    motion[..., relative, np.arange(relative.size)] = 1.0
-    motion[..., every[relative.size :], :] = -ordered.behind
-    held_motion = np.zeros((*full.shape[:-2], full.shape[-1]), ordered.held.dtype)
-    held_motion[..., every[relative.size :]] = ordered.held
-    return Condensed(ordered.stiffness, ordered.force, motion, held_motion)
-
-
-def relative_first(n: int, relative: IntArray) -> IntArray:
-    """Indices (n,) of all displacements, the relative ones first."""
-    others = np.ones(n, bool)
-    others[relative] = False
-    return np.concatenate([relative, np.flatnonzero(others)])
-
-
-class _Ordered(NamedTuple):
-    """Condensation of matrices whose first displacements are the relative ones.
-
-    - stiffness, force: as in `Condensed`.
-    - behind (..., n_i, n_rel): the other displacements for a unit u, with the sign reversed.
+    - behind (..., n_i, n_rel): the other displacements, ascending, for a unit u, with the sign reversed.
     - held (..., n_i): the other displacements under the load with u = 0, m.
     """
 
@@ -305,12 +250,28 @@ class _Ordered(NamedTuple):
     held: Matrix
 
 
-def _condense_ordered(full: Matrix, n_rel: int, load: Matrix) -> _Ordered:
+def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
+    """Condensation of stiffnesses `full` (..., n, n), N/m, and loads (..., n), N, on some displacements (n_rel,).
+
+    Raises numpy.linalg.LinAlgError where the block of the other displacements is singular.
+    """
+    every = relative_first(full.shape[-1], relative)
+    return _condense_ordered(full[..., every[:, None], every], relative.size, load[..., every])
+
+
+def relative_first(n: int, relative: IntArray) -> IntArray:
+    """Indices (n,) of all displacements, the relative ones first, then the others, ascending."""
+    others = np.ones(n, bool)
+    others[relative] = False
+    return np.concatenate([relative, np.flatnonzero(others)])
+
+
+def _condense_ordered(full: Matrix, n_rel: int, load: Matrix) -> Condensed:
     """As `condense`, of matrices whose first n_rel displacements are the relative ones."""
     right = np.concatenate([full[..., n_rel:, :n_rel], load[..., n_rel:, None]], axis=-1)
     solved = cast("Matrix", np.linalg.solve(full[..., n_rel:, n_rel:], right))
     back = full[..., :n_rel, n_rel:] @ solved
-    return _Ordered(
+    return Condensed(
         full[..., :n_rel, :n_rel] - back[..., :-1],
         load[..., :n_rel] - back[..., -1],
         solved[..., :-1],

@@ -8,7 +8,7 @@ harmonic n means `x(t) = Re(X exp(i n w t))`, so `X = cosine - i sine`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -35,22 +35,22 @@ class FourierBasis:
         """Number H of harmonics above the static one."""
         return len(self.orders)
 
+    @cached_property
+    def step_mean(self) -> FloatArray:
+        """Ratio (2H+1,) of the harmonics of means over a step around each sample to the harmonics of the samples."""
+        angle = np.pi * np.array(self.orders) / self.n_samples
+        return np.concatenate([[1.0], np.repeat(np.sin(angle) / angle, 2)])
+
+    def at(self, phase: FloatArray) -> FloatArray:
+        """`synthesis` at other phases (n,), rad: (2H+1, n)."""
+        return synthesis(self.orders, phase)
+
 
 @lru_cache(maxsize=32)
 def build_basis(orders: tuple[int, ...], n_samples: int) -> FourierBasis:
-    """Fourier basis, Eq. (5).
+    """Fourier basis, Eq. (5), of harmonics above the static one, ascending, and of N samples.
 
-    Parameters
-    ----------
-    orders : tuple of int
-        Harmonics above the static one, ascending.
-    n_samples : int
-        Number N of samples, equally spaced over the period.
-
-    Raises
-    ------
-    ValueError
-        The highest order is not below N/2: aliasing.
+    Raises ValueError where the highest order is not below N/2: aliasing.
     """
     highest = max(orders, default=0)
     if n_samples <= 2 * highest:

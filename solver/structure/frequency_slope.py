@@ -45,34 +45,32 @@ def frequency_slope(
 ) -> FrequencySlope:
     """Change of a structure with the frequency; arguments as in `build_structure`, and u (n_rel, 2H+1), m."""
     relative, _ = relative_indices(model.contact)
-    n_rel, moving = relative.size, to_complex(displacement_h).T
-    force, product = np.zeros((n_rel, len(orders)), complex), 0.0 + 0.0j
+    others = relative_first(len(model.linear[0].mass), relative)[relative.size :]
+    moving = to_complex(displacement_h).T
+    force, product = np.zeros((relative.size, len(orders)), complex), 0.0 + 0.0j
     response = np.zeros(model.linear[0].response.shape[0], complex)
-    for (linear, conjugate), places in by_structure(model, orders):
-        every = relative_first(len(linear.mass), relative)
-        mass, damping, elastic, shape, rows = (
-            (part.conj() if conjugate else part)[..., every]
-            for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic, linear.response)
-        )
-        mass, damping, elastic = (part[every] for part in (mass, damping, elastic))
+    for linear, places in by_structure(model, orders):
         harmonics = np.array(orders)[places]
-        rates = omega * harmonics
-        behind = dynamic_stiffness(elastic[n_rel:], damping[n_rel:], mass[n_rel:], rates)
-        compliance = cast("ComplexArray", np.linalg.inv(behind[..., n_rel:]))
-        load = np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * shape
-        pushed = load[:, n_rel:] - _each(behind[..., :n_rel], moving[places])
-        x = np.concatenate([moving[places], _each(compliance, pushed)], axis=1)
-        number = harmonics[:, None]
-        slope = 1j * number * (x @ damping.T) - 2.0 * number**2 * omega * (x @ mass.T)
-        turned = -_each(compliance, slope[:, n_rel:])
-        rate = rates[:, None]
-        elastic, damping, mass = (turned @ part[:n_rel, n_rel:].T for part in (elastic, damping, mass))
-        force[:, places] = (slope[:, :n_rel] + elastic + 1j * rate * damping - rate**2 * mass).T
+        rates, number = omega * harmonics, harmonics[:, None]
+        load = np.where(number == 1, excitation_amplitude, 0.0) * linear.load_harmonic
+        behind = dynamic_stiffness(linear, rates, others, others)
+        x = np.empty((len(places), len(linear.mass)), complex)
+        x[:, relative] = moving[places]
+        pushed = load[:, others] - _each(dynamic_stiffness(linear, rates, others, relative), moving[places])
+        x[:, others] = _solved(behind, pushed)
+        slope = 1j * number * (x @ linear.damping.T) - 2.0 * number**2 * omega * (x @ linear.mass.T)
+        turned = -_solved(behind, slope[:, others])
+        force[:, places] = (slope[:, relative] + _each(dynamic_stiffness(linear, rates, relative, others), turned)).T
         if harmonics[0] == 1:
-            product, response = complex(load[0, n_rel:].conj() @ turned[0]), rows[:, n_rel:] @ turned[0]
-    return FrequencySlope(from_complex(np.zeros(n_rel), force), product, response)
+            product, response = complex(load[0, others].conj() @ turned[0]), linear.response[:, others] @ turned[0]
+    return FrequencySlope(from_complex(np.zeros(relative.size), force), product, response)
 
 
 def _each(matrices: ComplexArray, vectors: ComplexArray) -> ComplexArray:
     """Products (H, n) of matrices (H, n, m) with vectors (H, m)."""
     return cast("ComplexArray", np.matmul(matrices, vectors[:, :, None])[:, :, 0])
+
+
+def _solved(matrices: ComplexArray, vectors: ComplexArray) -> ComplexArray:
+    """Solutions (H, n) of systems with the matrices (H, n, n) and right-hand sides (H, n)."""
+    return cast("ComplexArray", np.linalg.solve(matrices, vectors[:, :, None])[:, :, 0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, cast
+from typing import cast
 
 import numpy as np
 
@@ -13,42 +13,24 @@ from solver.structure.fourier import to_complex
 from solver.structure.rough_forms import RoughStiffness, rough_of_each, rough_of_shared
 
 
-class HarmonicStiffness(Protocol):
-    """Z_r at H harmonics above the static one."""
-
-    @property
-    def dense(self) -> ComplexArray:
-        """Matrices (H, n_rel, n_rel), N/m; computed at each call where they are not stored."""
-
-    def matrix(self, place: int) -> ComplexArray:
-        """Matrix (n_rel, n_rel), N/m, of the harmonic at index `place`."""
-
-    def apply(self, displacement_h: FloatArray) -> ComplexArray:
-        """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
-
-    @property
-    def rough(self) -> RoughStiffness:
-        """Z_r in single precision, for directions of Newton's method, not for the residual."""
-
-
 @dataclass(frozen=True)
 class DenseStiffness:
-    """A matrix for each harmonic, for any structure. dense (H, n_rel, n_rel): N/m."""
+    """Z_r at H harmonics above the static one, for any structure. dense (H, n_rel, n_rel): matrices, N/m."""
 
     dense: ComplexArray
 
     def matrix(self, place: int) -> ComplexArray:
-        """As in HarmonicStiffness."""
+        """Matrix (n_rel, n_rel), N/m, of the harmonic at index `place`."""
         return cast("ComplexArray", self.dense[place])
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
-        """As in HarmonicStiffness."""
+        """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
         moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
         return cast("ComplexArray", np.matmul(self.dense, moving)[:, :, 0].T)
 
     @cached_property
     def rough(self) -> RoughStiffness:
-        """As in HarmonicStiffness."""
+        """Z_r in single precision, for directions of Newton's method, not for the residual."""
         return rough_of_each(self.dense)
 
 
@@ -82,11 +64,11 @@ class SharedStiffness:
 
     @property
     def dense(self) -> ComplexArray:
-        """As in HarmonicStiffness. Not stored: all harmonics together may need as much memory as all other data."""
+        """As in DenseStiffness; computed at each call: the matrices may need as much memory as all other data."""
         return np.array([self.matrix(place) for place in range(self.rates.size)]).reshape(-1, self.n_rel, self.n_rel)
 
     def matrix(self, place: int) -> ComplexArray:
-        """As in HarmonicStiffness."""
+        """As in DenseStiffness."""
         rate = self.rates[place]
         stiffness, mass, damping = self.columns
         columns = stiffness - rate**2 * mass + 1j * rate * damping
@@ -95,36 +77,27 @@ class SharedStiffness:
         return cast("ComplexArray", columns[: self.n_rel] - back @ held)
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
-        """As in HarmonicStiffness."""
-        forces = self._combine(*_products(self.columns, displacement_h[:, 1:]))
-        return forces[: self.n_rel] - self._combine(*_products(self.back, self._behind(forces[self.n_rel :])))
+        """As in DenseStiffness."""
+        forces = self._products(self.columns, to_complex(displacement_h))
+        behind = np.matmul(self.held_compliance, forces[self.n_rel :].T[:, :, None])[:, :, 0].T
+        return forces[: self.n_rel] - self._products(self.back, behind)
 
     @cached_property
     def rough(self) -> RoughStiffness:
-        """As in HarmonicStiffness."""
+        """As in DenseStiffness."""
         few = rough_of_shared(self.linear, self.relative, self.internal, self.rates, self.held_compliance)
         return rough_of_each(self.dense) if few is None else few
 
-    def _behind(self, forces: ComplexArray) -> FloatArray:
-        """`A_ii^-1 f` as harmonics cosine, sine, ... (n_i, 2H) from the complex f (n_i, H)."""
-        behind = np.matmul(self.held_compliance, forces.T[:, :, None])[:, :, 0].T
-        parts = np.empty((behind.shape[0], 2 * self.rates.size))
-        parts[:, ::2], parts[:, 1::2] = behind.real, -behind.imag
-        return parts
+    def _products(self, parts: FloatArray, amplitudes: ComplexArray) -> ComplexArray:
+        """`(K + i n w C - (n w)^2 M) u` (rows, H) of real parts K, M, C (3, rows, n) and complex u (n, H).
 
-    def _combine(self, by_stiffness: FloatArray, by_mass: FloatArray, by_damping: FloatArray) -> ComplexArray:
-        """`(K + i n w C - (n w)^2 M) u` (rows, H) from `K u`, `M u`, `C u`, harmonics cosine, sine, ... (rows, 2H)."""
-        spring, inertia, drag = (part.reshape(part.shape[0], -1, 2) for part in (by_stiffness, by_mass, by_damping))
-        spring = spring - self.rates[:, None] ** 2 * inertia
-        drag = self.rates[:, None] * drag
-        # i (cosine - i sine) = sine + i cosine
-        return cast("ComplexArray", spring[..., 0] + drag[..., 1] - 1j * (spring[..., 1] - drag[..., 0]))
-
-
-def _products(forms: FloatArray, moving: FloatArray) -> FloatArray:
-    """`K u`, `M u`, `C u` (3, rows, k) in one product."""
-    _, n_rows, n_columns = forms.shape
-    return (forms.reshape(3 * n_rows, n_columns) @ moving).reshape(3, n_rows, moving.shape[1])
+        One real product for all harmonics: real and imaginary parts are columns side by side.
+        """
+        _, n_rows, n = parts.shape
+        columns = np.ascontiguousarray(amplitudes).view(np.float64)
+        found = (parts.reshape(3 * n_rows, n) @ columns).view(np.complex128)
+        spring, inertia, drag = found.reshape(3, n_rows, self.rates.size)
+        return np.asarray(spring + 1j * self.rates * drag - self.rates**2 * inertia)
 
 
 def share_matrices(
@@ -143,3 +116,6 @@ def share_matrices(
         relative,
         internal,
     )
+
+
+HarmonicStiffness = DenseStiffness | SharedStiffness

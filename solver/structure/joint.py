@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import cast
+from functools import cached_property
 
 import numpy as np
 
-from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray, ReducedModel
+from solver.contact.law import ContactLaw
+from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
 from solver.packing import packable
 from solver.settings import Resolution, SolverSettings, first_resolution
-from solver.structure.condensation import CondensedStructure, build_structure, relative_indices
-from solver.structure.fourier import FourierBasis, build_basis, from_complex, to_complex
+from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure, build_structure, relative_indices
+from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.harmonic_stiffness import DenseStiffness
-from solver.structure.options import STRUCTURE
-from solver.structure.penalty import Penalty, build_penalty, static_penalty
+from solver.structure.penalty import Penalty, build_penalty
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,6 @@ class Joint:
     - basis: Fourier basis.
     - component_index (n_rel,): `3 pair + component` of each relative displacement.
     - penalty: penalties and masses of the pairs.
-    - has_normal (n_contact,): False where the normal force is constant.
-    - line (n_contact,): 0 or 1 where a pair has the first or the second tangent only, else -1.
     """
 
     model: ReducedModel
@@ -43,63 +41,11 @@ class Joint:
     basis: FourierBasis
     component_index: IntArray
     penalty: Penalty
-    has_normal: BoolArray
-    line: IntArray
 
-    @property
-    def state_stiffness(self) -> FloatArray:
-        """Tangential state over slip (n_contact,), N/m; 1 for inertial pairs, whose state is the displacement."""
-        return np.where(self.penalty.inertial, 1.0, self.penalty.tangential)
-
-    @property
-    def sample_step(self) -> float:
-        """Time between two samples, s."""
-        return 2.0 * np.pi / (self.omega * self.basis.n_samples)
-
-    def step_mean_factor(self) -> FloatArray:
-        """Ratio (2H+1,) of the harmonics of means over a step around each sample to the harmonics of the samples."""
-        return step_mean_factor(self.basis.orders, self.basis.n_samples)
-
-    def _inertial_compliance(self) -> ComplexArray:
-        """Displacement per force (n_inertial, H), m/N, of the inertial pairs, exactly as in the steps of the march."""
-        orders = np.array(self.basis.orders, np.float64)
-        angle = np.pi * orders / self.basis.n_samples
-        mass, drag = (part[self.penalty.inertial][:, None] for part in (self.penalty.mass, self.penalty.drag))
-        impedance = 2j * mass * np.sin(angle) / self.sample_step + drag * np.cos(angle)
-        return cast("ComplexArray", np.sin(angle) / angle / (1j * self.omega * orders * impedance))
-
-    def motion(self, force_correction: FloatArray) -> FloatArray:
-        """Motion (n_contact, 3, 2H+1, ...), m, from predicted less contact force, N, of equal shape.
-
-        A linear map: Eq. (12) divided by the penalty; Newton's law for inertial pairs. The mean position of inertial
-        pairs is relative to their history.
-        """
-        shape = (-1,) + (1,) * (force_correction.ndim - 2)
-        moved = np.empty_like(force_correction)
-        moved[:, 0] = force_correction[:, 0] / self.penalty.normal.reshape(shape)
-        moved[:, 1:] = force_correction[:, 1:] / self.penalty.tangential.reshape((*shape, 1))
-        if self.penalty.inertial.any() and force_correction.shape[2] > 1:
-            self._move_masses(force_correction, moved)
-        return moved
-
-    def _move_masses(self, force_correction: FloatArray, moved: FloatArray) -> None:
-        fast = self.penalty.inertial
-        # harmonics last, as `to_complex` has them
-        force = np.moveaxis(force_correction[fast, 1:], 2, -1)
-        compliance = self._inertial_compliance().reshape((-1,) + (1,) * (force.ndim - 2) + (self.basis.n_harmonics,))
-        mean = force[..., 0] / self.penalty.mean[fast].reshape((-1,) + (1,) * (force.ndim - 2))
-        moved[fast, 1:] = np.moveaxis(from_complex(mean, compliance * to_complex(force)), -1, 2)
-
-    def force_correction(self, motion: FloatArray) -> FloatArray:
-        """Predicted less contact force, N, of a motion (n_contact, 3, 2H+1), m, Eqs. (10), (12); undoes `motion`."""
-        force = np.empty_like(motion)
-        force[:, 0] = motion[:, 0] * self.penalty.normal[:, None]
-        force[:, 1:] = motion[:, 1:] * self.penalty.tangential[:, None, None]
-        fast = self.penalty.inertial
-        if fast.any() and motion.shape[2] > 1:
-            mean = motion[fast, 1:, 0] * self.penalty.mean[fast, None]
-            force[fast, 1:] = from_complex(mean, to_complex(motion[fast, 1:]) / self._inertial_compliance()[:, None])
-        return force
+    @cached_property
+    def law(self) -> ContactLaw:
+        """The contact law of the pairs."""
+        return ContactLaw(self.penalty, self.friction_coefficient, self.contact, self.basis, self.omega)
 
     @property
     def relative_penalty(self) -> FloatArray:
@@ -122,14 +68,6 @@ class Joint:
     def to_relative(self, values: FloatArray) -> FloatArray:
         """Values (n_rel, m) of the relative displacements from (n_contact, 3, m)."""
         return values.reshape(3 * self.contact.n_contact, values.shape[2])[self.component_index]
-
-
-def step_mean_factor(orders: tuple[int, ...], n_samples: int) -> FloatArray:
-    """Ratio (2H+1,) of the harmonics of means over a step around each sample to the harmonics of the samples."""
-    factor = np.ones(2 * len(orders) + 1)
-    angle = np.pi * np.array(orders) / n_samples
-    factor[1::2] = factor[2::2] = np.sin(angle) / angle
-    return factor
 
 
 @packable
@@ -189,8 +127,6 @@ class Case:
         Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
         """
         _, component_index = relative_indices(self.model.contact)
-        tangents = self.model.contact.dofs[:, 1:] >= 0
-        one = tangents.sum(axis=1) == 1
         return Joint(
             model=self.model,
             omega=omega,
@@ -201,8 +137,6 @@ class Case:
             basis=build_basis(self.resolution.orders, self.resolution.samples),
             component_index=component_index,
             penalty=self.penalty,
-            has_normal=self.model.contact.dofs[:, 0] >= 0,
-            line=np.where(one, np.argmax(tangents, axis=1), -1),
         )
 
     def _structure(self, omega: float, excitation_amplitude: float) -> CondensedStructure:
@@ -212,7 +146,7 @@ class Case:
         if found is None:
             found = build_structure(self.model, *key)
             found = found if self.hold is None else self.hold.on(found)
-            while len(self._structures) >= STRUCTURE.kept_structures:
+            while len(self._structures) >= KEPT_STRUCTURES:
                 del self._structures[next(iter(self._structures))]
             self._structures[key] = found
         return found
@@ -238,23 +172,11 @@ def build_case(
 ) -> Case:
     """Case of a scene.
 
-    Parameters
-    ----------
-    model : ReducedModel
-        The scene.
-    friction_coefficient : float, array (n_contact,) or None
-        One number for all pairs or one for each pair; None where the scene has its own.
-    omega : float
-        Angular frequency for which the penalty is built, rad/s; equal for states that are compared.
-    settings : SolverSettings
-        Settings of the solver.
-    resolution : Resolution, optional
-        First harmonics and samples; by default from the settings.
+    - friction_coefficient: one number for all pairs or (n_contact,); None where the scene has its own.
+    - omega: angular frequency for which the penalty is built, rad/s; equal for states that are compared.
+    - resolution: first harmonics and samples; by default from the settings.
 
-    Raises
-    ------
-    ValueError
-        The friction coefficient is given twice, not at all, or not for each pair.
+    Raises ValueError where the friction coefficient is given twice, not at all, or not for each pair.
     """
     chosen = resolution or first_resolution(settings)
     penalty = build_penalty(model, omega, chosen.highest)
@@ -284,9 +206,8 @@ def static_joint(joint: Joint, load_factor: float) -> Joint:
         static_force=load_factor * structure.static_force,
         static_offset=load_factor * structure.static_offset,
     )
-    # a static state has no velocity: each pair is taken at displacement level
-    penalty = static_penalty(joint.penalty)
-    return replace(joint, excitation_amplitude=0.0, structure=held, basis=build_basis((), 1), penalty=penalty)
+    basis, penalty = build_basis((), 1), joint.penalty.static()
+    return replace(joint, excitation_amplitude=0.0, structure=held, basis=basis, penalty=penalty)
 
 
 def viscous_joint(joint: Joint, viscosity: float, before: FloatArray) -> Joint:

@@ -15,13 +15,27 @@ harmonic:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from solver.model import BoolArray, FloatArray, Matrix, ReducedModel
 from solver.structure.condensation import condense, relative_indices
-from solver.structure.options import STRUCTURE
+
+INERTIAL_RATIO = 2.0
+"""Ratio of the stiffness at twice a rate to the stiffness at the rate, above which a pair is inertial: 1 for a spring,
+4 for a mass. With 4 no pair is inertial, and the motion of the two masses is 20 % off with H = 5."""
+
+INERTIAL_RATE = 8.0
+"""Rate of the first test for `INERTIAL_RATIO` over the frequency, for any number of harmonics."""
+
+DRAG_FRACTION = 0.1
+"""Drag of an inertial pair over m w: the mean velocity falls to exp(-2 pi 0.1) = 0.53 of its value in a period. Half
+and twice the value change the motion of slider and two masses by 1e-4."""
+
+MEAN_STIFFNESS_FRACTION = 1e-5
+"""Stiffness on the mean position of an inertial pair over the stiffness of the joint at the frequency. It is too small
+to hold a pair that slips. Half and twice the value change states by at most 3e-6."""
 
 
 @dataclass(frozen=True)
@@ -44,29 +58,29 @@ class Penalty:
     drag: FloatArray
     mean: FloatArray
 
+    def static(self) -> Penalty:
+        """The penalty for a static state, which has no velocity: each pair is taken at displacement level."""
+        return replace(self, inertial=np.zeros_like(self.inertial))
+
+    def at_rate(self, rate: float) -> FloatArray:
+        """E (n_contact, 2), N/m, normal and tangential, of a motion that grows at a real rate, 1/s."""
+        return np.stack([self.normal, np.where(self.inertial, self.mass * rate**2, self.tangential)], axis=1)
+
 
 def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     """Penalty from the condensed `K + s^2 M` at the real rate s = `(highest + 1) omega`, the first harmonic left out.
 
     At a real rate the structure has no resonances: an elastic joint acts as a stiffness, a slider as a mass.
-
-    Parameters
-    ----------
-    model : ReducedModel
-        The structure.
-    omega : float
-        Angular frequency, rad/s.
-    highest : int
-        Highest harmonic of the balance.
+    omega: rad/s. highest: highest harmonic of the balance.
     """
     rate = (highest + 1) * omega
     size = _stiffness_at(model, rate)
-    low, high = (_stiffness_at(model, times * STRUCTURE.inertial_rate * omega)[:, 1] for times in (1.0, 2.0))
+    low, high = (_stiffness_at(model, times * INERTIAL_RATE * omega)[:, 1] for times in (1.0, 2.0))
     has_tangent = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
-    inertial = has_tangent & (high > STRUCTURE.inertial_ratio * low)
-    if inertial.any() and highest + 1 > STRUCTURE.inertial_rate:
+    inertial = has_tangent & (high > INERTIAL_RATIO * low)
+    if inertial.any() and highest + 1 > INERTIAL_RATE:
         # a mass behind a spring: where the spring dominates in the harmonics left out, the pair is elastic
-        inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > STRUCTURE.inertial_ratio * size[:, 1]
+        inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > INERTIAL_RATIO * size[:, 1]
     mass = np.ones(size.shape[0])
     if inertial.any():
         mass[inertial] = _mass_at(model, rate)[inertial]
@@ -75,8 +89,8 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
         tangential=size[:, 1],
         inertial=inertial,
         mass=mass,
-        drag=STRUCTURE.drag_fraction * mass * omega,
-        mean=STRUCTURE.mean_stiffness_fraction * _stiffness_at(model, omega)[:, 1],
+        drag=DRAG_FRACTION * mass * omega,
+        mean=MEAN_STIFFNESS_FRACTION * _stiffness_at(model, omega)[:, 1],
     )
 
 
@@ -112,12 +126,6 @@ def compliance_at(model: ReducedModel, rate: float) -> FloatArray:
 
 def _condensed_at(model: ReducedModel, rate: float) -> Matrix:
     relative, _ = relative_indices(model.contact)
-    linear, _ = model.harmonic_structure(1)
+    linear = model.harmonic_structure(1)
     full = linear.stiffness + rate**2 * linear.mass
     return condense(full, relative, np.zeros(full.shape[0])).stiffness
-
-
-def static_penalty(penalty: Penalty) -> Penalty:
-    """The penalty for a static state: no pair is inertial, each pair is taken at displacement level."""
-    none = np.zeros_like(penalty.inertial)
-    return Penalty(penalty.normal, penalty.tangential, none, penalty.mass, penalty.drag, penalty.mean)

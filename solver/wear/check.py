@@ -110,7 +110,7 @@ def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution)
     work.at(state)
     old, case = work.case, work.case.at(resolution)
     joint = case.joint(state.omega, work.excitation_amplitude)
-    point = work.run.move(old, case, joint, state.point)
+    point = work.run.move(old, joint, state.point)
     if point is None:
         return None
     tuned = work.tuned(replace(state, point=point, resolution=resolution, change=None))

@@ -16,12 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.contact.alternating_frequency_time import Marched
-from solver.contact.coulomb import STICK, friction_limit
-from solver.contact.options import CONTACT
-from solver.contact.period_march import march_period
+from solver.contact.coulomb import STICK
+from solver.contact.law import Marched
 from solver.model import FloatArray
-from solver.options import COMMON
 from solver.structure.joint import Joint
 from solver.wear.options import WEAR
 
@@ -42,16 +39,5 @@ def history_along(joint: Joint, before: Marched, history: FloatArray, ahead: Mar
     """
     # a pair that sticks with one history at both ends sticks everywhere between: its force lies on a straight line
     sticks = (before.status_t == STICK).all(axis=1) & (ahead.status_t == STICK).all(axis=1) & (ahead.periods == 1)
-    moving = np.flatnonzero(~(sticks | joint.penalty.inertial))
-    found = history.copy()
-    if moving.size:
-        first, last = before.predicted_t[moving], ahead.predicted_t[moving]
-        friction, stiffness = joint.friction_coefficient[moving], joint.state_stiffness[moving, None]
-        largest = float(friction_limit(friction, last[:, 0].max(axis=1)).max())
-        state = history[moving] * stiffness
-        for part in np.linspace(0.0, 1.0, WEAR.parts_of_step + 1)[1:-1]:
-            between = first + part * (last - first)
-            state_t = march_period(between, friction, state, COMMON.round_off * largest, CONTACT.most_periods)[1]
-            state = state_t[:, :, -1]
-        found[moving] = state / stiffness
-    return found
+    parts = np.linspace(0.0, 1.0, WEAR.parts_of_step + 1)[1:-1]
+    return joint.law.history_along(history, ~sticks, before.predicted_t, ahead.predicted_t, parts)

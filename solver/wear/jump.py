@@ -34,7 +34,7 @@ from solver.outcome import Outcome
 from solver.results.options import RESULTS
 from solver.stability.options import STABILITY
 from solver.structure.joint import Hold, Joint
-from solver.structure.options import STRUCTURE
+from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
 from solver.wear.state import WearState
 from solver.wear.step import Step, held_wear
 from solver.wear.step_limit import too_long
@@ -107,9 +107,10 @@ def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState |
 def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
     """Hold of the mean position of a state.
 
-    None unless every pair slips at some time and the structure is free to slide in one direction.
+    None unless every pair slips at some time and the structure is free to slide in one direction; masses on rigid
+    ground have a hold of their own (`Penalty.mean`).
     """
-    if (at.status_t == STICK).all(axis=1).any() or joint.penalty.inertial.any():
+    if (at.status_t == STICK).all(axis=1).any() or joint.law.rate_dependent:
         return None
     stiffness, directions = np.linalg.eigh(joint.structure.static_stiffness)
     # spin softening may give small negative eigenvalues
@@ -119,7 +120,7 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
     if np.count_nonzero(free) != 1 or closes > COMMON.negligible:
         return None
     motion = joint.to_relative(at.displacement_h)[:, 0]
-    return Hold(along, STRUCTURE.mean_stiffness_fraction * float(stiffness[-1]), float(along @ motion))
+    return Hold(along, MEAN_STIFFNESS_FRACTION * float(stiffness[-1]), float(along @ motion))
 
 
 def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:

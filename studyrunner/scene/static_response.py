@@ -32,7 +32,7 @@ def static_response(model: ReducedModel) -> StaticResponse | None:
     """The response at rest of the first harmonic; None where the stiffness alone does not hold the structure."""
     from scipy.linalg import LinAlgWarning, solve
 
-    linear, _ = model.harmonic_structure(1)
+    linear = model.harmonic_structure(1)
     held = model.contact.dofs[model.contact.gap <= 0.0]
     free = np.setdiff1d(np.arange(len(linear.load_harmonic)), held[held >= 0])
     both = np.ix_(free, free)

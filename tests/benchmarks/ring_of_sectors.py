@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from solver.model import ContactInterface, FloatArray, LinearModel, Matrix, ReducedModel
+from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 
 
 def ring_of_sectors(model: ReducedModel) -> ReducedModel:
@@ -23,20 +23,16 @@ def ring_of_sectors(model: ReducedModel) -> ReducedModel:
     structures = [model.harmonic_structure(harmonic) for harmonic in range(n)]
 
     def whole(name: str) -> FloatArray:
-        def of(structure: LinearModel, conjugate: bool) -> Matrix:
-            matrix: Matrix = getattr(structure, name)
-            return matrix.conj() if conjugate else matrix
-
-        blocks = (np.kron(np.outer(wave, wave.conj()), of(*one)) for wave, one in zip(waves, structures, strict=True))
+        seen = (getattr(one, name) for one in structures)
+        blocks = (np.kron(np.outer(wave, wave.conj()), matrix) for wave, matrix in zip(waves, seen, strict=True))
         found = np.asarray(sum(blocks))
         assert np.abs(found.imag).max() <= 1e-9 * np.abs(found.real).max(), f"{name} of the ring is not real"
         return np.ascontiguousarray(found.real)
 
-    excited, conjugate = structures[1]
-    assert not conjugate, "the wave turns the other way"
+    excited = structures[1]
     linear = LinearModel(
         *(whole(name) for name in ("mass", "damping", "stiffness")),
-        np.tile(structures[0][0].load_static, n),
+        np.tile(structures[0].load_static, n),
         np.kron(np.sqrt(n) * waves[1], excited.load_harmonic),
         np.kron(np.eye(1, n), excited.response),
     )

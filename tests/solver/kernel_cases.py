@@ -94,16 +94,15 @@ def mass_case(n_contact: int, seed: int, basis: FourierBasis = MASS_BASIS, opens
 def run_masses(
     case: MassCase, predicted_h: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
-    return march_masses(
-        case.predicted_t(predicted_h), friction_of(predicted_h), case.mass, case.drag, case.line, case.step
-    )
+    masses = case.mass, case.drag, case.line
+    return march_masses(case.predicted_t(predicted_h), friction_of(predicted_h), masses, case.step)
 
 
 def masses_tangent(case: MassCase, start: FloatArray) -> tuple[FloatArray, FloatArray]:
     basis, share = case.basis, case.step_share
-    given = case.predicted_t(case.predicted_h), friction_of(case.predicted_h), case.mass, case.drag, case.line
+    given = case.predicted_t(case.predicted_h), friction_of(case.predicted_h), (case.mass, case.drag, case.line)
     series = basis.synthesis, basis.synthesis * share[:, None], basis.analysis / share
-    return mass_tangent(*given, case.step, start, *series, case.has_normal)
+    return mass_tangent(*given, case.step, start, case.has_normal, series)
 
 
 def friction_of(predicted: FloatArray) -> FloatArray:
@@ -122,7 +121,7 @@ def kernel_results() -> dict[str, FloatArray]:
     force_t, state_t, status_t, periods, error = march_period(case.predicted_t, friction, case.start, 1e-9, 6)
     marched = case.predicted_t, friction, case.start, state_t, periods
     force_tangent, wear_tangent = march_tangent(
-        *marched, both_tangents(3), BASIS.synthesis, BASIS.analysis, case.has_normal
+        *marched, both_tangents(3), case.has_normal, (BASIS.synthesis, BASIS.analysis)
     )
     masses = mass_case(6, seed=21)
     mass_force_t, velocity_t, place_t, mass_status_t, slip_work, _ = run_masses(masses, masses.predicted_h)

@@ -11,7 +11,6 @@ from solver.structure.condensation import build_structure, relative_indices
 from solver.structure.fourier import change_orders, from_complex, to_complex
 from solver.structure.frequency_slope import frequency_slope
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
-from solver.structure.options import STRUCTURE
 from tests.solver.models import MASS, OMEGA, STIFFNESS, cyclic_model, definite, random_model, scene
 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
@@ -176,7 +175,7 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
     model = scene("dovetail_sector", 5, mesh=1)
     orders = (1, 2, 3, 5)
     each = build_structure(model, OMEGA, AMPLITUDE, orders)
-    monkeypatch.setattr(condensation, "STRUCTURE", replace(STRUCTURE, dense_bytes=0.0))
+    monkeypatch.setattr(condensation, "DENSE_BYTES", 0.0)
     shared = build_structure(model, OMEGA, AMPLITUDE, orders)
     assert isinstance(each.moving, DenseStiffness)
     assert isinstance(shared.moving, SharedStiffness)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.contact.alternating_frequency_time import law_tangent, march_law
 from solver.contact.coulomb import SEPARATED, SLIP, STICK
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import build_case
@@ -31,9 +30,9 @@ def predicted(joint, seed=2):
     values = random.normal(size=(6, 3, 2 * joint.basis.n_harmonics + 1)) * PRELOAD * 0.6
     values[:, 0, 0] = PRELOAD
     values[:, 1:, 0] *= 0.1
-    values[~joint.has_normal, 0, 1:] = 0.0
+    values[~joint.contact.has_normal, 0, 1:] = 0.0
     values.reshape(18, -1)[np.setdiff1d(np.arange(18), joint.component_index)] = 0.0
-    values[~joint.has_normal, 0, 0] = PRELOAD
+    values[~joint.contact.has_normal, 0, 0] = PRELOAD
     history = random.normal(size=(6, 2)) * 0.1 * PRELOAD / joint.penalty.tangential[:, None]
     return values, history
 
@@ -41,9 +40,9 @@ def predicted(joint, seed=2):
 def of_pairs(joint, pairs):
     """The same joint with some of its pairs alone; its structure is not used."""
     penalty = replace(joint.penalty, **{name: value[pairs] for name, value in vars(joint.penalty).items()})
-    contact = replace(joint.contact, dofs=joint.contact.dofs[pairs])
-    own = {name: getattr(joint, name)[pairs] for name in ("friction_coefficient", "has_normal", "line")}
-    return replace(joint, penalty=penalty, contact=contact, **own)
+    contact = replace(joint.contact, dofs=joint.contact.dofs[pairs], area=joint.contact.area[pairs])
+    friction = joint.friction_coefficient[pairs]
+    return replace(joint, penalty=penalty, contact=contact, friction_coefficient=friction)
 
 
 def assert_same(found, expected, pairs):
@@ -61,20 +60,20 @@ def assert_same(found, expected, pairs):
 def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution, friction):
     joint = mixed_joint(resolution, friction=friction)
     values, history = predicted(joint)
-    together = march_law(joint, values, history)
+    together = joint.law.march(values, history)
     assert {SEPARATED, STICK, SLIP} <= set(together.status_t[FREE].ravel())
     elastic = [0, 2, 5]
     assert {STICK, SLIP} <= set(together.status_t[elastic].ravel())
-    force_tangent, slip_tangent = law_tangent(joint, together)
+    force_tangent, slip_tangent = joint.law.tangent(together)
     groups = [FREE, elastic, *([pair] for pair in range(6))]
     for pairs in groups:
         part = of_pairs(joint, pairs)
-        alone = march_law(part, values[pairs], history[pairs])
+        alone = part.law.march(values[pairs], history[pairs])
         assert_same(together, alone, pairs)
-        its_force_tangent, its_slip_tangent = law_tangent(part, alone)
+        its_force_tangent, its_slip_tangent = part.law.tangent(alone)
         assert force_tangent[pairs] == pytest.approx(its_force_tangent, abs=1e-11)
         assert slip_tangent[pairs] == pytest.approx(its_slip_tangent, abs=1e-11 * np.abs(slip_tangent).max())
-    largest_error = max(march_law(of_pairs(joint, [p]), values[[p]], history[[p]]).periodicity_error for p in range(6))
+    largest_error = max(of_pairs(joint, [p]).law.march(values[[p]], history[[p]]).periodicity_error for p in range(6))
     assert together.periodicity_error == pytest.approx(largest_error, rel=1e-3, abs=1e-9 * PRELOAD)
 
 
@@ -84,11 +83,11 @@ def test_the_motion_of_a_joint_is_that_of_the_march(resolution):
     joint = mixed_joint(resolution)
     values, history = predicted(joint)
     values[:, 1:, 0] = 0.0
-    found = march_law(joint, values, history)
-    moved = joint.motion(values - found.force_h)
+    found = joint.law.march(values, history)
+    moved = joint.law.motion(values - found.force_h)
     for pair in FREE:
-        velocity_t = np.diff(found.state_t[pair]) / joint.sample_step  # means over the steps
-        velocity_h = (velocity_t @ joint.basis.analysis) / joint.step_mean_factor()
+        velocity_t = np.diff(found.state_t[pair]) / joint.law.sample_step  # means over the steps
+        velocity_h = (velocity_t @ joint.basis.analysis) / joint.basis.step_mean
         expected = np.empty_like(velocity_h[:, 1:])
         rates = OMEGA * np.array(joint.basis.orders)
         expected[:, 0::2], expected[:, 1::2] = -velocity_h[:, 2::2] / rates, velocity_h[:, 1::2] / rates

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from solver import Outcome, SolverSettings, backbone, build_model, frequency_response
-from solver.contact.alternating_frequency_time import friction_work
 from solver.modes.points import follow_mode
-from solver.structure.condensation import condense, relative_indices
+from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import to_complex
 from tests.solver.models import cyclic_model, dovetail, scene
 
@@ -160,20 +159,18 @@ def energies(problem, state):
     force = to_complex(joint.to_relative(at.force_h))
     fed, taken = 0.0, 0.0
     for place, order in enumerate(joint.basis.orders):
-        linear, folded = model.harmonic_structure(order)
-        mass, drag, elastic = (
-            np.conj(part) if folded else part for part in (linear.mass, linear.damping, linear.stiffness)
-        )
+        linear = model.harmonic_structure(order)
+        mass, drag = linear.mass, linear.damping
         rate = order * omega
         left = drag - 2.0 * state.damping_ratio * omega * mass
-        full = elastic + 1j * rate * left - rate**2 * mass
-        free = condense(full, relative, np.zeros(len(mass), complex)).motion @ moved[:, place]
+        none = np.zeros(len(mass), complex)
+        free = whole_motion(replace(linear, damping=left), 1j * rate, relative, none, moved[:, place])
         x = state.shape if order == 1 else free
         fed += np.pi * order * rate * 2.0 * state.damping_ratio * omega * float(np.vdot(x, mass @ x).real)
         taken += np.pi * order * rate * float(np.vdot(x, drag @ x).real)
         taken += np.pi * order * float(np.imag(np.vdot(moved[:, place], force[:, place])))
     # the slip of the samples takes what the series of the balance does
-    friction = float(friction_work(joint, at).sum())
+    friction = float(joint.law.friction_work(at).sum())
     contact = float(np.pi * (np.imag(moved.conj() * force) * np.array(joint.basis.orders)).sum())
     assert friction == pytest.approx(contact, rel=1e-2, abs=1e-9 * taken)
     return fed, taken

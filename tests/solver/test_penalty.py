@@ -53,12 +53,12 @@ def test_motion_and_surplus_of_a_joint_are_inverse(free, orders):
     assert np.flatnonzero(penalty.inertial).tolist() == free
     joint = case.joint(OMEGA, 60.0)
     correction = np.random.default_rng(5).normal(size=(3, 3, 2 * len(orders) + 1))
-    motion = joint.motion(correction)
-    assert joint.force_correction(motion) == pytest.approx(correction, abs=1e-12)
+    motion = joint.law.motion(correction)
+    assert joint.law.force(motion) == pytest.approx(correction, abs=1e-12)
     several = np.random.default_rng(6).normal(size=(*correction.shape, 4))
-    together = joint.motion(several)
+    together = joint.law.motion(several)
     for column in range(4):
-        alone = joint.motion(several[..., column])
+        alone = joint.law.motion(several[..., column])
         assert together[..., column] == pytest.approx(alone, rel=1e-13, abs=1e-13 * np.abs(alone).max())
     for pair in range(3):
         assert motion[pair, 0] == pytest.approx(correction[pair, 0] / penalty.normal[pair], rel=1e-12, abs=0.0)
@@ -73,11 +73,11 @@ def test_the_motion_of_a_marched_mass_is_that_of_newtons_law_as_the_steps_get_sh
         case = build_case(model, 0.4, OMEGA, SolverSettings(), Resolution((1, 3, 5), samples))
         joint, penalty = case.joint(OMEGA, 60.0), case.penalty
         correction = np.random.default_rng(5).normal(size=(1, 3, 7))
-        moved, force = to_complex(joint.motion(correction))[0, 1], to_complex(correction)[0, 1]
+        moved, force = to_complex(joint.law.motion(correction))[0, 1], to_complex(correction)[0, 1]
         rates = 1j * OMEGA * np.array([1, 3, 5])
         exact = force / (rates * (rates * penalty.mass[0] + penalty.drag[0]))
         errors.append(np.abs(moved / exact - 1.0).max())
-        assert joint.motion(correction)[0, 1, 0] == pytest.approx(correction[0, 1, 0] / penalty.mean[0], rel=1e-12)
+        assert joint.law.motion(correction)[0, 1, 0] == pytest.approx(correction[0, 1, 0] / penalty.mean[0], rel=1e-12)
     # the trapezoidal rule: its error falls with the square of the step
     assert errors[0] < 0.1
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)

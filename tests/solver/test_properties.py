@@ -74,7 +74,7 @@ def largest_force(evaluation):
 def elastic_work(joint, evaluation):
     """Contact forces times what they flex the pairs by, J."""
     force = joint.to_relative(evaluation.force_h)
-    flexed = joint.to_relative(joint.motion(evaluation.force_h))
+    flexed = joint.to_relative(joint.law.motion(evaluation.force_h))
     return float((np.linalg.norm(force[:, 1:], axis=1) * np.linalg.norm(flexed[:, 1:], axis=1)).sum())
 
 
@@ -106,7 +106,7 @@ def test_signorini(seed):
     assert (np.abs(at.predicted_t[:, 0] - at.force_t[:, 0])[closed] <= 1e-12 * size).all()
     assert (at.predicted_t[:, 0][~closed] <= 0.0).all()
     assert not at.force_t.transpose(0, 2, 1)[~closed].any()
-    constant = ~joint.has_normal
+    constant = ~joint.contact.has_normal
     assert (at.force_t[constant, 0] == joint.contact.normal_load[constant, None]).all()
 
 

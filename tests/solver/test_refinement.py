@@ -38,7 +38,7 @@ def slider(settings, force=10.0):
 def solved_at(case, omega, amplitude, point, resolution):
     """The same state with other harmonics and samples, which must be found."""
     other = case.at(resolution)
-    balance, start = transfer(other, other.joint(omega, amplitude), point.evaluation, case.resolution.orders)
+    balance, start = transfer(case, other.joint(omega, amplitude), point.evaluation)
     result = Run(case.settings.tolerance).solve(balance, start, 60)
     assert result.converged
     return State(result.evaluation, final_history(balance, result.evaluation), point.parameter)

@@ -9,6 +9,7 @@ from solver.results.resonance import resonance_frequency
 from solver.settings import Resolution, SolverSettings, WearTarget, all_orders
 from solver.structure.fourier import to_complex
 from tests.solver.models import dovetail, random_balance, random_model
+from tests.solver.reconstruction import harmonic_structure
 
 MASS = np.diag([0.05, 0.05, 0.2])
 FREQUENCY, AMPLITUDE, FRICTION, WEAR, END = 505.0, 5.0, 0.5, 1.1e-11, 1e5
@@ -44,11 +45,9 @@ def test_it_is_that_of_the_equation_of_motion(nodal_diameter):
         model = dovetail(3, nodal_diameter)
         balance, predicted = random_balance(model, settings, 3, wear=False, resolution=resolution)
     joint, at = balance.joint, balance.evaluate(predicted)
-    linear, conjugate = joint.model.harmonic_structure(1)
-    mass, damping, stiffness, load = (
-        np.conj(part) if conjugate else part
-        for part in (linear.mass, linear.damping, linear.stiffness, joint.excitation_amplitude * linear.load_harmonic)
-    )
+    linear = harmonic_structure(joint.model, 1)
+    mass, damping, stiffness = linear.mass, linear.damping, linear.stiffness
+    load = joint.excitation_amplitude * linear.load_harmonic
     relative = joint.model.contact.dofs.ravel()[joint.component_index]
     # the motion of the pairs is given, what holds them is found with it
     n, n_rel = len(load), relative.size

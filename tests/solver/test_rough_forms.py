@@ -19,7 +19,7 @@ ORDERS = tuple(range(1, 14))
 @pytest.fixture
 def shared(monkeypatch):
     """Even small structures share their matrices."""
-    monkeypatch.setattr(condensation, "STRUCTURE", replace(STRUCTURE, dense_bytes=0.0))
+    monkeypatch.setattr(condensation, "DENSE_BYTES", 0.0)
 
 
 def structure_of(linear):

@@ -79,7 +79,7 @@ def test_where_everything_sticks_there_is_no_slip_space():
     balance, predicted = case(9, wear=False)
     pressed = predicted.copy()
     pressed[balance.joint.component_index % 3 == 0, 0] += 1e4 * PRELOAD
-    constant = ~balance.joint.has_normal[balance.joint.component_index // 3]
+    constant = ~balance.joint.contact.has_normal[balance.joint.component_index // 3]
     pressed[constant] = 0.0
     tangent = tangent_of(balance, pressed)
     space = find_slip_space(tangent, MANY)

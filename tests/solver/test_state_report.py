@@ -10,7 +10,7 @@ from solver.accuracy.certificate import certify
 from solver.continuation.static_state import solve_static_state
 from solver.newton.run import Run
 from solver.results.state_report import periodic_state, report_state
-from solver.settings import RESOLUTION, SolverSettings, all_orders
+from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
 from solver.structure.joint import build_case
 from tests.solver.contact_twin import pair_period, status
@@ -146,7 +146,7 @@ def test_the_report_is_that_of_the_time_signals(kinds):
     motion = full_motion(model, state)
     assert report.response == pytest.approx(motion.response(), rel=1e-8, abs=0.0)
     static = np.real(model.linear[0].response @ motion.displacement[0])
-    phase = 2 * np.pi * np.arange(RESOLUTION.fine_samples) / RESOLUTION.fine_samples
+    phase = 2 * np.pi * np.arange(FINE_SAMPLES) / FINE_SAMPLES
     waves = sum(np.real(motion.response(n)[:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
     assert report.response_peak == pytest.approx(np.abs(static[:, None] + waves).max(axis=1), rel=1e-8, abs=0.0)
     assert report.mean_pressure == pytest.approx(

@@ -17,6 +17,7 @@ from solver.stability.multipliers import Multipliers
 from tests.event_driven import close_orbit
 from tests.references import vibro_impact_orbit
 from tests.solver.models import OMEGA, cyclic_model, random_model, scene
+from tests.solver.reconstruction import harmonic_structure
 from tests.solver.test_natural import GRAZING, WALL_OMEGA
 
 SETTINGS = SolverSettings(harmonics=19, samples=256)
@@ -67,11 +68,8 @@ def test_all_coefficients_obey_the_equation_of_motion(kind):
         balance = balance_of(model, OMEGA / (2.0 * np.pi), 40.0, 0.4, settings=SolverSettings(harmonics=3, samples=64))
     motion, dofs = balance.motion(), model.contact.dofs
     for place, order in enumerate(motion.orders.tolist()):
-        linear, folded = model.harmonic_structure(order)
-        mass, damping, stiffness, harmonic = (
-            np.conj(part) if folded else part
-            for part in (linear.mass, linear.damping, linear.stiffness, linear.load_harmonic)
-        )
+        linear = harmonic_structure(model, order)
+        mass, damping, stiffness, harmonic = linear.mass, linear.damping, linear.stiffness, linear.load_harmonic
         if order == 0:
             stiffness = stiffness.real
         rate = 2j * np.pi * order * motion.frequency

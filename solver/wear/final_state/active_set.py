@@ -82,7 +82,7 @@ def wear_off(work: WearingJoint, state: WearState, unworn: FloatArray, off: Bool
         if not begin.any() and (n_rounds > 0 or not off.any()):
             return WornOff(state, off, n_rounds)
         joint = work.at(state)
-        if not joint.has_normal[begin].all():
+        if not joint.contact.has_normal[begin].all():
             raise NoActiveSetError("pairs slip whose normal force no wear changes")
         off, n_rounds = off | begin, n_rounds + 1
         point = without(work, state, unworn, off)

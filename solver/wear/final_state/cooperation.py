@@ -23,7 +23,6 @@ from dataclasses import replace
 import numpy as np
 
 from solver.accuracy.options import ACCURACY
-from solver.contact.alternating_frequency_time import law_tangent
 from solver.contact.wear_law import WearingWork
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
@@ -44,7 +43,7 @@ def work_slopes(joint: Joint, at: Evaluation, wearing: WearingWork, run: Run, pa
     displacements. The dependence of a tabulated wear law itself on the depth is neglected.
     """
     tangent = Balance.frozen(joint, at.history, at.wear_depth).linearise(at)
-    force_tangent, slip_work_tangent = law_tangent(joint, at)
+    force_tangent, slip_work_tangent = joint.law.tangent(at)
     by_work, by_force, _ = wearing.slopes(*worn_by(at))
     row = by_work[:, None] * slip_work_tangent + by_force[:, None] * force_tangent[:, 0, :]
     found = np.zeros((joint.contact.n_contact, pairs.size))

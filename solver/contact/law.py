@@ -1,0 +1,335 @@
+"""The contact law of all pairs of a joint through one period, its exact derivative, and the motion that goes with it.
+
+Alternating frequency-time method: predicted force to samples, contact law, contact force back to harmonics. Two kinds
+of pairs stand behind the methods of `ContactLaw`. `solver.structure.penalty` chooses the kind, no other room asks:
+
+- *elastic* pairs, at displacement level: Eqs. (9)-(15), motion `(p - lambda) / eps` (`period_march`);
+- *inertial* pairs, masses that sit directly on rigid ground: motion by Newton's law (`rigid_slider`). Their tangential
+  state is a displacement, m, where that of elastic pairs is a force, N.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_limit, mean_normal_force, mean_normal_tangent
+from solver.contact.period_march import MOST_PERIODS, integrate_slip_work, march_period
+from solver.contact.rigid_slider import Masses, march_masses
+from solver.contact.tangent import march_tangent, mass_tangent
+from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
+from solver.options import COMMON
+
+if TYPE_CHECKING:
+    from solver.structure.fourier import FourierBasis
+    from solver.structure.penalty import Penalty
+
+Chosen = slice | BoolArray
+"""Pairs of one kind."""
+
+
+@dataclass(frozen=True)
+class Marched:
+    """Contact forces and states of the pairs under a predicted force, at N samples.
+
+    - predicted_t (n_contact, 3, N): predicted force, N; tangential ones of inertial pairs as means over the steps.
+    - force_t (n_contact, 3, N): contact force, N, compression positive; means for inertial pairs as in predicted_t.
+    - force_h (n_contact, 3, m): harmonics of the contact force, N.
+    - state_t (n_contact, 2, N+1): tangential state, N, beginning with the start of the period; for inertial pairs the
+      displacement, m.
+    - start (n_contact, 2): tangential state at the start of the first period, N; for inertial pairs the velocity at the
+      start of the last period, m/s.
+    - status_t (n_contact, N): SEPARATED, STICK or SLIP.
+    - periods (n_contact,): number of periods that were marched.
+    - periodicity_error: change of the tangential state over the last period, N.
+    - slip_work (n_contact,): integral of normal force times slip distance over a period, J. Archard's wear is
+      proportional to this integral, which is no work of a force (`solver.contact.archard`).
+    """
+
+    predicted_t: FloatArray
+    force_t: FloatArray
+    force_h: FloatArray
+    state_t: FloatArray
+    start: FloatArray
+    status_t: IntArray
+    periods: IntArray
+    periodicity_error: float
+    slip_work: FloatArray
+
+
+@dataclass(frozen=True)
+class ContactLaw:
+    """The law of the pairs of a joint at one frequency: predicted force to contact force, motion and history.
+
+    - penalty: penalties and masses of the pairs.
+    - friction_coefficient (n_contact,): for each pair.
+    - contact: the pairs.
+    - basis: Fourier basis.
+    - omega: rad/s.
+
+    Harmonics are on the axis of length m = 2H+1.
+    """
+
+    penalty: Penalty
+    friction_coefficient: FloatArray
+    contact: ContactInterface
+    basis: FourierBasis
+    omega: float
+
+    @property
+    def sample_step(self) -> float:
+        """Time between two samples, s."""
+        return 2.0 * np.pi / (self.omega * self.basis.n_samples)
+
+    @cached_property
+    def rate_dependent(self) -> bool:
+        """Whether the law depends on velocities, and so on the frequency: where masses sit on rigid ground."""
+        return bool(self.penalty.inertial.any())
+
+    # --- forces ---
+
+    def march(self, predicted_h: FloatArray, history: FloatArray) -> Marched:
+        """March all pairs through the period.
+
+        predicted_h (n_contact, 3, m): predicted force, N. history (n_contact, 2): tangential history, m.
+        """
+        basis, masses = self.basis, self.penalty.inertial
+        predicted_t = predicted_h @ basis.synthesis
+        if self.rate_dependent:
+            predicted_t[masses, 1:] = (predicted_h[masses, 1:] * basis.step_mean) @ basis.synthesis
+        force_t, state_t, start, status_t, periods, error, slip_work = self._march_kinds(predicted_t, history)
+        force_h = force_t @ basis.analysis
+        if self.rate_dependent:
+            force_h[masses, 1:] /= basis.step_mean
+        force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
+        change = float(error.max(initial=0.0))
+        return Marched(predicted_t, force_t, force_h, state_t, start, status_t, periods, change, slip_work)
+
+    def _march_kinds(self, predicted_t: FloatArray, history: FloatArray) -> list[np.ndarray]:
+        masses = self.penalty.inertial
+        if not self.rate_dependent:
+            return self._march_elastic(slice(None), predicted_t, history)
+        if masses.all():
+            return self._march_masses(slice(None), predicted_t)
+        found = []
+        elastic = self._march_elastic(~masses, predicted_t, history)
+        for one, other in zip(elastic, self._march_masses(masses, predicted_t), strict=True):
+            both = np.empty((masses.size, *one.shape[1:]), one.dtype)
+            both[~masses], both[masses] = one, other
+            found.append(both)
+        return found
+
+    def _march_elastic(self, pairs: Chosen, predicted_t: FloatArray, history: FloatArray) -> list[np.ndarray]:
+        friction, stiffness = self.friction_coefficient, self.penalty.tangential[pairs]
+        limit = friction_limit(friction, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
+        # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
+        periodicity = 0.1 * COMMON.round_off * float(limit.max(initial=0.0))
+        start = history[pairs] * stiffness[:, None]
+        force_t, state_t, status_t, periods, error = march_period(
+            predicted_t[pairs], friction[pairs], start, periodicity, MOST_PERIODS
+        )
+        return [force_t, state_t, start, status_t, periods, error, integrate_slip_work(force_t, state_t) / stiffness]
+
+    def _march_masses(self, pairs: Chosen, predicted_t: FloatArray) -> list[np.ndarray]:
+        force_t, velocity_t, place_t, status_t, slip_work, error = march_masses(
+            predicted_t[pairs], self.friction_coefficient[pairs], self._masses(pairs), self.sample_step
+        )
+        once = np.ones(len(force_t), np.int64)
+        return [force_t, place_t, velocity_t[:, :, 0], status_t, once, error, slip_work]
+
+    def _masses(self, pairs: Chosen | IntArray) -> Masses:
+        return self.penalty.mass[pairs], self.penalty.drag[pairs], self.contact.line[pairs]
+
+    def friction_work(self, at: Marched) -> FloatArray:
+        """Work that friction dissipates in a period (n_contact,), J. Friction is at its limit during slip."""
+        return friction_limit(self.friction_coefficient, at.slip_work)
+
+    def tangent(self, at: Marched) -> tuple[FloatArray, FloatArray]:
+        """Exact derivatives with respect to the harmonics of the predicted force of each pair, with the periodicity.
+
+        Returns the derivatives of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the
+        slip work (n_contact, 3m), m. Tangential displacements that do not exist count as sticking.
+        """
+        contact, basis, m = self.contact, self.basis, self.basis.synthesis.shape[0]
+        n_contact, masses = contact.n_contact, self.penalty.inertial
+        tangent, work_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
+        # a pair that sticks during the whole period transmits the predicted force, an open pair transmits nothing; but
+        # the start of a period that was marched more than once may depend on the force
+        stuck = (at.status_t == STICK).all(axis=1) & (at.periods == 1)
+        switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
+        slides = switching & (contact.dofs[:, 1:] >= 0).any(axis=1)
+        elastic, inertial = np.flatnonzero(slides & ~masses), np.flatnonzero(slides & masses)
+        if elastic.size:
+            tangent[elastic], work_tangent[elastic] = march_tangent(
+                at.predicted_t[elastic],
+                self.friction_coefficient[elastic],
+                at.start[elastic],
+                at.state_t[elastic],
+                at.periods[elastic],
+                contact.line[elastic],
+                contact.has_normal[elastic],
+                (basis.synthesis, basis.analysis),
+            )
+            work_tangent[elastic] /= self.penalty.tangential[elastic, None]
+        if inertial.size:
+            tangent[inertial], work_tangent[inertial] = mass_tangent(
+                at.predicted_t[inertial],
+                self.friction_coefficient[inertial],
+                self._masses(inertial),
+                self.sample_step,
+                at.start[inertial],
+                contact.has_normal[inertial],
+                (basis.synthesis, basis.synthesis * basis.step_mean[:, None], basis.analysis / basis.step_mean),
+            )
+        normal = np.flatnonzero(contact.has_normal & switching)
+        if normal.size:
+            tangent[normal, :m, :m] = mean_normal_tangent(
+                at.predicted_t[normal], basis.synthesis, basis.analysis, contact.has_normal[normal]
+            )
+        passes = stuck[:, None] | (contact.dofs < 0)
+        passes[:, 0] = stuck & contact.has_normal
+        pair, component = np.nonzero(passes)
+        own = m * component[:, None] + np.arange(m)
+        tangent[pair[:, None], own, own] = 1.0
+        return tangent, work_tangent
+
+    # --- motion ---
+
+    def motion(self, correction: FloatArray) -> FloatArray:
+        """Motion (n_contact, 3, m, ...), m, from predicted less contact force, N, of equal shape.
+
+        A linear map: Eq. (12) divided by the penalty; Newton's law for inertial pairs. Means are relative to `origin`.
+        """
+        shape, masses = (-1,) + (1,) * (correction.ndim - 2), self.penalty.inertial
+        moved = np.empty_like(correction)
+        moved[:, 0] = correction[:, 0] / self.penalty.normal.reshape(shape)
+        moved[:, 1:] = correction[:, 1:] / self.penalty.tangential.reshape((*shape, 1))
+        if self.rate_dependent and self.basis.orders:
+            moved[masses, 1:] = _scaled(correction[masses, 1:], 1.0 / self.penalty.mean[masses], self._compliance)
+        return moved
+
+    def force(self, motion: FloatArray) -> FloatArray:
+        """Predicted less contact force (n_contact, 3, m), N, of a motion, m, Eqs. (10), (12); undoes `motion`."""
+        penalty, masses = self.penalty, self.penalty.inertial
+        force = motion * np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)[:, :, None]
+        if self.rate_dependent and self.basis.orders:
+            force[masses, 1:] = _scaled(motion[masses, 1:], penalty.mean[masses], 1.0 / self._compliance)
+        return force
+
+    @cached_property
+    def _compliance(self) -> ComplexArray:
+        """Displacement per force (n_inertial, H), m/N, of the inertial pairs, exactly as in the steps of the march."""
+        orders = np.array(self.basis.orders, np.float64)
+        angle = np.pi * orders / self.basis.n_samples
+        mass, drag, _ = (part[:, None] for part in self._masses(self.penalty.inertial))
+        impedance = 2j * mass * np.sin(angle) / self.sample_step + drag * np.cos(angle)
+        return np.asarray(np.sin(angle) / angle / (1j * self.omega * orders * impedance))
+
+    def origin(self, history: FloatArray) -> FloatArray:
+        """Mean tangential position (n_contact, 2), m, at which no mean force acts: the history of inertial pairs."""
+        return np.where(self.penalty.inertial[:, None], history, 0.0)
+
+    # --- tangential history (n_contact, 2), m: corrected slip X_T of elastic pairs, mean position of inertial pairs ---
+
+    @property
+    def state_stiffness(self) -> FloatArray:
+        """Tangential state over slip (n_contact,), N/m; 1 for inertial pairs, whose state is the displacement."""
+        return np.where(self.penalty.inertial, 1.0, self.penalty.tangential)
+
+    def final_history(self, at: Marched, displacement_h: FloatArray) -> FloatArray:
+        """Tangential history that a state with the motion `displacement_h` (n_contact, 3, m), m, leaves."""
+        at_end = at.state_t[:, :, -1] / self.state_stiffness[:, None]
+        return np.where(self.penalty.inertial[:, None], displacement_h[:, 1:, 0], at_end)
+
+    def middle_history(self, at: Marched, history: FloatArray) -> FloatArray:
+        """The history with the middle of the slip in the closed samples for the elastic pairs that slip."""
+        slips = (at.status_t == SLIP).any(axis=1) & ~self.penalty.inertial
+        closed, slip = (at.status_t[slips] != SEPARATED)[:, None, :], at.state_t[slips, :, 1:]
+        low, high = np.where(closed, slip, np.inf).min(axis=2), np.where(closed, slip, -np.inf).max(axis=2)
+        middle = history.copy()
+        middle[slips] = 0.5 * (low + high) / self.penalty.tangential[slips, None]
+        return middle
+
+    def history_along(
+        self, history: FloatArray, pairs: BoolArray, first: FloatArray, last: FloatArray, parts: FloatArray
+    ) -> FloatArray:
+        """The history after a march at each of some `parts` of the way between two predicted forces.
+
+        pairs (n_contact,): pairs that are marched; inertial ones keep their history. first, last (n_contact, 3, N), N.
+        """
+        moving, found = pairs & ~self.penalty.inertial, history.copy()
+        if moving.any():
+            first, last = first[moving], last[moving]
+            friction, stiffness = self.friction_coefficient[moving], self.penalty.tangential[moving, None]
+            periodicity = COMMON.round_off * float(friction_limit(friction, last[:, 0].max(axis=1)).max())
+            state = history[moving] * stiffness
+            for part in parts:
+                between = first + part * (last - first)
+                state = march_period(between, friction, state, periodicity, MOST_PERIODS)[1][:, :, -1]
+            found[moving] = state / stiffness
+        return found
+
+    def history_from(self, other: Penalty, history: FloatArray, mean: FloatArray, last: FloatArray) -> FloatArray:
+        """The history of a state with another penalty.
+
+        A pair that becomes inertial begins at its mean position `mean` (n_contact, 2), m, one that becomes elastic at
+        its position `last` at the end of the period, which equals the corrected slip.
+        """
+        masses = self.penalty.inertial
+        changed = np.where(masses[:, None], mean, last)
+        return np.where((other.inertial == masses)[:, None], history, changed)
+
+    # --- what masses on rigid ground have beside a periodic motion: ratcheting, and harmonics above the highest one ---
+
+    def drift(self, at: Marched) -> FloatArray:
+        """Distance (n_contact, 2), m, by which the inertial pairs move on in a period; 0 for elastic pairs."""
+        return np.where(self.penalty.inertial[:, None], at.state_t[:, :, -1] - at.state_t[:, :, 0], 0.0)
+
+    def change_force(self, at: Marched) -> FloatArray:
+        """Change of the tangential state over the last period (n_contact,), N; of a drift the mean force of drag."""
+        change = np.hypot(*(at.state_t[:, :, -1] - at.state_t[:, :, 0]).T)
+        drag = self.penalty.drag * self.omega / (2.0 * np.pi)
+        return np.asarray(np.where(self.penalty.inertial, drag, 1.0) * change)
+
+    def driving_force(self, at: Marched) -> float:
+        """Largest force, N, that drives a sliding mass; 0 without masses."""
+        return float(np.abs(at.predicted_t[self.penalty.inertial, 1:]).max(initial=0.0))
+
+    def tail(self, at: Marched, basis: FourierBasis) -> FloatArray:
+        """Friction on masses in other harmonics (n_contact, 3, 2k+1), N, from its samples; 0 for elastic pairs.
+
+        The friction force jumps where a mass turns, so that its harmonics fall slowly.
+        """
+        masses = self.penalty.inertial
+        force_h = np.zeros((masses.size, 3, basis.analysis.shape[1]))
+        force_h[masses, 1:] = at.force_t[masses, 1:] @ basis.analysis / basis.step_mean
+        return force_h
+
+    def beyond_series(self, at: Marched, displacement_h: FloatArray) -> FloatArray:
+        """Tangential motion (n_contact, 2, N), m, that the march adds to the series, half a step before each sample.
+
+        A mass moves with all harmonics, of which the series `displacement_h` (n_contact, 3, m), m, has the lowest; 0
+        for elastic pairs. The march begins at an arbitrary position, so that the mean comes from the series.
+        """
+        n_samples, masses = self.basis.n_samples, self.penalty.inertial
+        beyond = np.zeros((masses.size, 2, n_samples))
+        if self.rate_dependent:
+            ends = self.basis.at(2.0 * np.pi * (np.arange(n_samples) - 0.5) / n_samples)
+            beyond[masses] = at.state_t[masses, :, :-1] - displacement_h[masses, 1:] @ ends
+            beyond -= beyond.mean(axis=2, keepdims=True)
+        return beyond
+
+
+def _scaled(values_h: FloatArray, mean: FloatArray, factor: ComplexArray) -> FloatArray:
+    """Series (k, 2, m, ...) with their means times `mean` (k,) and their complex amplitudes times `factor` (k, H)."""
+    tail = (1,) * (values_h.ndim - 3)
+    real, imaginary = (part.reshape(len(factor), 1, -1, *tail) for part in (factor.real, factor.imag))
+    cosine, sine = values_h[:, :, 1::2], values_h[:, :, 2::2]
+    scaled = np.empty_like(values_h)
+    scaled[:, :, 0] = values_h[:, :, 0] * mean.reshape(-1, 1, *tail)
+    # a complex amplitude is cosine - i sine
+    scaled[:, :, 1::2], scaled[:, :, 2::2] = real * cosine + imaginary * sine, real * sine - imaginary * cosine
+    return scaled

@@ -1,0 +1,78 @@
+"""Derivative of the contact law at the samples of a period, for disturbances of a periodic state in time.
+
+Let `p = lambda + x`, with the state `x = eps u` of an elastic pair. Let A be the derivative of x with respect to p, and
+B the derivative with respect to x at the sample before (`coulomb.sample_tangents`). The law of the disturbance is
+
+    (1 - A) eps du - A dlambda = B eps du'.
+
+A mass on a slider has its own steps (`rigid_slider.step_mass`). Their derivatives T include the instants at which the
+mass turns or stops: `dlambda = T_p dp + T_v dv' + T_l mu dlambda_N` with `dp = dlambda + gain dv - loss dv'`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.contact.coulomb import friction_limit, sample_tangents
+from solver.contact.law import ContactLaw, Marched
+from solver.contact.rigid_slider import step_gains, step_mass
+from solver.model import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class SampledLaw:
+    """Derivative of the contact law of the p switching pairs at N samples, in blocks (N, p, 3, 3) of the pairs:
+
+        by_force dlambda + by_motion du + by_speed dv = by_last_motion du' + by_last_speed dv'.
+
+    A prime marks the sample before. Velocities are in m per sample. Displacements that a pair does not have take no
+    force.
+    """
+
+    by_force: FloatArray
+    by_motion: FloatArray
+    by_speed: FloatArray
+    by_last_motion: FloatArray
+    by_last_speed: FloatArray
+
+
+def sampled_law(law: ContactLaw, at: Marched, pairs: IntArray) -> SampledLaw:
+    """Derivative of the contact law of the switching pairs (p,) of a state."""
+    n, penalty = at.status_t.shape[1], law.penalty
+    own, carried = sample_tangents(
+        at.predicted_t, law.friction_coefficient, at.state_t, at.status_t, law.contact.has_normal, 1
+    )
+    eps = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)[pairs, None, :]
+    there = law.contact.dofs[pairs] >= 0
+    # a displacement that does not exist has no disturbance of the force
+    passed = np.where(there[:, :, None] & there[:, None, :], own[:, pairs], -np.eye(3) * ~there[:, :, None])
+    last = np.zeros((n, pairs.size, 3, 3))
+    last[:, :, 1:, 1:] = carried[:, pairs]
+    none = np.zeros_like(last)
+    found = SampledLaw(-passed, (np.eye(3) - passed) * eps, none, last * eps, none.copy())
+    for place in np.flatnonzero(penalty.inertial[pairs]):
+        _take_mass_law(found, int(place), law, at, int(pairs[place]))
+    return found
+
+
+def _take_mass_law(found: SampledLaw, place: int, law: ContactLaw, at: Marched, pair: int) -> None:
+    """Tangential rows of the law of a mass on a slider, in place; `place`: index among the switching pairs."""
+    step, line = law.sample_step, int(law.contact.line[pair])
+    gain, loss = step_gains(law.penalty.mass[pair], law.penalty.drag[pair], step)
+    there = np.array([0, 1]) if line < 0 else np.array([line])
+    rows, friction = 1 + there, float(law.friction_coefficient[pair])
+    for part in (found.by_force, found.by_motion, found.by_last_motion):
+        part[:, place, rows] = 0.0
+    velocity, out, slopes = at.start[pair].copy(), np.empty(7), np.empty((5, 5))
+    for n in range(at.status_t.shape[1]):
+        limit = friction_limit(friction, max(float(at.predicted_t[pair, 0, n]), 0.0))
+        step_mass(at.predicted_t[pair, 1:, n], velocity, limit, gain, loss, line, out, slopes)
+        velocity[:] = out[2:4]
+        by_predicted, by_before = slopes[np.ix_(there, there)], slopes[np.ix_(there, 2 + there)]
+        found.by_force[n, place][np.ix_(rows, rows)] = np.eye(there.size) - by_predicted
+        if law.contact.has_normal[pair] and limit > 0.0:
+            found.by_force[n, place, rows, 0] = -friction * slopes[there, 4]
+        found.by_speed[n, place][np.ix_(rows, rows)] = -gain / step * by_predicted
+        found.by_last_speed[n, place][np.ix_(rows, rows)] = (by_before - loss * by_predicted) / step
