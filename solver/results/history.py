@@ -117,8 +117,6 @@ class WearHistory:
     - inaccurate_in: name of the inaccurate result.
     - inaccurate_error: largest error from `inaccurate_from` on.
     - held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
-    - other_peaks (2,): Hz, another resonance or peak in the range of a followed frequency, at the first and the last
-      state; NaN where there is none.
     - message: addition to the outcome: an unexpected error, the cycle from which on a condition is violated, the error
       reached; empty where there is nothing to add.
     """
@@ -168,4 +166,3 @@ class WearHistory:
     inaccurate_in: str = ""
     inaccurate_error: float = 0.0
     held_from: float = math.inf
-    other_peaks: tuple[float, float] = (math.nan, math.nan)
