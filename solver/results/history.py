@@ -104,8 +104,6 @@ class WearHistory:
     - branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
     - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step_limit`); inf if
       there is no limit.
-    - oscillates: whether the wear rate went up and down from step to step without decay, as in an unstable explicit
-      scheme.
     - final_method: method by which the scheme "final" has found the final state: "active_set" or "march"; empty for the
       other schemes. A final state of an active set has the count inf, and no state between the unworn one and the
       final one is known.
@@ -155,7 +153,6 @@ class WearHistory:
     branch: int = 0
     fold_frequency: float = math.nan
     step_limit: float = math.inf
-    oscillates: bool = False
     final_method: str = ""
     cut_off_cycle: float = math.nan
     message: str = ""

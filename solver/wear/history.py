@@ -13,7 +13,6 @@ from solver.accuracy.history_error import Both, history_error
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.target_error import error_of_wear, target_error
 from solver.model import FloatArray, ReducedModel
-from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.packing import Packed, unpack
 from solver.results.cut_off import first_cut_off
@@ -122,8 +121,6 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
         cycles_to_target_error=_target_error(output, coarse, steps, asked) if ends_at_target else math.nan,
         cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
         step_limit=state.step_limit if state.step_limit > 0.0 else math.inf,
-        # other schemes are stable: only small corners of the wear rate alternate there
-        oscillates=asked.scheme == "explicit" and state.rates.oscillate(COMMON.round_off * state.most_rate),
         inaccurate_from=state.inaccurate_from,
         inaccurate_in="wear rate" if worst.wear_rate >= worst.response else "response",
         inaccurate_error=worst.largest,

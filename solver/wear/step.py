@@ -85,7 +85,7 @@ def _shortened(work: WearingJoint, state: WearState, length: float, balance_at: 
 def _euler(work: WearingJoint, state: WearState, end: Reached, length: float) -> Step:
     """The result of an Euler step."""
     after = work.accepted(state, end, length)
-    change = abs(float(after.rates.value[-1] - state.rates.value[-1]))
+    change = abs(float(after.rates[-1] - state.rates[-1]))
     return Step(after, euler_error(length, change), length)
 
 

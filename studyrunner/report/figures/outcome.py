@@ -1,5 +1,5 @@
 """Where and why points ended as they did, and how right they are: outcomes, certificates, estimated errors, and what to
-beware of: folds and jumps of the branches, steps too long, oscillating wear, unstable states.
+beware of: folds and jumps of the branches, steps too long, unstable states.
 """
 
 from __future__ import annotations
@@ -231,19 +231,18 @@ def list_branches(result: Result) -> Iterator[Table]:
 
 
 def list_stability(result: Result) -> Iterator[Table]:
-    """Points with an explicit step longer than predicted to be stable, an oscillating wear rate, or unstable states."""
-    if not result.has("step_limit", "oscillates"):
+    """Points with an explicit step longer than predicted to be stable, or unstable states."""
+    if not result.has("step_limit"):
         return
     limit = result.read("step_limit").values
     # Points that failed count as in the certificates of the run: a step too long may be why they failed.
-    oscillates = result.read("oscillates").values != 0
-    unstable = np.zeros_like(oscillates)
+    unstable = np.zeros(limit.shape, bool)
     if result.has("stable"):
         unstable = (result.read("stable") == 0).any("cycle").transpose(*result.axes).values & result.computed
     step, explicit = _steps(result)
     too_long = explicit & np.isfinite(limit) & (step > limit)
     rows = []
-    places = np.argwhere(too_long | oscillates | unstable)
+    places = np.argwhere(too_long | unstable)
     for place in places[:_MOST_LISTED]:
         at = tuple(place)
         point = dict(zip(result.axes, map(int, place), strict=True))
@@ -253,19 +252,18 @@ def list_stability(result: Result) -> Iterator[Table]:
                 show_number(float(step[at]), 4) if np.isfinite(step[at]) else "",
                 show_number(float(limit[at]), 3) if explicit[at] and np.isfinite(limit[at]) else "",
                 "yes" if too_long[at] else "",
-                "yes" if oscillates[at] else "",
                 "yes" if unstable[at] else "",
             )
         )
     if rows:
-        counts = [int(np.count_nonzero(what)) for what in (too_long, oscillates, unstable)]
+        counts = [int(np.count_nonzero(what)) for what in (too_long, unstable)]
         note = as_sentences(
-            f"{count(counts[0], 'point')} with an explicit step longer than step_limit, {counts[1]} with a wear rate"
-            f" that oscillates from step to step, {counts[2]} with unstable states",
-            _advise_steps(result, too_long | oscillates),
+            f"{count(counts[0], 'point')} with an explicit step longer than step_limit, {counts[1]} with"
+            f" unstable states",
+            _advise_steps(result, too_long),
             _tell_rest(len(places)),
         )
-        columns = ("point", "step (cycles)", "step_limit (cycles)", "step too long", "oscillates", "unstable states")
+        columns = ("point", "step (cycles)", "step_limit (cycles)", "step too long", "unstable states")
         yield Table("stability", "Stability in slow time", columns, tuple(rows), note)
 
 
@@ -273,7 +271,7 @@ def _advise_steps(result: Result, where: NDArray[np.bool_]) -> str:
     """What may help the first of these points, whose steps are too long."""
     if not where.any():
         return ""
-    return f"Against the first two: {advise_steps(settings_of(result, tuple(np.argwhere(where)[0].tolist())))}"
+    return f"Against the first: {advise_steps(settings_of(result, tuple(np.argwhere(where)[0].tolist())))}"
 
 
 def _steps(result: Result) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

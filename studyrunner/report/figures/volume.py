@@ -33,7 +33,6 @@ from studyrunner.system.progress import count
 _MOST_LINES = 6
 _MOST_MAPS = 4
 _MANY_CELLS = 300
-_SEEN = 1e-3
 
 
 def draw_volumes(result: Result) -> Iterator[Drawing | Missing]:
@@ -284,7 +283,6 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
     care = mark_care(result, panel, course, choice, reached, scale)
     # bars that leave the points too little room are cut
     set_from_zero(panel, scale(max(largest, min(bars, 2.0 * largest))).item())
-    n_oscillating = _mark_oscillating(result, course, choice, panel, fields, scale, _SEEN * largest)
     n_failed = mark_failed(panel, course.values, failed)
     course.set_axis(panel)
     panel.set_ylabel(scale.label(f"worn volume {_when(result)}"))
@@ -294,36 +292,11 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
         f"Worn volume {_when(result)} over {course.name}",
         f"The largest is {scale.show(largest, 4)}{_where_last(result, course, choice, reached)}",
         f"Crosses: at these, {count(n_failed, 'point')} in all without a result" if n_failed else "",
-        f"Rings: {count(n_oscillating, 'point')} whose wear rate oscillates from step to step" if n_oscillating else "",
         "Bars: estimated error" if bars > 0.0 else "",
         *care,
         choice.sentence,
     )
     return Drawing("final_worn_volume", f"Final worn volume over {course.name}", caption, figure)
-
-
-def _mark_oscillating(
-    result: Result,
-    course: Course,
-    choice: Choice,
-    panel: Axes,
-    fields: list[NDArray[np.float64]],
-    scale: Scale,
-    least: float,
-) -> int:
-    """Rings around points whose wear rate oscillates and that have worn more than `least`; how many these are."""
-    if not result.has("oscillates"):
-        return 0
-    x, y = [], []
-    for point, field in zip(choice.points, fields, strict=True):
-        ringed = (course.read(result, "oscillates", point) != 0) & (field[:, 0] > least)
-        x.extend(course.values[ringed].tolist())
-        y.extend(scale(field[ringed, 0]).tolist())
-    if x:
-        panel.plot(
-            x, y, linestyle="none", marker="o", markersize=10, markerfacecolor="none", color="black", label="oscillates"
-        )
-    return len(x)
 
 
 def _where_last(result: Result, course: Course, choice: Choice, fields: list[NDArray[np.float64]]) -> str:

@@ -14,7 +14,7 @@ from studyrunner.report.precision.errors import FloatArray, Point
 from studyrunner.report.precision.settings import KEYS, list_settings, varying_keys
 from studyrunner.report.reading.result import Result
 
-_NUMBERS = ("run_time", "error_estimate", "step_limit", "oscillates")
+_NUMBERS = ("run_time", "error_estimate", "step_limit")
 _LAST_NUMBERS = ("response_error", "harmonics_used", "samples_used")
 
 
@@ -81,7 +81,6 @@ def _read_points(result: Result) -> Iterator[Point]:
     courses, amplitudes = [len(result.cycles)], [len(result.cycles), len(result.responses)]
     values = {name: read(name) for name in _NUMBERS}
     values |= {name: read(name, *courses)[..., -1] for name in _LAST_NUMBERS}
-    values["oscillates"] = np.nan_to_num(values["oscillates"])
     values["worn_volume"] = read("worn_volume", *courses)
     values["response_amplitude"] = read("response_amplitude", *amplitudes)
     rtol = [each.rtol or result.study_number("solver", "rtol") for each in settings]

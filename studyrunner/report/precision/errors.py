@@ -60,7 +60,7 @@ class Point:
     label: the point in words, empty where nothing but settings varies. cycles: at the end. settings: with their rows in
     `computed` and `values`, the same at all points. computed (n_setting,): whether to the last cycle. values
     (n_setting, more): `run_time` in CPU seconds, `error_estimate` and `response_error` relative, `harmonics_used` and
-    `samples_used` by the last state, `step_limit` in cycles, `rtol` in effect, `oscillates` 0 or 1, `worn_volume`
+    `samples_used` by the last state, `step_limit` in cycles, `rtol` in effect, `worn_volume`
     (n_setting, n_cycle) in m3 and `response_amplitude` (n_setting, n_cycle, n_response) in m; NaN where the file does
     not say. failures: words of the outcomes of what was not computed. exact: the exact worn volume and amplitude, None
     where the file holds none.
@@ -79,14 +79,9 @@ class Point:
         """Settings that were computed to the last cycle."""
         return [setting for setting, row in self.settings.items() if self.computed[row]]
 
-    @property
-    def steady(self) -> list[Setting]:
-        """Of them, those whose wear rate does not oscillate; all where it does in each."""
-        return [each for each in self.results if not self.number("oscillates", each)] or self.results
-
     @cached_property
     def finest(self) -> Setting | None:
-        """The finest setting that has a result and does not oscillate; None where no setting has a result.
+        """The finest setting that has a result; None where no setting has one.
 
         It has the most harmonics, then the most samples, then the smallest tolerances; of those, the adaptive scheme
         with the smallest `rtol` or the implicit one with the smallest step, whichever estimates the smaller error; the
@@ -94,7 +89,7 @@ class Point:
         """
         if not self.results:
             return None
-        ranks = {setting: self._rank(setting) for setting in self.steady}
+        ranks = {setting: self._rank(setting) for setting in self.results}
         best = [setting for setting, rank in ranks.items() if rank == max(ranks.values())]
         adaptive = [setting for setting in best if setting.scheme == ADAPTIVE]
         fixed = [setting for setting in best if setting.scheme not in (ADAPTIVE, EXPLICIT)]
@@ -132,14 +127,13 @@ class Point:
     def measured(self) -> pd.DataFrame:
         """A row for each `Setting` but the reference, the quickest first: its `errors`, `run_time` in CPU seconds.
 
-        `oscillates`: whether its wear rate does. `volume_resolved`, `response_resolved`: whether an error is clearly
-        more than the uncertainty of the reference.
+        `volume_resolved`, `response_resolved`: whether an error is clearly more than the uncertainty of the reference.
         """
         table = pd.DataFrame(self.errors, index=pd.Index(list(self.settings), dtype=object))
-        table["run_time"], table["oscillates"] = self.values["run_time"], self.values["oscillates"]
+        table["run_time"] = self.values["run_time"]
         for name in QUANTITIES:
             table[f"{name}_resolved"] = table[name] >= RESOLVED * self.uncertainty(name)
-        return table[self.compared].sort_values("run_time", kind="stable").astype({"oscillates": bool})
+        return table[self.compared].sort_values("run_time", kind="stable")
 
     @cached_property
     def quantities(self) -> tuple[str, ...]:
@@ -232,7 +226,7 @@ def _describe_finest(point: Point, finest: Setting) -> Reference:
     """The finest setting as reference."""
     best = {name: values[point.settings[finest]] for name, values in point.values.items()}
     errors = point.compare(finest)
-    nearest = [point.settings[setting] for setting in _neighbours(finest, point.steady)]
+    nearest = [point.settings[setting] for setting in _neighbours(finest, point.results)]
     most = {name: float(np.fmax.reduce(errors[name][nearest], initial=math.nan)) for name in QUANTITIES}
     volume = float(best["error_estimate"])
     volume = volume if math.isfinite(volume) else most["volume"]

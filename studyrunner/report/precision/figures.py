@@ -32,7 +32,6 @@ _NOT_RESOLVED = (
     " values of a key, or a smaller rtol, make a better reference."
 )
 _SCHEMES_ALONE = "Schemes alone are compared in the tables: give several values of a key of [solver], or of the step."
-_CROSS: dict[str, Any] = {"marker": "x", "markersize": 5, "markeredgewidth": 0.8, "color": "black"}
 
 
 def draw_precision(precision: Precision) -> Iterator[Drawing | Missing | Table]:
@@ -139,8 +138,6 @@ class _Marks:
         marks.append(("cheapest for its error", {**_RING, "markersize": 10}))
         if any(not point.measured[f"{name}_resolved"].all() for point in shown for name in point.quantities):
             marks.append(("not resolved", {**_RING, "markersize": _SIZE, "markeredgecolor": "0.3"}))
-        if any(point.measured["oscillates"].any() for point in shown):
-            marks.append(("oscillates", _CROSS))
         return [Line2D([], [], label=label, **{"linestyle": "none", **style}) for label, style in (*lines, *marks)]
 
 
@@ -163,8 +160,6 @@ def _draw_panel(panel: Axes, precision: Precision, point: Point, quantity: str, 
         face = colour if getattr(item, f"{quantity}_resolved") else "white"
         style = {"markerfacecolor": face, "markeredgecolor": colour, **marks.marker(item.Index)}
         panel.plot(*at, linestyle="none", alpha=0.85, zorder=4, **style)
-        if item.oscillates:
-            panel.plot(*at, zorder=6, **_CROSS)
     panel.set(xscale="log", yscale="log")
     panel.set_ylim(bottom=0.8 * bottom)
     cheapest = point.front(quantity)

@@ -1,4 +1,4 @@
-"""What the errors of the settings tell: orders of convergence, the largest stable step, the cheapest setting."""
+"""What the errors of the settings tell: orders of convergence, the cheapest setting."""
 
 from __future__ import annotations
 
@@ -20,9 +20,6 @@ CLEAR = 5.0
 else is wrong.
 """
 
-STEPS_TO_OSCILLATE = 4
-"""Fewer steps cannot show that the wear rate oscillates."""
-
 
 @dataclass(frozen=True)
 class Order:
@@ -40,20 +37,6 @@ class Order:
     used: tuple[float, ...]
     order: float
     reason: str
-
-
-@dataclass(frozen=True)
-class StableStep:
-    """The explicit steps with the finest other settings, cycles; NaN where there is none.
-
-    largest: longest step up to which all are stable. smallest_unstable: the first that oscillates or fails. predicted:
-    largest stable step at cycle 0. unjudged: steps so long that too few of them were taken to tell.
-    """
-
-    largest: float
-    smallest_unstable: float
-    predicted: float
-    unjudged: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -98,29 +81,10 @@ def find_orders(point: Point) -> tuple[Order, ...]:
     return tuple(found)
 
 
-def find_stable_step(point: Point) -> StableStep | None:
-    """The explicit steps at one point, with the finest harmonics and samples; None where the file compares none."""
-    finest = point.finest
-    if finest is None:
-        return None
-    explicit = [each for each in family(point.settings, finest, *OF_TIME) if each.scheme == EXPLICIT]
-    stable = {
-        each.step: each in point.results and not point.number("oscillates", each) for each in explicit if each.step
-    }
-    if len(stable) < 2:
-        return None
-    unstable = min((step for step, well in stable.items() if not well), default=math.nan)
-    unjudged = [step for step, well in stable.items() if well and point.cycles < STEPS_TO_OSCILLATE * step]
-    largest = max((step for step in stable if not step >= unstable and step not in unjudged), default=math.nan)
-    limits = [point.number("step_limit", each) for each in explicit if each in point.results]
-    predicted = next((limit for limit in limits if not math.isnan(limit)), math.nan)
-    return StableStep(largest, unstable, predicted, tuple(sorted(unjudged)))
-
-
 def recommend(points: Sequence[Point], target: float) -> Recommendation:
     """The cheapest setting whose errors are below a target at all of these points; time is summed over them.
 
-    A setting counts where it has a result at all points that have a reference. One that oscillates never does.
+    A setting counts where it has a result at all points that have a reference.
     """
     compared = [point for point in points if point.compared.any()]
     known = [point.uncertainty(name) for point in compared for name in point.quantities]
@@ -133,7 +97,7 @@ def recommend(points: Sequence[Point], target: float) -> Recommendation:
             error = np.nan_to_num(point.errors[name], nan=np.inf)
             errors[name] = np.maximum(errors[name], error)
             bounds = np.maximum(bounds, error + point.uncertainty(name))
-    usable = np.all([point.compared & (point.values["oscillates"] == 0.0) for point in compared], axis=0)
+    usable = np.all([point.compared for point in compared], axis=0)
     good = usable & np.all([error <= target for error in errors.values()], axis=0)
     if not good.any():
         return nothing

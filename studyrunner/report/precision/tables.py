@@ -9,16 +9,14 @@ from studyrunner.report.drawing import Table
 from studyrunner.report.precision.comparison import Precision
 from studyrunner.report.precision.errors import QUANTITIES, Point
 from studyrunner.report.precision.findings import (
-    STEPS_TO_OSCILLATE,
     TARGETS,
     Order,
     Recommendation,
     find_orders,
-    find_stable_step,
     recommend,
     show_percent,
 )
-from studyrunner.report.reading.result import NO_VOLUME, as_sentences
+from studyrunner.report.reading.result import as_sentences
 from studyrunner.report.reading.units import show_number
 
 _DASH = "\N{EN DASH}"
@@ -28,7 +26,6 @@ def list_precision(precision: Precision, shown: Sequence[Point]) -> Iterator[Tab
     """All tables, of the points shown; the recommended settings also of all points together."""
     yield _table_of_recommendations(precision, shown)
     yield from _table_of_orders(precision, shown)
-    yield from _table_of_stable_steps(shown)
     for number, point in enumerate(shown, start=1):
         yield _table_of_settings(precision, point, number)
 
@@ -66,8 +63,8 @@ def _table_of_recommendations(precision: Precision, shown: Sequence[Point]) -> T
     ]
     note = (
         "The cheapest setting whose errors of worn volume and response are both below the target, the uncertainty of"
-        " the reference included, out of those that the file compares and whose wear rate oscillates in no pair."
-        " Times of all points are summed."
+        " the reference included, out of those that the file compares. Times of all points are"
+        " summed."
     )
     columns = ("point", "error below", "setting", "CPU time (s)", "worn volume", "response", "remark")
     return Table("precision_recommended", "Recommended settings", columns, tuple(rows), note)
@@ -112,27 +109,6 @@ def _fitted(order: Order) -> tuple[str, str]:
     return f"{order.order:.2f}", f"{_cycles(order.used[0])} to {_cycles(order.used[-1])} ({len(order.used)} values)"
 
 
-def _table_of_stable_steps(shown: Sequence[Point]) -> Iterator[Table]:
-    rows = []
-    for point in shown:
-        found = find_stable_step(point)
-        if found is None or point.reference is None or not point.reference.worn > NO_VOLUME:
-            continue
-        predicted = "no limit" if found.predicted == math.inf else _cycles(found.predicted)
-        unjudged = ", ".join(map(_cycles, found.unjudged)) or _DASH
-        rows.append(
-            (point.label or _DASH, predicted, _cycles(found.largest), _cycles(found.smallest_unstable), unjudged)
-        )
-    if rows:
-        note = (
-            "Steps in cycles, with the finest harmonics and samples. The limit is predicted at cycle 0 and changes as"
-            " the joint wears; a step oscillates where the wear rate of any pair does at any time, also of one that"
-            f" wears little. A step of which there are fewer than {STEPS_TO_OSCILLATE} in the march is not judged."
-        )
-        columns = ("point", "predicted limit", "largest stable", "smallest that oscillates or fails", "not judged")
-        yield Table("precision_stable_steps", "Largest stable explicit step", columns, tuple(rows), note)
-
-
 def _cycles(value: float) -> str:
     return _DASH if math.isnan(value) else show_number(value, 4)
 
@@ -143,7 +119,6 @@ def _table_of_settings(precision: Precision, point: Point, number: int) -> Table
     for item in point.measured.itertuples():
         remarks = [f"front of {QUANTITIES[name]}" for name, front in fronts.items() if item.Index in front]
         remarks += [f"{QUANTITIES[name]} not resolved" for name in fronts if not getattr(item, f"{name}_resolved")]
-        remarks += ["oscillates"] * item.oscillates
         errors = map(show_percent, (item.volume, item.course, item.response))
         settings = map(item.Index.words, precision.keys)
         rows.append((*settings, f"{item.run_time:.3g}", *errors, ", ".join(remarks)))

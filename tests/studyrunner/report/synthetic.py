@@ -36,7 +36,6 @@ def synthetic(
     exact: bool = False,
     estimate: Formula = lambda _: 0.0,
     outcome: Formula = lambda _: 0,
-    oscillates: Formula = lambda _: 0,
     limit: float = np.inf,
     worn: float = WORN,
     rtol: float = 1e-3,
@@ -49,11 +48,10 @@ def synthetic(
     variables = {name: np.full((*shape, 3), np.nan) for name in ("worn_volume", "response_error")}
     amplitude = np.full((*shape, 3, 1), np.nan)
     plain = {name: np.zeros(shape) for name in ("run_time", "error_estimate", "step_limit")}
-    flags = {name: np.zeros(shape, np.int8) for name in ("outcome", "oscillates")}
+    flags = {name: np.zeros(shape, np.int8) for name in ("outcome",)}
     for place in itertools.product(*(range(size) for size in shape)):
         point = {name: whole[name][index] for name, index in zip(names, place, strict=True)}
         flags["outcome"][place] = outcome(point)
-        flags["oscillates"][place] = oscillates(point)
         plain["run_time"][place] = time(point)
         plain["step_limit"][place] = limit
         if outcome(point):

@@ -12,7 +12,7 @@ from studyrunner.report.drawing import Table
 from studyrunner.report.precision.comparison import study_precision
 from studyrunner.report.precision.errors import pareto_front
 from studyrunner.report.precision.figures import draw_precision
-from studyrunner.report.precision.findings import TARGETS, find_orders, find_stable_step, recommend
+from studyrunner.report.precision.findings import TARGETS, find_orders, recommend
 from studyrunner.report.precision.settings import Setting
 from tests.studyrunner.report.synthetic import WORN, synthetic
 
@@ -156,32 +156,14 @@ def test_order_in_the_step_is_that_of_the_formula(power, against):
         assert list(order.errors.values()) == pytest.approx([1e-4 * step**power for step in STEPS], rel=1e-9)
 
 
-@pytest.mark.parametrize("how", ["oscillates", "outcome"])
-def test_largest_stable_step_is_the_last_before_the_first_unstable_one(how):
-    def unstable(point):
-        return int(point["scheme"] == "explicit" and point["step"] in (50.0, 250.0)) * (4 if how == "outcome" else 1)
-
-    steps = [10.0, 20.0, 50.0, 100.0, 250.0, 300.0]
-    axes = {"step": steps, "scheme": list(SIGN)}
-    result = synthetic(axes, error_of, time_of, limit=40.0, **{how: unstable})
-    (point,) = precision_of(result).points
-    found = find_stable_step(point)
-    assert (found.largest, found.smallest_unstable, found.predicted) == (20.0, 50.0, 40.0)
-    # three steps of 300 cycles show nothing in 1000
-    assert found.unjudged == (300.0,)
-
-
 def test_recommended_is_the_cheapest_of_all_that_are_exact_enough():
-    def oscillates(point):
-        return int(point["scheme"] == "explicit" and point["step"] == 20.0)
-
-    precision = precision_of(exact_file(oscillates=oscillates))
+    precision = precision_of(exact_file())
     for target, points in itertools.product(TARGETS, ([0], [1], [0, 1])):
         frequencies = [(100.0, 200.0)[place] for place in points]
         best = (math.inf, None)
         for scheme, step, harmonics in itertools.product(("implicit", "explicit"), STEPS, HARMONICS):
             places = [{"frequency": f, "scheme": scheme, "step": step, "harmonics": harmonics} for f in frequencies]
-            if any(abs(error_of(place)) > target or oscillates(place) for place in places):
+            if any(abs(error_of(place)) > target for place in places):
                 continue
             best = min(best, (sum(map(time_of, places)), Setting(scheme, step, harmonics)), key=lambda entry: entry[0])
         found = recommend([precision.points[place] for place in points], target)
