@@ -17,6 +17,9 @@ pairs does not change. `dp = r - (Z / eps - 1) dx` follows in all harmonics at o
 
 The stiffness of an elastic joint hardly changes with the harmonic, except near resonances of the structure. Their
 effect, and that of the truncation of the series, are left to GMRES.
+
+CPU s of an adaptive history of the dovetail to 1e5 cycles with the march, and with the slip space in its place: 16
+pairs 3.0 and 3.5, 48 pairs 4.8 and 10.5.
 """
 
 from __future__ import annotations
