@@ -95,7 +95,7 @@ def advise_error(error: float, wear_rate_error: Sequence[float], used: Used) -> 
 
 
 def advise_steps(used: Used) -> str:
-    """What to do about explicit steps that make the wear rate oscillate."""
+    """What to do about explicit steps that are too long."""
     return " or ".join(_other_steps(used))
 
 

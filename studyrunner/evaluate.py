@@ -179,8 +179,7 @@ def failed_results(task: BranchTask | MarchTask, n_given: int, error: Exception)
 def integrate(model: ReducedModel, task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
     """The histories of a task, the one of the march itself first.
 
-    One march gives all of them, as far as it went. Where its wear rate oscillates, that may have begun after the end of
-    another history, which then takes a march of its own.
+    One march gives all of them, as far as it went.
     """
     reached = task.resume
 
@@ -193,12 +192,8 @@ def integrate(model: ReducedModel, task: MarchTask, keep: Keep) -> Iterator[Marc
     # with more time it goes on from there
     left = reached if history.outcome is Outcome.TIME_LIMIT else None
     yield replace(build_result(task, history), progress=left)
-    for place, scaled in enumerate(task.histories[1:], start=1):
-        if not history.oscillates:
-            yield replace(build_result(task, history, place), progress=left)
-        else:
-            alone = replace(task, histories=(scaled,), resume=None)
-            yield replace(build_result(alone, _solve(model, alone)), place=place)
+    for place in range(1, len(task.histories)):
+        yield replace(build_result(task, history, place), progress=left)
 
 
 def fly(models: Mapping[int, ReducedModel], task: MarchTask, keep: Keep) -> MarchResult:

@@ -295,14 +295,6 @@ KEPT = {
         "predicted largest stable step of the explicit scheme at cycle 0, cycles",
         comment="Infinite where there is none.",
     ),
-    "oscillates": Variable(
-        (),
-        "1",
-        "whether the wear rate oscillates from step to step, as in an unstable explicit scheme",
-        "int8",
-        ("steady", "oscillating"),
-        comment="Only the explicit scheme is watched.",
-    ),
     "final_method": Variable(
         (),
         "1",

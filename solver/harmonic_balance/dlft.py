@@ -211,7 +211,7 @@ class Linearisation:
     def _held_back(self) -> tuple[IntArray, SingleArray]:
         """Active pairs, and the part `1 - d lambda/dp` that they do not transmit, in single precision."""
         pairs = self.active()
-        return pairs, identity_less(self.force_tangent, pairs)
+        return pairs, (np.eye(self.force_tangent.shape[1]) - self.force_tangent[pairs]).astype(np.float32)
 
     @cached_property
     def _rows_of_pairs(self) -> IntArray:
@@ -276,19 +276,6 @@ def differs_from_identity(matrices: FloatArray, by: float) -> BoolArray:
 
 
 @njit(cache=True)
-def identity_less(matrices: FloatArray, chosen: IntArray) -> SingleArray:
-    """`1 - A` (k, n, n) of some of the matrices A (..., n, n), in single precision."""
-    n = matrices.shape[1]
-    less = np.empty((chosen.size, n, n), np.float32)
-    for place in range(chosen.size):
-        matrix = matrices[chosen[place]]
-        for row in range(n):
-            for column in range(n):
-                less[place, row, column] = (row == column) - matrix[row, column]
-    return less
-
-
-@njit(cache=True)
 def hold_back(
     step: FloatArray,
     rows: IntArray,
@@ -299,6 +286,9 @@ def hold_back(
     growth: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Part of a predicted force (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m.
+
+    CPU time of an adaptive history, over that with this function: with the same products in NumPy 1.07 (16 pairs) and
+    1.08 (48 pairs), with those of all pairs in double precision 1.04 to 1.19, 1.14 and (336 pairs) 1.04.
 
     - step (n_rel, m): predicted force, N.
     - rows (n_contact, 3): row of each component, -1 for none.

@@ -23,52 +23,6 @@ ROUND_OFF = 1e-11
 Product = Callable[[FloatArray], FloatArray]
 
 
-@dataclass
-class Recycled:
-    """A correction from earlier solves with an operator A, for later solves with an operator near A.
-
-    A cycle of GMRES ends with `A Z = C` for as many orthonormal vectors C as there were products. In front of A,
-    the correction `E = 1 + (Z - C) C^T` makes the operator the identity on the span of C and changes nothing else.
-    The corrections of several solves are one product of low rank, `E = 1 + U W^T`.
-
-    - moves, images (k, n): rows of `U^T` and `W^T`.
-    """
-
-    moves: FloatArray | None = None
-    images: FloatArray | None = None
-
-    def apply(self, vector: FloatArray) -> FloatArray:
-        """`E v` (n,)."""
-        if self.moves is None or self.images is None:
-            return vector
-        return vector + (self.images @ vector) @ self.moves
-
-    def learn(self, basis: FloatArray, triangle: FloatArray, rotations: FloatArray) -> None:
-        """Add the correction of a GMRES cycle with A E: basis (k + 1, n), triangle (k, k), Givens rotations (k, 2)."""
-        size = np.abs(np.diag(triangle))
-        # a cycle with a smaller pivot is not recycled
-        if not size.min() > COMMON.negligible * size.max():
-            return
-        turned = np.eye(len(basis), len(triangle))
-        for place in range(len(triangle) - 1, -1, -1):
-            cosine, sine = rotations[place]
-            above, below = turned[place].copy(), turned[place + 1].copy()
-            turned[place], turned[place + 1] = cosine * above - sine * below, sine * above + cosine * below
-        images = turned.T @ basis
-        moves = np.linalg.solve(triangle.T, basis[:-1])
-        if self.moves is None or self.images is None:
-            self.moves, self.images = moves - images, images
-            return
-        through = moves + (moves @ self.images.T) @ self.moves
-        before = (images @ self.images.T) @ self.moves
-        if len(self.moves) + len(moves) > NEWTON.recycled_directions:
-            # the oldest corrections belong to the Jacobians that have changed most
-            self.moves, self.images = through - images, images
-        else:
-            self.moves = np.concatenate([self.moves, through - images - before])
-            self.images = np.concatenate([self.images, images])
-
-
 def solve_gmres(
     product: Product,
     right: FloatArray,
@@ -76,7 +30,6 @@ def solve_gmres(
     restart: int,
     cycles: float = np.inf,
     exact: Product | None = None,
-    recycled: Recycled | None = None,
 ) -> tuple[FloatArray, bool]:
     """Solve `exact(x) = right` by restarted GMRES from zero.
 
@@ -94,8 +47,6 @@ def solve_gmres(
         Most cycles; by default until stagnation. A cycle that converges with inexact products only does not count.
     exact : callable, optional
         The exact operator, `product` by default; applied once in a cycle.
-    recycled : Recycled, optional
-        Correction of earlier solves. A converged solve adds its first cycle.
 
     Returns
     -------
@@ -103,33 +54,27 @@ def solve_gmres(
     converged : bool
         Whether the relative residual is below rtol.
     """
-    kept = recycled or Recycled()
     solution, residual = np.zeros_like(right), right
     size = float(np.linalg.norm(right))
     norms = [size]
     restart = min(restart, right.size)
-    first = None
     while cycles > 0:
         if not (np.isfinite(norms[-1]) and norms[-1] > rtol * size):
             break
-        cycle = _cycle(lambda vector: product(kept.apply(vector)), residual, norms, rtol * size, restart)
+        cycle = _cycle(product, residual, norms, rtol * size, restart)
         n_columns = len(cycle.triangle)
         if n_columns == 0:
             break
-        first = first or cycle
         # without convergence, directions of the null space would only make the solution large
         least = 0.0 if norms[-1] <= rtol * size else COMMON.negligible
         weights = np.linalg.lstsq(cycle.triangle, cycle.projected, rcond=least)[0]
-        solution = solution + kept.apply(weights @ cycle.basis[:n_columns])
+        solution = solution + weights @ cycle.basis[:n_columns]
         cycles -= norms[-1] > rtol * size
         residual = right - (exact or product)(solution)
         norms[-1] = float(np.linalg.norm(residual))
         if _stagnates(norms):
             break
-    converged = norms[-1] <= rtol * size
-    if converged and first is not None and recycled is not None:
-        recycled.learn(first.basis, first.triangle, first.rotations)
-    return solution, converged
+    return solution, norms[-1] <= rtol * size
 
 
 @dataclass(frozen=True)
@@ -138,13 +83,11 @@ class _Cycle:
 
     - basis (k + 1, n): orthonormal.
     - triangle (k, k): triangular factor of the Hessenberg matrix.
-    - rotations (k, 2): cosine and sine of the Givens rotations to this factor.
-    - projected (k,): first residual on the basis, after the rotations.
+    - projected (k,): first residual on the basis, after the Givens rotations to this factor.
     """
 
     basis: FloatArray
     triangle: FloatArray
-    rotations: FloatArray
     projected: FloatArray
 
 
@@ -168,7 +111,7 @@ def _cycle(product: Product, residual: FloatArray, norms: list[float], wanted: f
             break
     if lost:
         basis[k] = 0.0
-    return _Cycle(basis[: k + 1], triangle[:k, :k], rotations[:k], projected[:k])
+    return _Cycle(basis[: k + 1], triangle[:k, :k], projected[:k])
 
 
 def ritz_values(

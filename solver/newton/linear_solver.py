@@ -14,12 +14,10 @@ import numpy as np
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
-from solver.newton.cost import is_dense_cheapest, worthwhile_products
-from solver.newton.krylov import Recycled, ritz_values, solve_gmres
+from solver.newton.krylov import ritz_values, solve_gmres
 from solver.newton.options import NEWTON
-from solver.newton.period_preconditioner import PeriodFactor
 from solver.newton.preconditioner import Factor, build_factor
-from solver.newton.slip_preconditioner import SlipFactor, build_slip_factor, find_slip_space
+from solver.newton.slip_preconditioner import build_slip_factor, largest_directions
 
 
 @dataclass
@@ -27,8 +25,6 @@ class JacobianSolver:
     """Solver of systems with a `Linearisation` that keeps one factorisation between its calls."""
 
     _factor: Factor | None = field(default=None, repr=False)
-    _recycled: Recycled = field(default_factory=Recycled, repr=False)
-    _products: list[int] = field(default_factory=list, repr=False)
 
     def solve(self, tangent: Linearisation, right: FloatArray, rtol: float = NEWTON.forcing) -> FloatArray:
         """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
@@ -37,7 +33,7 @@ class JacobianSolver:
         rows = tangent.joint.rows_of(pairs)
         step = np.zeros_like(right)
         if rows.size:
-            if is_dense_cheapest(rows.size * m, rows.size):
+            if rows.size * m <= NEWTON.dense_unknowns:
                 step[rows] = _solve_dense(tangent.dense(pairs), right[rows].ravel()).reshape(rows.size, m)
             else:
                 step[rows] = self._solve_kept(tangent, right, rtol)[rows]
@@ -79,12 +75,14 @@ class JacobianSolver:
             sign, settled = self._judge(kept, tangent)
             if settled:
                 return sign
-        factor = self._keep(build_factor(tangent))
+        self._factor = factor = build_factor(tangent)
         if factor.exact:
             return factor.sign
         sign, settled = self._judge(factor, tangent)
-        whole = None if settled else find_slip_space(tangent, NEWTON.most_directions)
-        return sign if whole is None else build_slip_factor(tangent, whole).sign
+        if not settled:
+            whole = largest_directions(tangent, NEWTON.most_directions)
+            sign = build_slip_factor(tangent, whole).sign if whole.exact else sign
+        return sign
 
     def _judge(self, factor: Factor, tangent: Linearisation) -> tuple[float, bool]:
         """Sign of the determinant from outlying eigenvalues of J P^-1, and whether these eigenvalues have converged."""
@@ -100,40 +98,17 @@ class JacobianSolver:
         negative = np.count_nonzero((values.real < 0.0) & (values.imag == 0.0))
         return factor.sign * float((-1) ** negative), _settled(values, residuals)
 
-    def _keep(self, factor: Factor) -> Factor:
-        self._factor, self._recycled, self._products = factor, Recycled(), []
-        return factor
-
-    def _note(self, products: int) -> None:
-        """Note the products of a solve; drop a march through the period whose products have grown.
-
-        Products grow slowly while a joint wears. The march is dropped when the products beyond those of its first
-        solves have cost as much as another march.
-        """
-        first, most = NEWTON.renewal
-        self._products.append(products)
-        usual = float(np.mean(self._products[:first]))
-        if sum(self._products) - usual * len(self._products) > most and isinstance(self._factor, PeriodFactor):
-            self._factor = None
-
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
         """Solution (n_rel, m) in the rows of the active pairs, with the kept factorisation while products are few."""
         if self._factor is not None:
-            products = NEWTON.products
-            if isinstance(self._factor, SlipFactor) and self._factor.exact:
-                space = self._factor.space
-                products = worthwhile_products(space.pairs.size, right.shape[1], space.size)
-            solution, taken, found = self._iterate(self._factor, tangent, right, rtol, products, 1)
+            solution, found = self._iterate(self._factor, tangent, right, rtol, NEWTON.kept_products, 1)
             if found:
-                self._note(taken)
                 return solution
-        factor = self._keep(build_factor(tangent))
+        self._factor = factor = build_factor(tangent)
         if factor.exact:
             return self._solve_exactly(factor, tangent, right)
         # convergence is not required: Newton's method judges by the true residual
-        solution, taken, _ = self._iterate(factor, tangent, right, rtol, NEWTON.products, np.inf)
-        self._note(taken)
-        return solution
+        return self._iterate(factor, tangent, right, rtol, NEWTON.products, np.inf)[0]
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, right: FloatArray) -> FloatArray:
         """Solution by a factorisation of this Jacobian; a second solve corrects for the shift of neutral directions."""
@@ -150,9 +125,9 @@ class JacobianSolver:
 
     def _iterate(
         self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, products: int, cycles: float
-    ) -> tuple[FloatArray, int, bool]:
-        """Solution (n_rel, m) by GMRES in the rows of the active pairs, products it took, and whether it was found."""
-        rest, taken = _passive_rows(tangent), 0
+    ) -> tuple[FloatArray, bool]:
+        """Solution (n_rel, m) by GMRES in the rows of the active pairs, and whether it was found."""
+        rest = _passive_rows(tangent)
 
         def precondition(vector: FloatArray) -> FloatArray:
             solved = factor.solve(vector.reshape(right.shape))
@@ -160,8 +135,6 @@ class JacobianSolver:
             return solved
 
         def product(vector: FloatArray) -> FloatArray:
-            nonlocal taken
-            taken += 1
             image = tangent.apply_roughly(precondition(vector))
             image[rest] = 0.0
             return image.ravel()
@@ -174,8 +147,8 @@ class JacobianSolver:
         wanted = right.copy()
         wanted[rest] = 0.0
         # preconditioned from the right: the residual of GMRES is the true one
-        solution, found = solve_gmres(product, wanted.ravel(), rtol, products, cycles, exact, self._recycled)
-        return precondition(solution), taken, found
+        solution, found = solve_gmres(product, wanted.ravel(), rtol, products, cycles, exact)
+        return precondition(solution), found
 
 
 def _passive_rows(tangent: Linearisation) -> IntArray:
@@ -192,9 +165,9 @@ def _settled(values: ComplexArray, residuals: FloatArray) -> bool:
 
 
 def _is_dense(tangent: Linearisation, m: int) -> bool:
-    """Whether a dense factorisation of the rows of the active pairs, times m unknowns, is cheapest."""
+    """Whether the rows of the active pairs, times m unknowns, are few enough for a dense factorisation."""
     rows = tangent.joint.rows_of(tangent.active()).size
-    return rows > 0 and is_dense_cheapest(rows * m, rows)
+    return 0 < rows * m <= NEWTON.dense_unknowns
 
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:

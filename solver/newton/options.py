@@ -30,9 +30,6 @@ class NewtonOptions:
     the states of the dovetail are equal to 1e-6. Also the residual of a node of a sweep as a fraction of rtol: with a
     tenth and with ten times this value the motion of the dovetail is equal to 1e-4; with the tolerance of a result,
     nodes take 1.4 times the iterations."""
-    recycled_directions: int = 30
-    """Directions kept from solve to solve with a factorisation. Products a solve for 48 pairs: 12.4 with 0, 9.0 with
-    30, 8.3 with 60 in an equal time."""
     settled: float = 0.1
     """Residual over modulus of an eigenvalue below which its sign is known, and real part above which an eigenvalue is
     certainly positive (all are 1 for an exact factorisation). With 0.15 for the real part the same cases are equal."""
@@ -41,26 +38,21 @@ class NewtonOptions:
     """Most products of a GMRES cycle, and of Arnoldi's method for a determinant or for Floquet multipliers. GMRES finds
     resonances one by one. At 160 pairs, eigenvalues at 0.01 converge with 32."""
 
-    renewal: tuple[int, int] = (10, 30)
-    """First solves with a march through the period, whose mean products are the usual ones; and products beyond the
-    usual ones after which the march is built anew. Building one takes as long as 20 products with 48 pairs, as 34 with
-    336. Histories of the dovetail (48 pairs) take 0.7 of the products with 15 to 40; of 336 pairs, whose products do
-    not grow, as many as without."""
+    kept_products: int = 25
+    """Most products of a solve with a kept factorisation, before a new one is built, which takes as long as 20 products
+    with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 12 to 80."""
 
-    # choice of the factorisation (`cost`), in operations of a factorisation: 22e9 to 27e9 in a second of one core
-    vector_cost: float = 7.0
-    """Cost of an operation of a product with a vector: 3.5e9 to 3.8e9 such operations in a second."""
-    call_cost: float = 2.5e5
-    """Cost of a call of NumPy, whatever its size: 10 us. A product with a small Jacobian takes ten such times, a sample
-    of a march five."""
-    usual_products: int = 8
-    """Products of a solve with a kept factorisation: 7.6 in the default study."""
+    # choice of the factorisation
+    dense_unknowns: int = 200
+    """Unknowns up to which a Jacobian is factorised as it is. With 100 and 400, sweeps and histories of 16 and 48 pairs
+    take equal times."""
     dear_unknowns: int = 1000
     """Unknowns of an expensive dense solve: above, no odd harmonics above 79, no homotopy in the harmonics, no 3 N + 2
     samples to compare, and no eigenvalues of Hill's matrix (255 unknowns take 0.15 s, 800 take 3 s)."""
     small_joint_displacements: int = 40
-    """Relative displacements up to which a joint is small: impacts couple most harmonics and directions, and products
-    with any other factorisation are in vain (three pairs with 115 harmonics, `tests/solver/test_refinement.py`)."""
+    """Relative displacements up to which a joint is small and its slip space is factorised: impacts couple most
+    harmonics and directions, and products with any other factorisation are in vain (three pairs with 115 harmonics,
+    `tests/solver/test_refinement.py`)."""
     most_directions: int = 2500
     """Most directions of a factorisation in the slip space, 0.4 s. For the sign of a determinant that is not certain
     otherwise, and for sliding masses, to which the march does not apply."""
@@ -68,10 +60,6 @@ class NewtonOptions:
     # march through the period
     march_periods: int = 2
     """Periods of the march: slip removes the influence of the start."""
-    resonant_difference: float = 0.2
-    """Fraction of the penalty: larger differences to the median stiffness of the harmonics are taken into account."""
-    resonances: int = 6
-    """Most such differences of a harmonic."""
 
     @property
     def sign_products(self) -> int:

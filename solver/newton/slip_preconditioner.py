@@ -56,20 +56,6 @@ class SlipSpace:
         return sum(basis.shape[1] for basis in self.bases)
 
 
-def find_slip_space(tangent: Linearisation, most: int) -> SlipSpace | None:
-    """Whole slip space of a Jacobian; None where it has more than `most` directions."""
-    pairs, rows = _held_back_rows(tangent)
-    bases: list[FloatArray] = []
-    total = 0
-    for own in rows:
-        basis, _ = _directions(own)
-        total += basis.shape[1]
-        if total > most:
-            return None
-        bases.append(basis)
-    return SlipSpace(pairs, tuple(bases), True)
-
-
 def largest_directions(tangent: Linearisation, most: int) -> SlipSpace:
     """The part of the slip space of a Jacobian with the `most` largest directions of all pairs."""
     pairs, rows = _held_back_rows(tangent)

@@ -104,8 +104,6 @@ class WearHistory:
     - branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
     - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step_limit`); inf if
       there is no limit.
-    - oscillates: whether the wear rate went up and down from step to step without decay, as in an unstable explicit
-      scheme.
     - final_method: method by which the scheme "final" has found the final state: "active_set" or "march"; empty for the
       other schemes. A final state of an active set has the count inf, and no state between the unworn one and the
       final one is known.
@@ -117,8 +115,6 @@ class WearHistory:
     - inaccurate_in: name of the inaccurate result.
     - inaccurate_error: largest error from `inaccurate_from` on.
     - held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
-    - other_peaks (2,): Hz, another resonance or peak in the range of a followed frequency, at the first and the last
-      state; NaN where there is none.
     - message: addition to the outcome: an unexpected error, the cycle from which on a condition is violated, the error
       reached; empty where there is nothing to add.
     """
@@ -157,7 +153,6 @@ class WearHistory:
     branch: int = 0
     fold_frequency: float = math.nan
     step_limit: float = math.inf
-    oscillates: bool = False
     final_method: str = ""
     cut_off_cycle: float = math.nan
     message: str = ""
@@ -168,4 +163,3 @@ class WearHistory:
     inaccurate_in: str = ""
     inaccurate_error: float = 0.0
     held_from: float = math.inf
-    other_peaks: tuple[float, float] = (math.nan, math.nan)

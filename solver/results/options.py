@@ -12,9 +12,6 @@ class ResultOptions:
     held_force: float = 1e-5
     """Fraction of the friction of all pairs that a hold of the mean position takes up at most. Motion and wear change
     by this fraction at most, far below any rtol. Dovetail, friction 0.3, 1 N: 5e-7 to 2e-6 after 20 000 cycles."""
-    other_peak: float = 0.1
-    """Work or amplitude of another resonance or peak in the range of a followed frequency, over the present one, from
-    which on a history names it. Does not change results."""
 
 
 RESULTS = ResultOptions()

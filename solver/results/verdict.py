@@ -28,7 +28,9 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     """
     if not rows.size:
         return Outcome.CONVERGED, ""
-    last, remarks = int(rows[-1]), _remarks(history, history.cycles[rows[-1]], slower)
+    last = int(rows[-1])
+    held = math.inf > history.held_from <= history.cycles[last]
+    remarks = [describe_hold(history.held_from / slower)] if held else []
     if history.cycles[last] >= history.cut_off_cycle:
         return Outcome.CONTACT_CUT_OFF, describe_cut_off(history.cut_off_cycle / slower)
     error = float(history.worn_volume_error[last])
@@ -66,27 +68,6 @@ def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> s
         where = "where other pairs wear, or by other values on the way"
         return f"worn volume {volume:.3g} mm3, {known}: {other:.3g} mm3 {coarser}, {where}"
     return f"worn volume {volume:.3g} mm3, but {other:.3g} mm3 {coarser}: {known}"
-
-
-def _remarks(history: WearHistory, count: float, slower: float) -> list[str]:
-    """Further sentences about a history up to a count of its own."""
-    said = []
-    if math.inf > history.held_from <= count:
-        said.append(describe_hold(history.held_from / slower))
-    first, last = history.other_peaks
-    if math.isfinite(first):
-        said.append(_describe_other_peak("in the beginning", first, float(history.excitation_frequency[0])))
-    elif math.isfinite(last) and count >= history.last_cycle:
-        said.append(_describe_other_peak("in the end", last, float(history.excitation_frequency[-1])))
-    return said
-
-
-def _describe_other_peak(when: str, other: float, followed: float) -> str:
-    """Sentence about another peak, Hz, in the range of a followed frequency, Hz."""
-    return (
-        f"{when} the response has another peak in the range, near {other:.5g} Hz; the history follows the one at"
-        f" {followed:.6g} Hz"
-    )
 
 
 def describe_hold(cycle: float) -> str:

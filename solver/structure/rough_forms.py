@@ -8,6 +8,9 @@ structure behind the joint acts through as many motions as it has displacements.
     Z_n = (1 + i n w s) K + B G_n B^T,      G_n small and complex,
 
 and one product with K serves all harmonics. Other structures need a matrix for each harmonic.
+
+CPU time of an adaptive history of the dovetail with products in double precision, over that with these: 1.08 (16 and
+48 pairs), 2.15 (336 pairs).
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ class GivenSteps:
         """As in `Control`; a step whose wear would move many times the normal forces is a failure."""
         planned = self.length
         if self.end == np.inf:
-            slower = float(state.rates.largest[-1] / state.rates.value[-1])
+            slower = float(state.largest_rates[-1] / state.rates[-1])
             planned = min(COMMON.largest_step_ratio * state.length, self.length * slower)
         if self.largest_depth is not None and self.scheme == "explicit":
             planned = self.largest_depth / float(work.rate(state.point.evaluation).max())

@@ -13,18 +13,15 @@ from solver.accuracy.history_error import Both, history_error
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.target_error import error_of_wear, target_error
 from solver.model import FloatArray, ReducedModel
-from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.packing import Packed, unpack
 from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState, WearHistory
-from solver.results.other_peak import find_other_peak
 from solver.results.verdict import judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
 from solver.wear.output import DenseOutput, no_output
 from solver.wear.solutions import Ended, SlowTime, Solutions
-from solver.wear.state import WearState
 
 
 def integrate_wear(
@@ -124,13 +121,10 @@ def _assembled(solutions: Solutions, fine: Ended, reference: Ended | None) -> We
         cycles_to_target_error=_target_error(output, coarse, steps, asked) if ends_at_target else math.nan,
         cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
         step_limit=state.step_limit if state.step_limit > 0.0 else math.inf,
-        # other schemes are stable: only small corners of the wear rate alternate there
-        oscillates=asked.scheme == "explicit" and state.rates.oscillate(COMMON.round_off * state.most_rate),
         inaccurate_from=state.inaccurate_from,
         inaccurate_in="wear rate" if worst.wear_rate >= worst.response else "response",
         inaccurate_error=worst.largest,
         held_from=math.inf if math.isnan(state.held_from) else state.held_from,
-        other_peaks=_other_peaks(solutions, state),
     )
 
 
@@ -152,17 +146,6 @@ def _target_error(output: DenseOutput, coarse: DenseOutput | None, steps: Both, 
     weights = deepest if quantity == "wear_depth" else area
     rate = min(float(rates @ weights) for rates in (own["depth_rate"][1], output.taken.nodes[-1].rate))
     return target_error(at, coarse.target_count(), known_to, rate) + output.target_within()
-
-
-def _other_peaks(solutions: Solutions, last: WearState) -> tuple[float, float]:
-    """Further peaks in the range of a followed frequency, Hz, at the first and the last state; NaN where none is."""
-    follow, start, model = solutions.asked.follow, solutions.start.state, solutions.case.model
-    if follow is None or start is None:
-        return math.nan, math.nan
-    at = last.point.evaluation
-    end = replace(start, omega=last.omega, displacement_h=at.displacement_h, contact_force_h=at.force_h)
-    first, other = (find_other_peak(model, state, follow) for state in (start, end))
-    return first, other
 
 
 def _read_or_nan(output: DenseOutput | None, counts: FloatArray, like: dict[str, Any]) -> dict[str, Any]:

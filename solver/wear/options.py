@@ -47,8 +47,6 @@ class WearOptions:
     left_out_grown: float = 1.5
     """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
     which a new choice is possible. Dovetail, 211.5, 211.75, 212.5 Hz: 0.8 to 1.4 over 1e5 cycles."""
-    alternations: int = 4
-    """Number of increments of a wear rate with alternating sign and without decay that make an oscillation."""
 
     # steady state
     acted_back: float = 100.0

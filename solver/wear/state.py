@@ -11,7 +11,6 @@ from solver.model import FloatArray
 from solver.packing import packable
 from solver.settings import Resolution
 from solver.structure.joint import Hold
-from solver.wear.rates import WearRates
 
 # Fraction of `WearState.most_rate`: a joint that wears less sticks, and its rate is round-off.
 _NO_WEAR = 1e-12
@@ -47,7 +46,8 @@ class WearState:
     point: periodic state, its worn depth (`point.evaluation.wear_depth`) and the tangential history for the next one.
     resolution: harmonics and samples of the periodic state.
     choice: last choice of the resolution.
-    rates: wear rates so far.
+    rates, largest_rates (n_contact + 1,): wear rates of the pairs and, as the last entry, of all together, and their
+        largest values so far, m3 per cycle; NaN and zero before the first state.
     most_rate: wear rate if every pair slipped as far as it moves, m3 per cycle; rates far below are round-off.
     step_limit: largest stable explicit step at the first state that wears, cycles; NaN as long as nothing wears.
     change: length of the last step, cycles, and changes of predicted force (n_rel, 2H+1), N, and frequency, rad/s, in
@@ -68,7 +68,8 @@ class WearState:
     point: State
     resolution: Resolution
     choice: Choice
-    rates: WearRates
+    rates: FloatArray
+    largest_rates: FloatArray
     most_rate: float = 0.0
     step_limit: float = float("nan")
     change: tuple[float, FloatArray, float] | None = None

@@ -49,7 +49,7 @@ class InSteadyState:
         """AS_ASKED in a steady state or at the target, NO_FINAL_STATE where there is none, else None."""
         if output.reached_target or self._is_over(state) or not work.wears(state):
             return AS_ASKED
-        rate, n_steps = float(state.rates.value[-1]), len(output.taken.course.ends) - 1
+        rate, n_steps = float(state.rates[-1]), len(output.taken.course.ends) - 1
         if self._is_steady(work, state, output):
             steady = f"from cycle {state.cycle:.4g} on they wear at a steady rate of {rate:.6g} m3 a cycle"
             return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
@@ -60,7 +60,7 @@ class InSteadyState:
 
     def _is_over(self, state: WearState) -> bool:
         """Whether the rate of every pair is below the fraction `share` of its largest rate."""
-        rates, largest = state.rates.value[:-1], state.rates.largest[:-1]
+        rates, largest = state.rates[:-1], state.largest_rates[:-1]
         floor = self.share * float(largest.max(initial=0.0))
         return bool((rates <= self.share * np.maximum(largest, floor)).all())
 

@@ -22,7 +22,6 @@ from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.followed import end_at_resonance, lost_resonance
 from solver.wear.friction_history import history_along
-from solver.wear.rates import WearRates
 from solver.wear.state import Choice, Reached, WearState
 from solver.wear.step_limit import explicit_step_limit
 
@@ -109,7 +108,7 @@ class WearingJoint:
 
     def wears(self, state: WearState) -> bool:
         """Whether the wear rate is above the round-off of the slip by the static load."""
-        return bool(state.rates.value[-1] > state.least_rate)
+        return bool(state.rates[-1] > state.least_rate)
 
     def begin(
         self,
@@ -129,13 +128,20 @@ class WearingJoint:
         joint = self.joint(resolution, None, start.omega)
         balance = Balance.frozen(joint, start.start_history, start.wear_depth)
         at = balance.evaluate(balance.predict(start.displacement_h, start.contact_force_h))
-        n_rates = self.area.size + 1
+        unknown = np.full(self.area.size + 1, np.nan)
         choice = Choice(left_out(resolution.orders, at), estimate, accurate)
         point = State(at, final_history(balance, at))
-        rates = WearRates.none(n_rates)
         # the stability of a start state has been checked
         begun = WearState(
-            0.0, start.omega, point, resolution, choice, rates, step_limit=step_limit, judged_h=at.predicted_h
+            0.0,
+            start.omega,
+            point,
+            resolution,
+            choice,
+            rates=unknown,
+            largest_rates=np.zeros_like(unknown),
+            step_limit=step_limit,
+            judged_h=at.predicted_h,
         )
         return self.noted(begun)
 
@@ -159,8 +165,9 @@ class WearingJoint:
         pressed = np.abs(at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(at.displacement_h[:, 1:], axis=(1, 2)))
         most = volume_rate(self.wear_coefficient, self.wearing.largest_factor * moved)
-        rates = state.rates.after(np.append(volumes, volumes.sum()))
-        state = replace(state, rates=rates, most_rate=max(state.most_rate, most))
+        rates = np.append(volumes, volumes.sum())
+        largest = np.maximum(state.largest_rates, np.abs(rates))
+        state = replace(state, rates=rates, largest_rates=largest, most_rate=max(state.most_rate, most))
         if np.isnan(state.step_limit) and self.wears(state):
             limit = explicit_step_limit(self.at(state), at, self.gain(1.0), self.wearing, self.run)
             state = replace(state, step_limit=limit)

@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE
-from studyrunner.advice import advise_steps
-from studyrunner.plan.point_text import settings_of
 from studyrunner.plan.sharing import Index
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
@@ -75,7 +73,7 @@ class CertificateTable:
         self._folds: set[tuple[Index, float]] = set()
         self._first_jump: tuple[float, Index] | None = None
         self._n_jumps = 0
-        self._noted = {name: _Noted() for name in ("too long", "oscillating", "unstable")}
+        self._noted = {name: _Noted() for name in ("too long", "unstable")}
 
     def add(self, points: Sequence[tuple[Index, ...]], records: NDArray[np.void]) -> None:
         """Adds records (n,), and the points of each record."""
@@ -94,7 +92,6 @@ class CertificateTable:
             self._first_jump = jump if self._first_jump is None else min(self._first_jump, jump)
             self._n_jumps += len(points[row])
         self._add_too_long(points, records["step_limit"])
-        self._note("oscillating", points, records["oscillates"] != 0)
         # a point that reached its target, or its final state directly, has counts without a state
         there = ~np.isnan(records["residual"])
         self._note("unstable", points, complete & np.any((records["stable"] == 0) & there, axis=1))
@@ -105,8 +102,7 @@ class CertificateTable:
         How well the worn volume is known, what another mesh changes, the shortest life where there is a target, whether
         wear is small, how much of it is at the edge, and outcomes where loads and wear vary. Then the largest value of
         each certificate over all points
-        computed to the end, with its place, and how many folds, jumps, too long steps, oscillating wear rates and
-        unstable states there are.
+        computed to the end, with its place, and how many folds, jumps, too long steps and unstable states there are.
         """
         rows = [("worn volume", self._volumes.format()), *self._mesh.rows(), *self._lives.rows()]
         rows.append(("small-wear assumption", self._small.format()))
@@ -118,7 +114,6 @@ class CertificateTable:
         rows.append(("folds in the sweeps", self._format_folds()))
         rows.append(("jumps while wearing", self._format_jumps()))
         rows.append(("explicit steps too long", self._format_noted("too long", "longer than step_limit")))
-        rows.append(("oscillating wear rate", self._format_noted("oscillating", self._steps())))
         rows.append(("unstable states", self._format_noted("unstable", "see the variable stable")))
         width = max(len(label) for label, _ in rows)
         return "\n".join(f"{label:<{width}}  {text}" for label, text in rows)
@@ -192,11 +187,6 @@ class CertificateTable:
         cycle, point = self._first_jump
         where = _where(self._study, _Place(point))
         return f"{self._n_jumps}, the first at cycle {cycle:g}" + (f" at {where}" if where else "")
-
-    def _steps(self) -> str:
-        """What to do about the first wear rate that oscillates."""
-        first = self._noted["oscillating"].first
-        return "" if first is None else advise_steps(settings_of(self._study, first))
 
     def _format_noted(self, what: str, remedy: str) -> str:
         """How many of them, where the first is, and what there is to say."""

@@ -6,9 +6,6 @@ import scipy.linalg
 
 from solver import backbone
 from solver.outcome import Outcome
-from solver.results.history import PeriodicState
-from solver.results.other_peak import find_other_peak
-from solver.settings import FollowedFrequency
 from tests.friction_beam import SPRING, friction_beam, matrices, plain_mode
 
 
@@ -26,19 +23,6 @@ def test_the_first_mode_is_that_of_a_plain_harmonic_balance():
     assert (abs(mode.damping_ratio - damping[chosen]) < mode.damping_error + 5e-5 * damping[chosen]).all()
     assert (mode.frequency_error < 1e-3 * mode.frequency).all()
     assert (mode.damping_error < 5e-3 * mode.damping_ratio).all()
-
-
-@pytest.mark.parametrize("word", ["resonance", "peak"])
-def test_the_second_mode_of_the_stuck_beam_is_another_peak_in_the_range(word):
-    """The end of the spring has no mass, and damping is low."""
-    mass, _, stiffness, place = matrices()
-    stiffness[place, place] += SPRING
-    first, second = np.sqrt(scipy.linalg.eigh(stiffness, mass, eigvals_only=True)[:2])
-    still = np.zeros((1, 3, 7))
-    state = PeriodicState(first, 0.1, still, still, np.zeros((1, 2)), np.zeros(1))
-    found = find_other_peak(friction_beam(), state, FollowedFrequency(word, 40.0, 400.0))
-    assert found == pytest.approx(second / (2.0 * np.pi), rel=1e-3)
-    assert np.isnan(find_other_peak(friction_beam(), state, FollowedFrequency(word, 40.0, 300.0)))
 
 
 @pytest.mark.slow

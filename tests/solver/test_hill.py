@@ -10,9 +10,9 @@ from solver.continuation.arc_length import Arc, follow_arc
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
 from solver.newton.bordering import Bordered, bordered_step
-from solver.newton.cost import is_dense_cheapest
 from solver.newton.krylov import ritz_values
 from solver.newton.linear_solver import JacobianSolver
+from solver.newton.options import NEWTON
 from solver.newton.run import Run
 from solver.settings import SolverSettings
 from solver.stability.hill import is_stable
@@ -71,7 +71,7 @@ def test_the_sign_with_a_kept_factorisation_is_that_of_the_dense_matrix(seed):
     settings = SolverSettings(3, 24)
     # wear in the step so large that signs of both kinds come up
     balance, predicted = random_balance(random_model(seed, ("3d",) * 14, 4), settings, seed, wear=True)
-    assert not is_dense_cheapest(predicted.size, len(predicted))
+    assert predicted.size > NEWTON.dense_unknowns
     random = np.random.default_rng(seed)
     solver = JacobianSolver()
     for _ in range(6):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solver.newton.krylov import Recycled, solve_gmres
+from solver.newton.krylov import solve_gmres
 from solver.newton.options import NEWTON
 
 
@@ -73,24 +73,3 @@ def test_products_that_are_rounded_are_refined_by_exact_ones():
     solution, found = solve_gmres(lambda x: rounded @ x, wanted, 1e-9, 30, 1, lambda x: matrix @ x)
     assert found
     assert np.linalg.norm(matrix @ solution - wanted) < 1e-9 * np.linalg.norm(wanted)
-
-
-def test_what_a_solve_has_learned_serves_the_next_ones():
-    random = np.random.default_rng(8)
-    matrix = well_conditioned(80, 9) + random.normal(size=(80, 4)) @ random.normal(size=(4, 80))
-    recycled = Recycled()
-    taken = []
-    for turn in range(4):
-        changed = matrix + 1e-3 * turn * random.normal(size=matrix.shape) / np.sqrt(80)
-        count, product = counted(changed)
-        right = random.normal(size=80)
-        found, converged = solve_gmres(product, right, 1e-3, 60, 1, None, recycled)  # type: ignore[arg-type]
-        assert converged
-        assert np.linalg.norm(changed @ found - right) <= 1e-3 * np.linalg.norm(right)
-        taken.append(count[0])
-        if turn == 0:
-            # the operator is the identity on what was learned
-            assert recycled.images is not None
-            for image in recycled.images:
-                assert np.linalg.norm(matrix @ recycled.apply(image) - image) < 1e-8
-    assert max(taken[1:]) < taken[0]

@@ -40,7 +40,7 @@ def depths(states):
 
 def rates(states):
     """m per cycle."""
-    return np.array([state.rates.value[-1] for state in states]) / AREA
+    return np.array([state.rates[-1] for state in states]) / AREA
 
 
 def counts(states):

@@ -42,17 +42,6 @@ def test_a_sensitive_volume_is_told_with_that_of_the_reference_solution(other, e
     assert judged([0, 1], 0.4, **changed) == (Outcome.CONVERGED, "")
 
 
-def test_another_peak_is_told_once_and_the_one_of_the_end_by_a_history_that_goes_so_far():
-    followed = {"excitation_frequency": np.array([200.0, 201.0, 202.0]), "last_cycle": 10.0}
-    _, first = judged([0], other_peaks=(215.0, 216.0), **followed)
-    assert first.startswith("in the beginning the response has another peak in the range, near 215 Hz;")
-    assert first.endswith("follows the one at 200 Hz")
-    _, last = judged(other_peaks=(np.nan, 216.0), **followed)
-    assert last.startswith("in the end the response has another peak in the range, near 216 Hz;")
-    assert last.endswith("follows the one at 202 Hz")
-    assert judged([0, 1], other_peaks=(np.nan, 216.0), **followed) == (Outcome.CONVERGED, "")
-
-
 @pytest.mark.parametrize(
     ("first", "rows", "said"),
     [

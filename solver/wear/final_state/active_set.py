@@ -53,7 +53,7 @@ class WornOff:
 
 def least_rate(state: WearState, share: float) -> float:
     """Wear rate of a pair that counts as zero, m3 per cycle, as in `solver.wear.stop` and `WearingJoint.wears`."""
-    largest = float(state.rates.largest[:-1].max(initial=0.0))
+    largest = float(state.largest_rates[:-1].max(initial=0.0))
     return max(share**2 * largest, state.least_rate)
 
 
@@ -78,7 +78,7 @@ def wear_off(work: WearingJoint, state: WearState, unworn: FloatArray, off: Bool
     """
     off, n_rounds = off.copy(), 0
     for _ in range(unworn.size + 2):
-        begin = (state.rates.value[:-1] > least_rate(state, share)) & ~off
+        begin = (state.rates[:-1] > least_rate(state, share)) & ~off
         if not begin.any() and (n_rounds > 0 or not off.any()):
             return WornOff(state, off, n_rounds)
         joint = work.at(state)

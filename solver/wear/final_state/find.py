@@ -1,4 +1,15 @@
-"""The final state by an active set for a cooperative joint, by a wear history to the steady state for any other."""
+"""The final state by an active set for a cooperative joint, by a wear history to the steady state for any other.
+
+CPU s of the active set and of the history (3 harmonics, both from the start state):
+
+| joint | active set | history | accepted |
+|---|---|---|---|
+| slider | 0.03 | 0.43 | yes |
+| cylinder, 24 strips / 60 (automatic harmonics) | 0.10 / 0.35 | 0.89 / 3.2 | yes |
+| sphere, 8 x 8 patches / 16 x 16 | 0.19 / 2.2 | 1.7 / 14 | yes / no |
+| dovetail, 16 pairs, 209 Hz and 4 N / 212.6 / 212.8 Hz | 0.31 / 1.5 / 1.5 | 1.4 / 1.6 / 1.1 | no |
+| dovetail, 48 pairs, 211.5 Hz | 0.36 | 9.0 | no |
+"""
 
 from __future__ import annotations
 

@@ -20,7 +20,6 @@ _MOST_POINTS = 3
 _TITLE = "Error against run time"
 _SHAPES, _SIZE = "os^DvPX<>p", 5.5
 _RING: dict[str, Any] = {"marker": "o", "markerfacecolor": "none", "markeredgecolor": "black", "linestyle": "none"}
-_CROSS: dict[str, Any] = {"marker": "x", "markersize": 5, "markeredgewidth": 0.8, "color": "black", "linestyle": "none"}
 _DASH = "\N{EN DASH}"
 
 
@@ -64,7 +63,6 @@ def _draw(points: Sequence[ComparedPoint], shown: Sequence[ComparedPoint], keys:
         "Each mark is one setting; a line joins those of a scheme than which no quicker one is as exact; rings: of all",
         "Open marks, in the grey: errors below"
         f" {RESOLVED:.0f} times the uncertainty of the reference, which tell no setting from another",
-        "Crosses: the wear rate oscillates",
         *(f"{point.label or 'Reference'}: {_tell_reference(point)}" for point in shown),
         f"Left out: {count(failed, 'result')} not computed to the end" if failed else "",
         f"{count(len(points) - len(shown), 'other point')} not drawn" if len(points) > len(shown) else "",
@@ -113,7 +111,7 @@ class _Marks:
         for step in self.steps[:1] + self.steps[-1:]:
             setting = Setting(step=step)
             found.append((f"step {setting.words('step')}", {"color": "0.3", **self.marker(setting), "marker": "o"}))
-        found += [("cheapest for its error", {**_RING, "markersize": 10}), ("oscillates", _CROSS)]
+        found.append(("cheapest for its error", {**_RING, "markersize": 10}))
         return [Line2D([], [], label=label, **style) for label, style in found]
 
 
@@ -133,8 +131,6 @@ def _draw_panel(panel: Axes, point: ComparedPoint, quantity: str, marks: _Marks)
         colour = marks.lines[point.settings[row].scheme]["color"]
         style = {"markerfacecolor": colour if clear[row] else "white", "markeredgecolor": colour}
         panel.plot(time[row], drawn[row], alpha=0.85, zorder=4, **style, **marks.marker(point.settings[row]))
-        if point.values["oscillates"][row] == 1.0:
-            panel.plot(time[row], drawn[row], zorder=6, **_CROSS)
     rows = point.front(quantity)
     panel.plot(time[rows], drawn[rows], markersize=11, zorder=5, **_RING)
     known = np.isfinite(errors)
@@ -162,7 +158,6 @@ def _list_settings(point: ComparedPoint, number: int, keys: Sequence[str]) -> Ta
             for (name, words), error in zip(QUANTITIES.items(), errors, strict=True)
             if np.isfinite(error) and not point.is_clear(name)[row]
         ]
-        remarks += ["oscillates"] if point.values["oscillates"][row] == 1.0 else []
         shown = [show_percent(error) if np.isfinite(error) else _DASH for error in errors]
         rows.append((*values, f"{point.values['run_time'][row]:.3g}", *shown, ", ".join(remarks)))
     title = "All settings" + (f" at {point.label}" if point.label else "")

@@ -28,7 +28,7 @@ RESOLVED = 3.0
 
 _ROUND_OFF = 1e-12
 _AUTO, _ADAPTIVE, _FINAL, _EXPLICIT = "auto", "adaptive", "final", "explicit"
-_VALUES = ("run_time", "error_estimate", "response_error", "harmonics_used", "samples_used", "oscillates")
+_VALUES = ("run_time", "error_estimate", "response_error", "harmonics_used", "samples_used")
 
 
 @dataclass(frozen=True)
@@ -79,13 +79,12 @@ class ComparedPoint:
         """Row of the finest setting that has a result; None where the exact answer is known, or nothing is.
 
         It has the most harmonics, then the most samples, then the smallest tolerances, and of those the smallest
-        estimated error of the worn volume. One whose wear rate oscillates counts only where there is no other.
+        estimated error of the worn volume.
         """
         rows = np.flatnonzero(self.computed)
         if self.exact is not None or not rows.size:
             return None
-        steady = rows[np.nan_to_num(self.values["oscillates"][rows]) == 0]
-        return int(max((steady if steady.size else rows).tolist(), key=self._rank))
+        return int(max(rows.tolist(), key=self._rank))
 
     def _rank(self, row: int) -> tuple[float, ...]:
         """As numbers, the highest the finest; automatic ones rank by what the last state took."""

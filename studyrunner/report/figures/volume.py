@@ -258,7 +258,7 @@ def draw_final(result: Result, course: Course, scale: Scale) -> Drawing:
     number = int(np.argmax([np.nanmax(field, initial=-1.0) for field in reached]))
     largest = float(np.nanmax(reached[number], initial=0.0))
     bars = _draw_bars(result, panel, course, choice, reached, scale)
-    marks = _mark_care(result, panel, course, choice, reached, scale, _SEEN * largest)
+    marks = _mark_care(result, panel, course, choice, reached, scale)
     # bars that leave the points too little room are cut
     set_from_zero(panel, scale(max(largest, min(bars, 2.0 * largest))).item())
     n_failed = mark_failed(panel, course.values, failed)
@@ -302,16 +302,12 @@ def _mark_care(
     choice: Choice,
     fields: list[NDArray[np.float64]],
     scale: Scale,
-    least: float,
 ) -> list[str]:
     """Marks at points to be taken with care, and a sentence for each kind.
 
-    fields (n,) each: worn volumes at the last cycle count that each point has. least: m3, an oscillating wear rate
-    matters from there on.
+    fields (n,) each: worn volumes at the last cycle count that each point has.
     """
-    sensitive, oscillates = result.ended("sensitive"), np.zeros(result.held.shape, dtype=bool)
-    if result.has("oscillates"):
-        oscillates = (result.read("oscillates").values != 0) & (result.worn > least) & result.computed
+    sensitive = result.ended("sensitive")
     kinds = (
         ("above rtol", "s", result.above & ~sensitive, "Squares: {} whose worn volume is known less well than to rtol"),
         ("sensitive", "D", sensitive, "Diamonds: {} so sensitive that one number says little"),
@@ -321,7 +317,6 @@ def _mark_care(
             result.held & ~result.computed,
             "Triangles: {} that ended early, at what was worn by then",
         ),
-        ("oscillates", "o", oscillates, "Rings: {} whose wear rate oscillates from step to step"),
     )
     sentences = []
     for label, marker, where, sentence in kinds:

@@ -247,7 +247,7 @@ class Result:
 
         Among the points computed to the end this is the point with the largest final worn volume. Where nothing is
         worn, or the file has no wear, it is the point with the largest response at the first kept cycle count; else the
-        first computed point; else the first point. Explicit, oscillating and sensitive histories, which wear too much,
+        first computed point; else the first point. Explicit and sensitive histories, which wear too much,
         count only where there is no other; histories that ended early count only where none was computed to the end.
         """
         return dict(self._shown)
@@ -287,15 +287,11 @@ class Result:
 
     @property
     def _trusted(self) -> NDArray[np.bool_]:
-        """Histories that are neither explicit nor sensitive and do not oscillate, no final states without a history; in
-        the shape of the axes.
-        """
+        """Histories neither explicit nor sensitive, no final states without a history; in the shape of the axes."""
         outcome = self.dataset["outcome"]
         trusted = xr.ones_like(outcome, dtype=bool)
         if "scheme" in outcome.dims:
             trusted = trusted & (self.dataset["scheme"] != "explicit")
-        if self.has("oscillates"):
-            trusted = trusted & (self.dataset["oscillates"] == 0)
         if self.has("cycle_count"):
             trusted = trusted & np.isfinite(self.dataset["cycle_count"].isel(cycle=-1))
         found: NDArray[np.bool_] = trusted.transpose(*self.axes).values & ~self.ended("sensitive")

@@ -83,7 +83,6 @@ def make_result(
         "jump_cycle": np.full(shape, math.nan),
         "fold_frequency": np.full(shape, math.nan),
         "step_limit": np.full(shape, 5000.0),
-        "oscillates": np.zeros(shape, dtype=np.int8),
         "branch": np.zeros(shape, dtype=np.int32),
         "run_time": 1.0 + peak,
     }

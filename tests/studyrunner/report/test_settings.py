@@ -45,7 +45,6 @@ def finest_file(estimate, exact=False):
         dataset["run_time"].values[place] = time_of(*at)
     dataset["error_estimate"][:] = estimate
     dataset["response_error"][:] = estimate
-    dataset["oscillates"][:] = 0
     if exact:
         course = WORN * np.array([0.0, 0.5, 1.0])
         dataset["exact_worn_volume"] = dataset["worn_volume"].copy(data=np.broadcast_to(course, (*shape, 3)))
