@@ -23,6 +23,9 @@ class MissionOptions:
     """Frequencies before those that are added."""
     most_frequencies: int = 400
     """Most frequencies of a passage."""
+    finest_interval: float = 0.1
+    """Longest interval of frequencies that is never divided, over sqrt(|df/dt|): a tenth of zeta f at a sweep rate of 1.
+    Slider without damping, from 1 to 10 000 Hz at 10 Hz/s: a result, without this limit none in 400 s."""
     frequency_error: float = 0.25
     """Allowed error of the wear of a passage by its frequencies, as a fraction of rtol."""
     largest_sweep_rate: float = 1.0
