@@ -16,8 +16,9 @@ a part of the error, and falls with the wear of one passage.
 
 A slow passage finds the steady states. What a faster one may wear more or less is a part of its error, see
 `solver.missions.delay`. A vibration passes df in the time df / |df/dt|, in which it does not tell apart frequencies
-that are closer than 1 / time: an interval far below sqrt(|df/dt|) is not divided. Without this limit no number of frequencies
-suffices at the resonance of a structure without damping that friction does not limit: its integral is infinite.
+that are closer than 1 / time: an interval far below sqrt(|df/dt|) is not divided. Without this limit no number of
+frequencies suffices at the resonance of a structure without damping that friction does not limit: its integral is
+infinite.
 """
 
 from __future__ import annotations
