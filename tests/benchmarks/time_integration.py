@@ -24,8 +24,8 @@ volume and tip amplitude of the bundled dovetail root; `--single 16000` takes th
   not settle ends the run.
 - The friction history of sticking pairs converges more slowly than the volume, as the root of the cycles of a period:
   at 212.5 Hz, 16 000 cycles, a pair that sticks is 0.20, 0.11, 0.06 um from its place with 20, 5, 1.5 cycles a period,
-  and it has moved 3 um. Where a pair only just slips this decides: there, `--single 20000` takes the first cycles one
-  by one, without projection.
+  and it has moved 3 um (with 15 periods in one of the mode in each case). Where a pair only just slips this decides:
+  there, `--single 16000` takes the first cycles one by one, without projection.
 """
 
 import argparse
