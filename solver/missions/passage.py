@@ -15,7 +15,10 @@ with the implicit trapezoidal rule in the order of the passage. The square of th
 a part of the error, and falls with the wear of one passage.
 
 A slow passage finds the steady states. What a faster one may wear more or less is a part of its error, see
-`solver.missions.delay`.
+`solver.missions.delay`. A vibration passes df in the time df / |df/dt|, in which it does not tell apart frequencies
+that are closer than 1 / time: an interval far below sqrt(|df/dt|) is not divided. Without this limit no number of
+frequencies suffices at the resonance of a structure without damping that friction does not limit: its integral is
+infinite.
 """
 
 from __future__ import annotations
@@ -204,7 +207,7 @@ def _swept(case: BlockCase, passage: Passage, like: Like | None) -> Swept | Fail
             break
         wanted = []
         for place in np.flatnonzero(errors > allowed / len(errors)):
-            wanted.extend(_between(states[place], states[place + 1]))
+            wanted.extend(_between(states[place], states[place + 1], MISSIONS.finest_interval * passage.rate**0.5))
     wear = np.sum([_part(tuple(states), place) for place in range(len(states))], axis=0)
     return Swept(tuple(states), wear, error, iterations, _needed(states, errors, allowed / len(errors), least))
 
@@ -232,8 +235,8 @@ def _needed(states: list[SweptState], errors: FloatArray, allowed: float, least:
     return (*found, states[-1].frequency)
 
 
-def _between(one: SweptState, other: SweptState) -> list[float]:
-    """Further frequencies between two, Hz: both sides of a jump, or the middle."""
+def _between(one: SweptState, other: SweptState, finest: float) -> list[float]:
+    """Further frequencies between two, Hz: both sides of a jump, or the middle of an interval above `finest`, Hz."""
     low, high = one.frequency, other.frequency
     near = COMMON.negligible * low
     folds = {
@@ -241,7 +244,7 @@ def _between(one: SweptState, other: SweptState) -> list[float]:
     }
     if one.start.branch != other.start.branch and folds:
         return [side for fold in folds for side in (fold - near, fold + near)]
-    return [0.5 * (low + high)] if high - low > 2.0 * near else []
+    return [0.5 * (low + high)] if high - low > max(2.0 * near, finest) else []
 
 
 def interval_errors(states: list[SweptState], area: FloatArray) -> FloatArray:

@@ -544,9 +544,10 @@ def swept_with(monkeypatch, density, depth, near=()):
         return [state(at, density(at), response=1e-3) for at in frequencies]
 
     monkeypatch.setattr("solver.missions.passage._states", states)
-    block = Block(scene("sdof_slider"), Passage(1.0, 2.0, 1.0), 10.0, FRICTION, begin="up")
+    passage = Passage(1.0, 2.0, 1e-4)
+    block = Block(scene("sdof_slider"), passage, 10.0, FRICTION, begin="up")
     case = BlockCase(Mission((block,), WEAR, (0, 1), SETTINGS), 0, np.array([depth]), None, False, SETTINGS, near)
-    swept = _swept(case, Passage(1.0, 2.0, 1.0), None)
+    swept = _swept(case, passage, None)
     assert isinstance(swept, Swept)
     return swept
 
@@ -555,6 +556,13 @@ def test_wear_that_is_round_off_asks_for_no_more_frequencies(monkeypatch):
     noise = np.random.default_rng(0)
     assert len(swept_with(monkeypatch, lambda _: 1e-25 * noise.uniform(), 0.0).states) == MISSIONS.first_frequencies
     assert len(swept_with(monkeypatch, lambda _: 1e-14 * noise.uniform(), 1e-6).states) == MISSIONS.first_frequencies
+
+
+def test_a_resonance_without_any_limit_does_not_ask_for_frequencies_without_end(monkeypatch):
+    """The integral over its steady states is infinite; the error tells that it is not known."""
+    swept = swept_with(monkeypatch, lambda at: 1e-12 / max(abs(at - 1.3), 1e-12), 0.0)
+    assert len(swept.states) < 150 < MISSIONS.most_frequencies
+    assert swept.error > SETTINGS.rtol * float(swept.wear.sum()) * 1e-4
 
 
 def test_the_next_passage_begins_with_the_frequencies_that_count(monkeypatch):
