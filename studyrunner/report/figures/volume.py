@@ -33,7 +33,6 @@ from studyrunner.report.reading.units import Scale, scale_for, show_cycles, show
 from studyrunner.system.progress import count
 
 _MOST_LINES, _MOST_MAPS = 6, 4
-_SEEN = 1e-3
 _CHARACTERS = 80
 """Of titles over panels side by side."""
 _MAPS = {"worn_volume": "worn volume", "wear_rate": "wear rate"}
