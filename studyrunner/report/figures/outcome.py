@@ -4,7 +4,6 @@ beware of: folds and jumps of the branches, steps too long, oscillating wear, un
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator
 
@@ -22,6 +21,7 @@ from studyrunner.report.reading.choice import choose
 from studyrunner.report.reading.known_volumes import settings_of, tell_ends, tell_volumes
 from studyrunner.report.reading.result import CONVERGED, NO_VOLUME, Result, as_sentences
 from studyrunner.report.reading.units import show_cycles, show_number, show_power
+from studyrunner.summary.certificates import certificate_rows
 from studyrunner.system.progress import count
 
 _MOST_ROWS = 24
@@ -124,30 +124,17 @@ def _on(colour: str) -> str:
 
 
 def draw_certificates(result: Result) -> Iterator[Drawing | Missing | Table]:
-    """The table of the worst certificates that the file carries, and the estimated errors over the course."""
-    summary = str(result.dataset.attrs.get("certificate_summary", ""))
-    title = "Certificates: how right the states are"
-    if result.blocks is not None:
-        yield Table("certificates", "Summary of the run", ("what", "found"), _split_summary(summary))
-    elif summary:
-        yield Table("certificates", title, ("certificate", "worst value and where"), _split_summary(summary), _NOTE)
-    else:
-        yield Missing("certificates", title, "The file carries no certificate_summary: run the study anew.")
+    """The table of the worst certificates, and the estimated errors over the course."""
+    rows, title = certificate_rows(result), "Certificates: how right the states are"
+    if rows:
+        yield Table("certificates", title, ("certificate", "largest value", "where"), tuple(rows), _NOTE)
+    elif result.blocks is None:
+        yield Missing("certificates", title, "The file holds no certificates: add residual to [outputs] variables.")
     course = find_course(result)
     if course is not None and result.computed.any():
         drawing = draw_errors(result, course)
         if drawing is not None:
             yield drawing
-
-
-def _split_summary(summary: str) -> tuple[tuple[str, str], ...]:
-    """Lines of label and text, two spaces or more apart."""
-    rows = []
-    for line in summary.splitlines():
-        label, *text = re.split(r"\s{2,}", line.strip(), maxsplit=1)
-        # of nothing there is no place
-        rows.append((label, re.sub(r"^0\.0e\+00 at .*", "0", text[0]) if text else ""))
-    return tuple(rows)
 
 
 def draw_errors(result: Result, course: Course) -> Drawing | None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -17,9 +16,9 @@ from studyrunner.report.reading.chosen import find_values
 from studyrunner.report.reading.endings import Ending, read_endings
 from studyrunner.report.reading.measured import Profile, read_profile
 from studyrunner.report.reading.missions import as_history
-from studyrunner.report.reading.opening import open_file
+from studyrunner.report.reading.opening import open_known
 from studyrunner.report.reading.sample_statistics import SAMPLE, statistics_of
-from studyrunner.report.reading.schema_check import check_dataset, reading_errors, study_tables
+from studyrunner.report.reading.schema_check import study_tables
 from studyrunner.report.reading.units import show_cycles, show_value
 from studyrunner.user_error import UserError, show_text
 
@@ -31,6 +30,9 @@ _COMPLETE = ("converged", "inaccurate", "sensitive")
 
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
+
+_AT_ONCE = 2**21
+"""Numbers that are read at once."""
 
 Point = Mapping[str, int]
 """Index along each axis. A missing axis stands for all its values."""
@@ -124,16 +126,36 @@ class Result:
         return np.asarray(self.computed & (self.errors <= self.rtol))
 
     @property
+    def wears(self) -> bool:
+        """Whether wear was asked for, and not of unworn states or modes only."""
+        return not self.has_modes and (self.has("cycle_count") or bool(self.dataset["cycle"].values[-1] > 0.0))
+
+    @property
     def tells_volumes(self) -> bool:
-        """Whether the file says how well worn volumes are known: with an rtol, and not of unworn states only."""
-        wears = self.has("cycle_count") or self.dataset["cycle"].values[-1] > 0.0
-        return bool(wears and self.has("error_estimate") and np.isfinite(self.rtol).any() and self.computed.any())
+        """Whether the file says how well worn volumes are known, with an rtol."""
+        return bool(self.wears and self.has("error_estimate") and np.isfinite(self.rtol).any() and self.computed.any())
 
     @cached_property
     def worn(self) -> NDArray[np.float64]:
         """Worn volume of each point at its last cycle, m3, or where it ended early; NaN without a state."""
-        worn = self.read("worn_volume").isel(cycle=-1).fillna(self.read("worn_volume").max("cycle"))
-        return np.asarray(worn.transpose(*self.axes).values, dtype=float)
+
+        def last(values: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.where(np.isnan(values[:, -1]), np.fmax.reduce(values, axis=1), values[:, -1])
+
+        return self.over_points("worn_volume", last)
+
+    def over_points(
+        self, name: str, reduce: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        """A number of each point, in the shape of the axes, read some points at a time.
+
+        reduce: from values (n_points, ...) of the variable to (n_points,).
+        """
+        found = []
+        for part in _in_slabs(self.dataset[name], self.axes):
+            values = np.asarray(part.transpose(*self.axes, ...).values, dtype=float)
+            found.append(reduce(values.reshape(-1, *values.shape[len(self.axes) :])))
+        return np.concatenate(found).reshape(self.computed.shape)
 
     def ended(self, word: str) -> NDArray[np.bool_]:
         """Points with the outcome of this word; in the shape of the axes."""
@@ -187,6 +209,12 @@ class Result:
         """What the frequency of the excitation follows, "resonance" or "peak"; empty for given frequencies."""
         given = self.study.get("axes", {}).get("frequency")
         return given if isinstance(given, str) else ""
+
+    @property
+    def stuck_frequency(self) -> float:
+        """First natural frequency with the joint stuck, Hz; NaN where there are several, or the file has none."""
+        found = self.dataset["stuck_frequency"].values if self.has("stuck_frequency") else np.array(math.nan)
+        return float(found) if found.ndim == 0 else math.nan
 
     def study_number(self, table: str, key: str) -> float:
         """A number of the study; NaN where the file does not say."""
@@ -336,6 +364,17 @@ class Result:
         self.dataset.close()
 
 
+def _in_slabs(values: xr.DataArray, axes: Sequence[str]) -> Iterator[xr.DataArray]:
+    """Parts of a variable along its axes, in their order, of which none is much larger than `_AT_ONCE`."""
+    if values.size <= _AT_ONCE or not axes:
+        yield values
+        return
+    axis, *others = axes
+    length = max(1, _AT_ONCE // (values.size // values.sizes[axis]))
+    for start in range(0, values.sizes[axis], length):
+        yield from _in_slabs(values.isel({axis: slice(start, start + length)}), others if length == 1 else [])
+
+
 def as_sentences(*parts: str) -> str:
     """Text of those parts that are not empty, each ended with a full stop."""
     return " ".join(part if part.endswith(".") else f"{part}." for part in parts if part)
@@ -353,8 +392,6 @@ def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None, m
         Where there is no such file, it is no result of `run-study`, or it has no such point.
     """
     profile = None if measured is None else read_profile(measured)
-    opened = open_file(path)
-    with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
-        dataset, blocks = as_history(check_dataset(opened, str(path)))
-        values = find_values(dataset, chosen or {})
-        return Result(Path(path), dataset, blocks=blocks, chosen=values, measured=profile)
+    dataset, blocks = as_history(open_known(path))
+    values = find_values(dataset, chosen or {})
+    return Result(Path(path), dataset, blocks=blocks, chosen=values, measured=profile)

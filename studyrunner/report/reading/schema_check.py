@@ -15,7 +15,7 @@ from contextlib import contextmanager
 import numpy as np
 import xarray as xr
 
-from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
 from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS
 from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
@@ -50,6 +50,7 @@ _INTEGERS = 2.0**63
 _REMEDY = "give a result file of run-study that is whole"
 
 _WITHOUT_AXES = {name: entry for table in ("mesh", "natural_frequency") for name, entry in SCENE[table].items()}
+_WITHOUT_AXES["stuck_frequency"] = STUCK_FREQUENCY
 _WITH_AXES = ASKED | KEPT | LOOPS | COUNTS | SCENE["exact"]
 _OF_CONTACTS = {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
 _ATTRIBUTES = {"units": _LONGEST_NAME, "long_name": _LONGEST_SENTENCE, "flag_meanings": _LONGEST_TEXT}

@@ -1,0 +1,168 @@
+"""The summary of a result in at most nine lines of plain text: the answer first, then failures, then certainty."""
+
+from __future__ import annotations
+
+import math
+
+from studyrunner.percent import show_percent
+from studyrunner.report.reading.units import scale_for, show_cycles, show_number
+from studyrunner.summary.answer import Failure, ModeRange, Summary
+from studyrunner.summary.wear import Deepest, Life, MostWear, NothingWore, Number, Vibration
+from studyrunner.system.progress import count
+
+MOST_LINES = 9
+_MOST_FAILURES, _MOST_MODES, _MOST_DOUBTS = 2, 4, 1
+_WIDTH = 12
+_PLAIN = str.maketrans({"³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
+_SHARE = 0.5
+"""Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
+
+
+def summary_lines(summary: Summary) -> tuple[str, ...]:
+    """Lines of label and text, in the order in which an engineer asks."""
+    rows: list[tuple[str, str]] = []
+    wear = summary.wear
+    if isinstance(wear, NothingWore):
+        rows.append(("wear", _nothing(wear, summary)))
+    elif summary.samples is not None:
+        samples = summary.samples
+        at = f"{samples.where}{f', the most of {samples.n_points} points' if samples.n_points > 1 else ''}: "
+        after = f" after {_count(wear.count, summary)}" if isinstance(wear, MostWear) else ""
+        rows.append(("wear" + after, (at if samples.where else "") + samples.text))
+    elif isinstance(wear, MostWear):
+        rows.append(("most wear" if wear.n_compared > 1 else "wear", _most(wear, summary)))
+    if isinstance(wear, MostWear):
+        rows.append(("deepest", _deepest(wear.deepest, wear.where if summary.samples is not None else "")))
+        if wear.blocks:
+            rows.append(("blocks", ", ".join(f"{name} {show_percent(share)}" for name, share in wear.blocks)))
+    if summary.vibration is not None:
+        rows.append(_vibration(summary.vibration, summary))
+    rows += [(f"mode {mode.number}", _mode(mode)) for mode in summary.modes[:_MOST_MODES]]
+    if summary.life is not None:
+        rows.append(("life", _life(summary.life, summary)))
+    if summary.mesh is not None:
+        rows.append(("mesh", _mesh(summary)))
+    rows += [("failed", _failure(each, summary.n_points)) for each in summary.failures[:_MOST_FAILURES]]
+    if (left := summary.failures[_MOST_FAILURES:]) and rows:
+        label, text = rows[-1]
+        rows[-1] = label, f"{text}; {count(sum(each.n_points for each in left), 'point')} failed otherwise"
+    rows += [("beware", doubt) for doubt in summary.doubts[:_MOST_DOUBTS]]
+    rows = rows[: MOST_LINES - 1]
+    if summary.certainty is not None:
+        rows.append(("certainty", summary.certainty.sentence))
+    return tuple(f"{label:<{_WIDTH}}{text}".translate(_PLAIN) for label, text in rows)
+
+
+def _count(value: float, summary: Summary) -> str:
+    return show_cycles(value, summary.counted)
+
+
+def show_known(number: Number, units: str) -> str:
+    """A number with its error: "1.52 mm3 +- 1.3 %"."""
+    text = scale_for(units, number.value).show(number.value)
+    if math.isnan(number.error):
+        return f"{text} (error not known)"
+    return f"{text} +- {show_percent(number.error / number.value)}" if number.value > 0.0 else text
+
+
+def _most(wear: MostWear, summary: Summary) -> str:
+    at = f" at {wear.where}" if wear.where else ""
+    when = "in the final state" if math.isinf(wear.count) else f"after {_count(wear.count, summary)}"
+    text = f"{show_known(wear.volume, 'm3')} {when}{at}"
+    if wear.n_left_out:
+        more = f"{count(wear.n_left_out, 'case')} without a known volume"
+        text += f", the most of {wear.n_compared} cases; {more} may wear more"
+    return text
+
+
+def _deepest(deepest: Deepest, where: str) -> str:
+    text = show_known(deepest.depth, "m")
+    if deepest.pair is not None:
+        text += f" at contact pair {deepest.pair}" + (f" of {deepest.surface}" if deepest.surface else "")
+        if all(map(math.isfinite, deepest.position)):
+            text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in deepest.position)}) mm"
+    text += f", at {where}" if where else ""
+    if deepest.edge_share > max(_SHARE, deepest.edge_area):
+        shown = "all" if deepest.edge_share > 0.995 else show_percent(deepest.edge_share)
+        what = f"the wear of {deepest.surface}" if deepest.surface else "the wear"
+        text += f"; {shown} of {what} is in pairs at the edge: correct if the contact ends there, otherwise extend it"
+    return text
+
+
+def _nothing(wear: NothingWore, summary: Summary) -> str:
+    why = "no volume is worn"
+    if wear.largest_slip == 0.0:
+        why = "all pairs stick"
+    elif wear.largest_slip > 0.0:
+        why = f"pairs slip by up to {scale_for('m', wear.largest_slip).show(wear.largest_slip)}, without wear"
+    everywhere = wear.n_points == summary.n_points
+    points = f"all {wear.n_points} points" if everywhere else f"the {count(wear.n_points, 'point')} with a result"
+    text = f"nothing wore: {why} at {wear.where or points}"
+    return text + (f" ({_stuck(summary)})" if math.isfinite(summary.stuck_frequency) else "")
+
+
+def _stuck(summary: Summary) -> str:
+    return f"first resonance {summary.stuck_frequency:.4g} Hz when all pairs stick"
+
+
+def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
+    first, last = (scale_for("m", *vibration.amplitude).show(each) for each in vibration.amplitude)
+    start, end = vibration.frequency
+    at = f" at {vibration.where}" if vibration.where else ""
+    worn = isinstance(summary.wear, MostWear)
+    if vibration.followed:
+        known = "" if math.isnan(end.error) else f" +- {end.error:.2g}"
+        moved = f"moved from {start:.6g} to {end.value:.6g}{known} Hz" if worn else f"at {start:.6g} Hz"
+        return vibration.followed, f"{moved}, response of {vibration.of} {f'{first} to {last}' if worn else first}"
+    text = f"{vibration.of}{at}: {first}"
+    text += f" when new, {last} when worn" if worn else ""
+    if math.isfinite(start):
+        peak = scale_for("m", vibration.peak).show(vibration.peak)
+        text += f"; the new joint responds most at {start:.6g} Hz ({peak})"
+    if worn and math.isfinite(summary.stuck_frequency):
+        text += f"; {_stuck(summary)}"
+    return "response", text
+
+
+def _life(life: Life, summary: Summary) -> str:
+    units = {"wear_depth": "m", "worn_volume": "m3", "frequency_shift": "Hz"}.get(life.quantity, "1")
+    target = f"{life.quantity.replace('_', ' ')} {scale_for(units, life.target).show(life.target)}"
+    beyond = f"{count(life.n_beyond, 'point')} {'does' if life.n_beyond == 1 else 'do'} not reach it"
+    if math.isnan(life.count.value):
+        return f"{target} is not reached by any point computed to the end"
+    known = "error not known"
+    if math.isfinite(life.count.error):
+        known = f"+- {show_percent(life.count.error / life.count.value)}"
+    text = f"{_count(round(life.count.value), summary)} {known} to {target}"
+    text += f", the shortest, at {life.where}" if life.where and summary.n_points > 1 else ""
+    return text + (f"; {beyond}" if life.n_beyond else "")
+
+
+def _mode(mode: ModeRange) -> str:
+    if not mode.n_found:
+        return f"found at none of {count(mode.n_points, 'point')}"
+    low, high = (f"{each:.6g}" for each in mode.frequency)
+    least, most = (f"{100.0 * each:.3g}" for each in mode.damping)
+    frequency = low if low == high else f"{low} to {high}"
+    damping = least if least == most else f"{least} to {most}"
+    found = "" if mode.n_found == mode.n_points else f", found at {mode.n_found} of {mode.n_points} points"
+    over = f" over {mode.over}" if mode.over else ""
+    return f"natural frequency {frequency} Hz, damping ratio {damping} %{over}{found}"
+
+
+def _mesh(summary: Summary) -> str:
+    mesh = summary.mesh
+    assert mesh is not None
+    coarse, fine = (show_number(each) for each in mesh.meshes)
+    text = f"worn volumes of meshes {coarse} and {fine} differ by {show_percent(mesh.median)} {mesh.at}"
+    text += f", at most {show_percent(mesh.largest)}" if mesh.largest > mesh.median else ""
+    if mesh.limit is not None:
+        volume, order = mesh.limit
+        text += f"; an infinitely fine one would wear {scale_for('m3', volume).show(volume)} (order {order:.1f})"
+    return text
+
+
+def _failure(failure: Failure, n_points: int) -> str:
+    text = f"{failure.n_points} of {count(n_points, 'point')}: {failure.sentence or failure.word}."
+    text += f" {failure.advice}." if failure.advice else ""
+    return text + (f" First: {failure.first}" if failure.first else "")
