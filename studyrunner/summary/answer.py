@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from studyrunner.report.reading.known_volumes import Certainty, advise_ended, certainty_of, describe_ended
 from studyrunner.report.reading.missions import as_history
-from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.result import COMPLETE_WORDS, Result
 from studyrunner.report.reading.sample_statistics import SAMPLE
-from studyrunner.report.reading.units import show_value
-from studyrunner.statistics.sentence import sentence
+from studyrunner.report.reading.units import show_number
+from studyrunner.statistics.ranking import describe_ranking
+from studyrunner.statistics.sentence import describe_volumes
 from studyrunner.summary.doubts import doubts
 from studyrunner.summary.mesh_change import MeshChange, compare_meshes
 from studyrunner.summary.wear import (
@@ -33,19 +34,19 @@ from studyrunner.summary.wear import (
     where_is,
 )
 
-_COMPLETE = ("converged", "inaccurate", "not_computed")
-
 
 @dataclass(frozen=True)
 class Samples:
     """What the samples say, at the point of the other axes where their median is largest.
 
-    where: this point in words. n_points: how many there are. text: `statistics.sentence.sentence`. n_samples: of it.
+    where: this point in words. n_points: how many there are. volumes, ranking: range and median of the worn volumes,
+    and which input decides, in words.
     """
 
     where: str
     n_points: int
-    text: str
+    volumes: str
+    ranking: str
 
 
 @dataclass(frozen=True)
@@ -65,9 +66,13 @@ class ModeRange:
 
 @dataclass(frozen=True)
 class Failure:
-    """Points that ended in one way without a result. sentence, advice: on them. first: of them, in words."""
+    """Points that ended in one way but `converged`. sentence, advice: on them. first: of them, in words.
+
+    is_complete: whether they were computed to the end, and are uncertain only.
+    """
 
     word: str
+    is_complete: bool
     n_points: int
     sentence: str
     advice: str
@@ -142,14 +147,18 @@ def _samples(result: Result) -> Samples | None:
     place = np.unravel_index(int(np.argmax(medians.values)), medians.shape)
     point = {str(name): int(index) for name, index in zip(medians.dims, place, strict=True)}
     where = result.describe(point, [name for name in result.varying if name != SAMPLE])
-    return Samples(where, int(medians.size), sentence(last.isel(point)))
+    point_of_all = last.isel(point)
+    return Samples(where, int(medians.size), describe_volumes(point_of_all), describe_ranking(point_of_all))
 
 
 def _modes(result: Result) -> tuple[ModeRange, ...]:
     place, found = result.axes.index("mode"), []
-    ends = ((result.dataset[name], name) for name in result.varying if name != "mode")
-    over = ", ".join(f"{show_value(axis, 0)} to {show_value(axis, -1).removeprefix(f'{name} ')}" for axis, name in ends)
-    over = over.replace("_", " ")
+    ends = ((name, result.dataset[name].values) for name in result.varying if name != "mode")
+    over = ", ".join(
+        f"{name.replace('_', ' ')} {' to '.join(show_number(float(each)) for each in (values[0], values[-1]))}"
+        for name, values in ends
+        if values.dtype.kind in "iuf"
+    )
     for index, number in enumerate(result.dataset["mode"].values.tolist()):
         computed = np.asarray(result.computed.take(index, axis=place))
         frequency, damping = (_ends(result, name, index, computed) for name in ("natural_frequency", "damping_ratio"))
@@ -168,16 +177,18 @@ def _ends(result: Result, name: str, mode: int, computed: NDArray[np.bool_]) -> 
 def _failures(result: Result) -> tuple[Failure, ...]:
     numbers, counts = np.unique(result.dataset["outcome"].values, return_counts=True)
     found = []
-    for number, n_points in sorted(zip(numbers.tolist(), counts.tolist(), strict=True), key=lambda each: -each[1]):
+    for number, n_points in zip(numbers.tolist(), counts.tolist(), strict=True):
         ending = result.endings[number]
-        if ending.word in _COMPLETE:
+        if ending.word == "converged":
             continue
+        is_complete = ending.word in COMPLETE_WORDS
         lines = describe_ended(result, number)
-        if ending.word == "sensitive":
-            # what its message holds is no result
+        if ending.word == "sensitive" or not lines:
+            # what the message of a sensitive one holds is no result
             place = np.argwhere(result.dataset["outcome"].values == number)[0]
             lines = [where_is(result, dict(zip(result.axes, map(int, place), strict=True)))]
         first = re.split(r"[.:](?:\s|$)", ending.sentence)[0]
         advice = " ".join(advise_ended(result, number)[:1]).rstrip(".")
-        found.append(Failure(ending.word, n_points, first, advice, lines[0] if lines else ""))
+        found.append(Failure(ending.word, is_complete, n_points, first, advice, lines[0]))
+    found.sort(key=lambda each: (each.is_complete, -each.n_points))
     return tuple(found)

@@ -1,4 +1,4 @@
-"""How right the states of a result are: the largest of each certificate, with its place, for the table of the report."""
+"""How right the states of a result are: the largest value of each certificate and its place, for the report."""
 
 from __future__ import annotations
 

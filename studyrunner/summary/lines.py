@@ -6,13 +6,13 @@ import math
 
 from studyrunner.percent import show_percent
 from studyrunner.report.reading.units import scale_for, show_cycles, show_number
-from studyrunner.summary.answer import Failure, ModeRange, Summary
+from studyrunner.summary.answer import Failure, ModeRange, Samples, Summary
 from studyrunner.summary.wear import Deepest, Life, MostWear, NothingWore, Number, Vibration
 from studyrunner.system.progress import count
 
 MOST_LINES = 9
 _MOST_FAILURES, _MOST_MODES, _MOST_DOUBTS = 2, 4, 1
-_WIDTH = 12
+_WIDTH, _LONGEST = 12, 160
 _PLAIN = str.maketrans({"³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 _SHARE = 0.5
 """Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
@@ -25,14 +25,12 @@ def summary_lines(summary: Summary) -> tuple[str, ...]:
     if isinstance(wear, NothingWore):
         rows.append(("wear", _nothing(wear, summary)))
     elif summary.samples is not None:
-        samples = summary.samples
-        at = f"{samples.where}{f', the most of {samples.n_points} points' if samples.n_points > 1 else ''}: "
-        after = f" after {_count(wear.count, summary)}" if isinstance(wear, MostWear) else ""
-        rows.append(("wear" + after, (at if samples.where else "") + samples.text))
+        rows += _samples(summary.samples, summary)
     elif isinstance(wear, MostWear):
         rows.append(("most wear" if wear.n_compared > 1 else "wear", _most(wear, summary)))
     if isinstance(wear, MostWear):
-        rows.append(("deepest", _deepest(wear.deepest, wear.where if summary.samples is not None else "")))
+        at = f" in the sample that wears most, {wear.where}" if summary.samples is not None else ""
+        rows.append(("deepest", _deepest(wear.deepest, at)))
         if wear.blocks:
             rows.append(("blocks", ", ".join(f"{name} {show_percent(share)}" for name, share in wear.blocks)))
     if summary.vibration is not None:
@@ -42,10 +40,11 @@ def summary_lines(summary: Summary) -> tuple[str, ...]:
         rows.append(("life", _life(summary.life, summary)))
     if summary.mesh is not None:
         rows.append(("mesh", _mesh(summary)))
-    rows += [("failed", _failure(each, summary.n_points)) for each in summary.failures[:_MOST_FAILURES]]
+    for each in summary.failures[:_MOST_FAILURES]:
+        rows.append(("uncertain" if each.is_complete else "failed", _failure(each, summary.n_points)))
     if (left := summary.failures[_MOST_FAILURES:]) and rows:
         label, text = rows[-1]
-        rows[-1] = label, f"{text}; {count(sum(each.n_points for each in left), 'point')} failed otherwise"
+        rows[-1] = label, f"{text}; {count(sum(each.n_points for each in left), 'point')} ended otherwise"
     rows += [("beware", doubt) for doubt in summary.doubts[:_MOST_DOUBTS]]
     rows = rows[: MOST_LINES - 1]
     if summary.certainty is not None:
@@ -75,13 +74,24 @@ def _most(wear: MostWear, summary: Summary) -> str:
     return text
 
 
+def _samples(samples: Samples, summary: Summary) -> list[tuple[str, str]]:
+    text = samples.volumes
+    if isinstance(summary.wear, MostWear):
+        text += f" after {_count(summary.wear.count, summary)}"
+    if samples.where:
+        text += f", at {samples.where}"
+    if samples.n_points > 1:
+        text += f", the most of {samples.n_points} points"
+    return [("wear", text), *([("input", samples.ranking)] if samples.ranking else [])]
+
+
 def _deepest(deepest: Deepest, where: str) -> str:
     text = show_known(deepest.depth, "m")
     if deepest.pair is not None:
         text += f" at contact pair {deepest.pair}" + (f" of {deepest.surface}" if deepest.surface else "")
         if all(map(math.isfinite, deepest.position)):
             text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in deepest.position)}) mm"
-    text += f", at {where}" if where else ""
+    text += where
     if deepest.edge_share > max(_SHARE, deepest.edge_area):
         shown = "all" if deepest.edge_share > 0.995 else show_percent(deepest.edge_share)
         what = f"the wear of {deepest.surface}" if deepest.surface else "the wear"
@@ -90,26 +100,20 @@ def _deepest(deepest: Deepest, where: str) -> str:
 
 
 def _nothing(wear: NothingWore, summary: Summary) -> str:
-    why = "no volume is worn"
+    why = ""
     if wear.largest_slip == 0.0:
-        why = "all pairs stick"
+        why = ": all pairs stick"
     elif wear.largest_slip > 0.0:
-        why = f"pairs slip by up to {scale_for('m', wear.largest_slip).show(wear.largest_slip)}, without wear"
-    everywhere = wear.n_points == summary.n_points
-    points = f"all {wear.n_points} points" if everywhere else f"the {count(wear.n_points, 'point')} with a result"
-    text = f"nothing wore: {why} at {wear.where or points}"
-    return text + (f" ({_stuck(summary)})" if math.isfinite(summary.stuck_frequency) else "")
-
-
-def _stuck(summary: Summary) -> str:
-    return f"first resonance {summary.stuck_frequency:.4g} Hz when all pairs stick"
+        why = f": pairs slip by up to {scale_for('m', wear.largest_slip).show(wear.largest_slip)} without wear"
+    stuck = f" (first resonance {summary.stuck_frequency:.4g} Hz)" if math.isfinite(summary.stuck_frequency) else ""
+    return f"nothing wore{why} at {wear.where}{stuck}"
 
 
 def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
     first, last = (scale_for("m", *vibration.amplitude).show(each) for each in vibration.amplitude)
     start, end = vibration.frequency
-    at = f" at {vibration.where}" if vibration.where else ""
     worn = isinstance(summary.wear, MostWear)
+    at = " there" if worn else f" at {vibration.where}" if vibration.where else ""
     if vibration.followed:
         known = "" if math.isnan(end.error) else f" +- {end.error:.2g}"
         moved = f"moved from {start:.6g} to {end.value:.6g}{known} Hz" if worn else f"at {start:.6g} Hz"
@@ -120,7 +124,7 @@ def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
         peak = scale_for("m", vibration.peak).show(vibration.peak)
         text += f"; the new joint responds most at {start:.6g} Hz ({peak})"
     if worn and math.isfinite(summary.stuck_frequency):
-        text += f"; {_stuck(summary)}"
+        text += f"; first resonance {summary.stuck_frequency:.4g} Hz when all pairs stick"
     return "response", text
 
 
@@ -165,4 +169,5 @@ def _mesh(summary: Summary) -> str:
 def _failure(failure: Failure, n_points: int) -> str:
     text = f"{failure.n_points} of {count(n_points, 'point')}: {failure.sentence or failure.word}."
     text += f" {failure.advice}." if failure.advice else ""
-    return text + (f" First: {failure.first}" if failure.first else "")
+    first = failure.first if len(failure.first) <= _LONGEST else f"{failure.first[:_LONGEST].rsplit(' ', 1)[0]} ..."
+    return text + (f" First: {first}" if first else "")

@@ -67,13 +67,12 @@ class MostWear:
 class NothingWore:
     """No point that was computed to the end wears.
 
-    largest_slip: m, of any pair, 0 where all stick; NaN where the file does not say. where: the point in words, empty
-    for several. n_points: their number.
+    largest_slip: m, of any pair, 0 where all stick; NaN where the file does not say. where: these points in words, as
+    "212 Hz" or "all 3 frequencies".
     """
 
     largest_slip: float
     where: str
-    n_points: int
 
 
 @dataclass(frozen=True)
@@ -174,7 +173,7 @@ def _deepest(result: Result, point: dict[str, int], at: int) -> Deepest:
     share = of_area = math.nan
     if surface is not None and area is not None and "contact_edge" in found:
         own, edge = surface == surface[pair], found["contact_edge"] != 0
-        if edge[own].any():
+        if edge[own].any() and depth[own].any():
             share, of_area = (float(each[own & edge].sum() / each[own].sum()) for each in (depth * area, area))
     return Deepest(
         Number(float(depth[pair]), error),
@@ -198,8 +197,16 @@ def _nothing(result: Result, best: NDArray[np.bool_]) -> NothingWore:
     if result.has("slip_range"):
         largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=(1, 2)))
         slip = float(largest[best].max())
-    where = where_is(result, result.shown_point()) if best.size == 1 else ""
-    return NothingWore(0.0 if slip < _NO_SLIP else slip, where, int(np.count_nonzero(result.computed)))
+    return NothingWore(0.0 if slip < _NO_SLIP else slip, _all_points(result))
+
+
+def _all_points(result: Result) -> str:
+    n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
+    one = result.varying[0] if len(result.varying) == 1 else ""
+    words = {"frequency": "frequencies", "sample": "samples"}.get(one, "points")
+    if n_computed < n_points:
+        return f"{n_computed} of {n_points} {words}, the others have no result"
+    return f"all {n_points} {words}" if n_points > 1 else where_is(result, result.shown_point()) or "the only point"
 
 
 def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibration | None:

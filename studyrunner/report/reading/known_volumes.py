@@ -70,7 +70,7 @@ def certainty_of(result: Result, *, wore: bool = True) -> Certainty | None:
     None where the file has no errors.
     """
     if result.has_modes:
-        return _certainty(result, "mode", _of_modes(result))
+        return _certainty(result, "point", _of_modes(result))
     responses = result.has("response_error") and result.blocks is None
     if result.tells_volumes and (wore or not responses):
         return _certainty(result, "worn volume", result.errors)

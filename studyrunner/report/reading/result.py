@@ -25,7 +25,7 @@ from studyrunner.user_error import UserError, show_text
 CONVERGED = 0
 """The `outcome` of a point that was computed to the end without restriction."""
 
-_COMPLETE = ("converged", "inaccurate", "sensitive")
+COMPLETE_WORDS = ("converged", "inaccurate", "sensitive")
 """Outcomes of points that were computed to the end."""
 
 NO_VOLUME = 1e-24
@@ -82,7 +82,7 @@ class Result:
         if not self.has("last_cycle") and not self.has_modes:
             # an older file holds nothing of any other point
             return np.asarray(outcome == CONVERGED)
-        complete = [number for number, ending in self.endings.items() if ending.word in _COMPLETE]
+        complete = [number for number, ending in self.endings.items() if ending.word in COMPLETE_WORDS]
         return np.asarray(np.isin(outcome, complete))
 
     @cached_property
