@@ -143,7 +143,7 @@ def _samples(result: Result) -> Samples | None:
     if statistics is None:
         return None
     last = statistics.isel(cycle=-1, missing_dims="ignore")
-    medians = last["worn_volume_mean"].isel(bound=0)
+    medians = last["worn_volume_quantile"].sel(quantile=0.5).isel(bound=0)
     place = np.unravel_index(int(np.argmax(medians.values)), medians.shape)
     point = {str(name): int(index) for name, index in zip(medians.dims, place, strict=True)}
     where = result.describe(point, [name for name in result.varying if name != SAMPLE])

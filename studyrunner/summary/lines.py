@@ -28,6 +28,8 @@ def summary_lines(summary: Summary) -> tuple[str, ...]:
         rows += _samples(summary.samples, summary)
     elif isinstance(wear, MostWear):
         rows.append(("most wear" if wear.n_compared > 1 else "wear", _most(wear, summary)))
+    elif summary.certainty is not None and summary.certainty.of == "worn volume":
+        rows.append(("wear", "no worn volume is known within 50 %"))
     if isinstance(wear, MostWear):
         at = f" in the sample that wears most, {wear.where}" if summary.samples is not None else ""
         rows.append(("deepest", _deepest(wear.deepest, at)))
