@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from studyrunner.report.reading.result import NO_VOLUME, Result
-from studyrunner.summary.wear import best_known
 
 _MESH = "mesh"
 _ORDERS = (0.5, 4.0)
@@ -44,7 +43,7 @@ def compare_meshes(result: Result) -> MeshChange | None:
     order = np.argsort(meshes)
     rows = [
         np.moveaxis(each, result.axes.index(_MESH), -1)[..., order].reshape(-1, len(meshes))
-        for each in (np.where(best_known(result)[0], result.worn, np.nan), result.errors)
+        for each in (np.where(result.best_known, result.worn, np.nan), result.errors)
     ]
     volumes, errors = rows
     fine = np.fmax(volumes[:, -1], volumes[:, -2])

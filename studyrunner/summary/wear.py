@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 from studyrunner.report.reading.result import NO_VOLUME, Result
 from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
 
-_WELL_ENOUGH = 0.5
-"""Largest relative error of a number that is told: the limit of the outcome `sensitive`."""
-_OF_STEPS = ("step", "scheme")
 _NO_SLIP = 1e-12  # m, round-off: less than the size of an atom
 
 
@@ -107,27 +104,6 @@ class Life:
     n_beyond: int
 
 
-def usable(result: Result) -> NDArray[np.bool_]:
-    """Points whose worn volume is a result: computed to the end, and not known to a factor of two only."""
-    found = result.computed & ~result.ended("sensitive")
-    if result.has("oscillates"):
-        found = found & (result.read("oscillates").values == 0)
-    return found & (result.errors <= _WELL_ENOUGH) if result.has("error_estimate") else found
-
-
-def best_known(result: Result) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Of usable points that differ in numerical settings only, those with the smallest error; whether a case has any.
-
-    The first in the shape of the axes, the second in that of the axes that are no numerical settings.
-    """
-    found = usable(result)
-    errors = np.where(found, result.errors if result.has("error_estimate") else 0.0, np.inf)
-    numerical = [name for name in result.axes if name in _OF_STEPS or name in result.study.get("solver", {})]
-    labelled = xr.DataArray(errors, dims=result.axes)
-    least = labelled.min(numerical)
-    return np.asarray(found & (labelled <= least).transpose(*result.axes).values), np.isfinite(least.values)
-
-
 def where_is(result: Result, point: dict[str, int]) -> str:
     """A point in words, along the axes that vary; where none does, its frequency."""
     return result.describe(point, result.varying or ("frequency",))
@@ -135,7 +111,7 @@ def where_is(result: Result, point: dict[str, int]) -> str:
 
 def most_wear(result: Result) -> MostWear | NothingWore | None:
     """The point that wears most; None where no wear was asked for, or no worn volume is known."""
-    best, known = best_known(result)
+    best = result.best_known
     if not result.wears or not result.has("worn_volume") or not best.any():
         return None
     worn = np.where(best, result.worn, -1.0)
@@ -147,13 +123,19 @@ def most_wear(result: Result) -> MostWear | NothingWore | None:
     return MostWear(
         point,
         where_is(result, point),
-        int(known.sum()),
-        int(known.size - known.sum()),
+        *_count_cases(result),
         float(result.counts(point)[at]),
         Number(volume, volume * float(result.errors[place])),
         _deepest(result, point, at),
         _blocks(result, point, volume),
     )
+
+
+def _count_cases(result: Result) -> tuple[int, int]:
+    """Number of cases with a worn volume that is known, and without: points that differ in more than steps."""
+    best = xr.DataArray(result.best_known, dims=result.axes)
+    known = best.any(result.numerical)
+    return int(known.sum()), int(known.size - known.sum())
 
 
 def _deepest(result: Result, point: dict[str, int], at: int) -> Deepest:

@@ -108,7 +108,7 @@ def test_correlations_tell_which_input_decides():
         (
             30.0,
             12,
-            r"which input decides is not known: \w+ coefficient has the largest rank correlation -?0\.\d\d, interval .*",
+            r"which input decides is not known: \w+ coefficient has the largest rank .*, interval .*",
         ),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 
 from solver.outcome import Outcome
 from studyrunner.advice import Used, advise, advise_error, advise_steps
-from studyrunner.percent import known_to, show_percent, show_rtol
+from studyrunner.percent import show_percent, show_rtol
 from studyrunner.report.reading.known_volumes import settings_of
 from studyrunner.report.reading.missions import as_history
 from studyrunner.report.reading.result import Result
@@ -415,8 +415,3 @@ def test_an_error_is_shown_on_its_side_of_rtol(error, rtol, text):
     if error < 1.0:
         shown, limit = float(text.removesuffix(" %")), float(show_rtol(rtol).removesuffix(" %"))
         assert (shown <= limit) == (error <= rtol)
-
-
-def test_what_is_not_finite_is_not_known():
-    assert known_to(0.010003, 0.01) == "is known to 1.0003 % only"
-    assert known_to(float("inf"), 0.01) == "is not known"

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from studyrunner.advice import Used, advise, advise_error
 from studyrunner.percent import show_percent, show_rtol
-from studyrunner.report.reading.result import Point, Result
+from studyrunner.report.reading.result import WELL_ENOUGH, Point, Result
 from studyrunner.report.reading.units import show_cycles
 from studyrunner.system.progress import count
 
 _MOST_NAMED = 10
-_WELL_ENOUGH = 0.5  # largest relative error of what is known at all, that of the outcome `sensitive`
 _AUTO = "auto"
 _OF_ADVICE = ("scheme", "sweep", "harmonics", "samples", "rtol")
 
@@ -51,7 +50,7 @@ class Certainty:
         """The certainty in one sentence."""
         aim = f"rtol = {show_rtol(self.rtol)}" if math.isfinite(self.rtol) else "their rtol"
         held = self.rtol if math.isfinite(self.rtol) else None
-        known = f"known within {show_percent(self.worst, held)}" if self.worst <= _WELL_ENOUGH else "not known"
+        known = f"known within {show_percent(self.worst, held)}" if self.worst <= WELL_ENOUGH else "not known"
         advice = f": {self.advice}" if self.advice else ""
         if self.n_points == 1 and not self.n_short:
             return f"the {self.of} is {known} ({aim}){advice}"
@@ -147,7 +146,7 @@ def describe_ended(result: Result, number: int) -> list[str]:
                 if result.computed[place]
                 else f"computed up to {show_cycles(float(result.last_cycle[place]), result.counted)}"
             )
-            known = f"worn volume known within {show_error(result, place)}" if 0.0 < error <= _WELL_ENOUGH else ""
+            known = f"worn volume known within {show_error(result, place)}" if 0.0 < error <= WELL_ENOUGH else ""
             said = ", ".join(filter(None, (end, known, said)))
         where = result.describe(_point(result, place))
         lines += [f"{where}: {said}"] if said else []

@@ -31,6 +31,11 @@ COMPLETE_WORDS = ("converged", "inaccurate", "sensitive")
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
 
+WELL_ENOUGH = 0.5
+"""Largest relative error of a number that is a result: that of the outcome `sensitive`."""
+
+_OF_STEPS = ("step", "scheme")
+
 _AT_ONCE = 2**21
 """Numbers that are read at once."""
 
@@ -129,6 +134,32 @@ class Result:
     def wears(self) -> bool:
         """Whether wear was asked for, and not of unworn states or modes only."""
         return not self.has_modes and (self.has("cycle_count") or bool(self.dataset["cycle"].values[-1] > 0.0))
+
+    @cached_property
+    def usable(self) -> NDArray[np.bool_]:
+        """Points whose worn volume is a result: computed to the end, and not known to a factor of two only."""
+        found = self.computed & ~self.ended("sensitive")
+        if self.has("oscillates"):
+            found = found & (self.dataset["oscillates"].values == 0)
+        return found & (self.errors <= WELL_ENOUGH) if self.has("error_estimate") else found
+
+    @cached_property
+    def numerical(self) -> list[str]:
+        """Axes that are numerical settings."""
+        return [name for name in self.axes if name in _OF_STEPS or name in self.study.get("solver", {})]
+
+    @cached_property
+    def best_known(self) -> NDArray[np.bool_]:
+        """Of usable points that differ in numerical settings only, those with the smallest error.
+
+        Of explicit histories, which wear too much, only those without another one of the same case.
+        """
+        errors = np.where(self.usable, self.errors if self.has("error_estimate") else 0.0, np.inf)
+        labelled = xr.DataArray(errors, dims=self.axes)
+        if "scheme" in self.axes:
+            labelled = labelled + xr.DataArray(self.dataset["scheme"].values == "explicit", dims="scheme")
+        best = labelled <= labelled.min(self.numerical)
+        return np.asarray(self.usable & best.transpose(*self.axes).values)
 
     @property
     def tells_volumes(self) -> bool:
@@ -273,34 +304,32 @@ class Result:
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show.
 
-        Among the points computed to the end this is the point with the largest final worn volume. Where nothing is
-        worn, or the file has no wear, it is the point with the largest response at the first kept cycle count; else the
-        first computed point; else the first point. Explicit, oscillating and sensitive histories, which wear too much,
-        count only where there is no other; histories that ended early count only where none was computed to the end.
+        Of `best_known` the one with the largest final worn volume. Where nothing is worn, or the file has no wear, the
+        one with the largest response at the first kept cycle count. Other points count only where there is none.
         """
         return dict(self._shown)
 
     @cached_property
     def _shown(self) -> dict[str, int]:
-        candidates = []
+        measures = [np.ones(self.computed.shape)]
         if self.has_modes:
             amplitude = self.dataset["modal_amplitude"].broadcast_like(self.dataset["outcome"])
-            candidates.append(amplitude.transpose(*self.axes).values)
-        elif self.has("worn_volume"):
-            candidates.append(self.worn)
-        if self.has("response_amplitude") and not self.has_modes:
+            measures.insert(0, amplitude.transpose(*self.axes).values)
+        elif self.has("response_amplitude"):
             amplitude = self.read("response_amplitude").isel(cycle=0)
-            candidates.append(amplitude.max("response", skipna=False).values)
-        candidates.append(np.ones(self.computed.shape))
-        wanted = self._wanted
-        usable = self.computed & wanted if (self.computed & wanted).any() else self.held & wanted
-        trusted = usable & self._trusted
-        for measure in candidates:
-            known = np.where((trusted if trusted.any() else usable) & np.isfinite(measure), measure, 0.0)
+            measures.insert(0, amplitude.max("response", skipna=False).transpose(*self.axes).values)
+        if not self.has_modes and self.has("worn_volume"):
+            measures.insert(0, self.worn)
+        with_history = self.best_known
+        if self.has("cycle_count"):
+            with_history = with_history & np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
+        sets = (with_history, self.best_known, self.computed, self.held, np.ones(self.computed.shape, np.bool_))
+        points = next(each & self._wanted for each in sets if (each & self._wanted).any())
+        for measure in measures:
+            known = np.where(points & np.isfinite(measure), measure, 0.0)
             if known.max() > 0.0:
-                place = np.unravel_index(int(np.argmax(known)), known.shape)
-                return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
-        place = np.unravel_index(int(np.argmax(wanted)), wanted.shape)
+                break
+        place = np.unravel_index(int(np.argmax(known)), known.shape)
         return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
 
     @property
@@ -312,22 +341,6 @@ class Result:
             if name in outcome.dims and self.dataset.sizes[name] > 1:
                 wanted = wanted & (self.dataset[name] == value)
         return np.asarray(wanted.transpose(*self.axes).values)
-
-    @property
-    def _trusted(self) -> NDArray[np.bool_]:
-        """Histories that are neither explicit nor sensitive and do not oscillate, no final states without a history; in
-        the shape of the axes.
-        """
-        outcome = self.dataset["outcome"]
-        trusted = xr.ones_like(outcome, dtype=bool)
-        if "scheme" in outcome.dims:
-            trusted = trusted & (self.dataset["scheme"] != "explicit")
-        if self.has("oscillates"):
-            trusted = trusted & (self.dataset["oscillates"] == 0)
-        if self.has("cycle_count"):
-            trusted = trusted & np.isfinite(self.dataset["cycle_count"].isel(cycle=-1))
-        found: NDArray[np.bool_] = trusted.transpose(*self.axes).values & ~self.ended("sensitive")
-        return found
 
     @cached_property
     def course_axis(self) -> str | None:
