@@ -115,7 +115,7 @@ def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
     first, last = (scale_for("m", *vibration.amplitude).show(each) for each in vibration.amplitude)
     start, end = vibration.frequency
     worn = isinstance(summary.wear, MostWear)
-    at = " there" if worn else f" at {vibration.where}" if vibration.where else ""
+    at = " in this case" if worn else f" at {vibration.where}" if vibration.where else ""
     if vibration.followed:
         known = "" if math.isnan(end.error) else f" +- {end.error:.2g}"
         moved = f"moved from {start:.6g} to {end.value:.6g}{known} Hz" if worn else f"at {start:.6g} Hz"
