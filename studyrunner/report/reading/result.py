@@ -320,10 +320,11 @@ class Result:
             measures.insert(0, amplitude.max("response", skipna=False).transpose(*self.axes).values)
         if not self.has_modes and self.has("worn_volume"):
             measures.insert(0, self.worn)
-        with_history = self.best_known
+        marched = np.ones(self.computed.shape, np.bool_)
         if self.has("cycle_count"):
-            with_history = with_history & np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
-        sets = (with_history, self.best_known, self.computed, self.held, np.ones(self.computed.shape, np.bool_))
+            marched = np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
+        usable, best = self.usable, self.best_known
+        sets = (best & marched, usable & marched, best, self.computed, self.held, np.ones_like(marched))
         points = next(each & self._wanted for each in sets if (each & self._wanted).any())
         for measure in measures:
             known = np.where(points & np.isfinite(measure), measure, 0.0)
