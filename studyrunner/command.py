@@ -264,7 +264,11 @@ def _answer(study: Study, path: Path) -> tuple[str, ...]:
     from studyrunner.summary.answer import summary
     from studyrunner.summary.lines import summary_lines
 
-    with open_result(path) as dataset:
-        found = summary(dataset)
+    try:
+        with open_result(path) as dataset:
+            found = summary(dataset)
+    except UserError as error:
+        # the result is there all the same, but larger than what is read
+        return (f"no summary: {error}",)
     room = any(failure.word == "contact_cut_off" for failure in found.failures) and describe_room(study)
     return (*summary_lines(found), *([f"{'':<12}{room}"] if room else []))

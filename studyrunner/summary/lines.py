@@ -13,6 +13,7 @@ from studyrunner.system.progress import count
 MOST_LINES = 9
 _MOST_FAILURES, _MOST_MODES, _MOST_DOUBTS = 2, 4, 1
 _WIDTH, _LONGEST = 12, 160
+_LEAST = 1e-4  # relative error that is told, of any smaller one
 _PLAIN = str.maketrans({"³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 _SHARE = 0.5
 """Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
@@ -63,7 +64,7 @@ def show_known(number: Number, units: str) -> str:
     text = scale_for(units, number.value).show(number.value)
     if math.isnan(number.error):
         return f"{text} (error not known)"
-    return f"{text} +- {show_percent(number.error / number.value)}" if number.value > 0.0 else text
+    return f"{text} +- {show_percent(max(number.error / number.value, _LEAST))}" if number.value > 0.0 else text
 
 
 def _most(wear: MostWear, summary: Summary) -> str:
@@ -112,7 +113,7 @@ def _nothing(wear: NothingWore, summary: Summary) -> str:
 
 
 def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
-    first, last = (scale_for("m", *vibration.amplitude).show(each) for each in vibration.amplitude)
+    first, last = ("not known" if math.isnan(each.value) else show_known(each, "m") for each in vibration.amplitude)
     start, end = vibration.frequency
     worn = isinstance(summary.wear, MostWear)
     at = " in this case" if worn else f" at {vibration.where}" if vibration.where else ""
@@ -135,12 +136,14 @@ def _life(life: Life, summary: Summary) -> str:
     target = f"{life.quantity.replace('_', ' ')} {scale_for(units, life.target).show(life.target)}"
     beyond = f"{count(life.n_beyond, 'point')} {'does' if life.n_beyond == 1 else 'do'} not reach it"
     if math.isnan(life.count.value):
-        return f"{target} is not reached by any point computed to the end"
+        unsure = f"the life of {count(life.n_unsure, 'point')} is not known; " if life.n_unsure else ""
+        return f"{unsure}{target} is not reached by {'another' if unsure else 'any'} point computed to the end"
     known = "error not known"
     if math.isfinite(life.count.error):
         known = f"+- {show_percent(life.count.error / life.count.value)}"
     text = f"{_count(round(life.count.value), summary)} {known} to {target}"
     text += f", the shortest, at {life.where}" if life.where and summary.n_points > 1 else ""
+    text += f"; that of {count(life.n_unsure, 'point')} is not known" if life.n_unsure else ""
     return text + (f"; {beyond}" if life.n_beyond else "")
 
 

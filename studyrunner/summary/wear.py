@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.result import NO_VOLUME, Result
+from studyrunner.report.reading.result import NO_VOLUME, WELL_ENOUGH, Result
 from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
 
 _NO_SLIP = 1e-12  # m, round-off: less than the size of an atom
@@ -78,15 +78,15 @@ class Vibration:
 
     followed: "resonance" or "peak", whose frequency goes from `frequency[0]` to `frequency[1]`, Hz, while the joint
     wears. Else empty: frequency[0] is where the unworn joint responds most among the frequencies, NaN where none lies
-    between two others; frequency[1] is NaN. amplitude: m, of the unworn and of the worn joint at `where`. peak: m, of
-    the unworn joint at frequency[0].
+    between two others; frequency[1] is NaN. amplitude: m, of the unworn and of the worn joint at `where`; NaN where it
+    is known to a factor of two only. peak: m, of the unworn joint at frequency[0].
     """
 
     of: str
     where: str
     followed: str
     frequency: tuple[float, Number]
-    amplitude: tuple[float, float]
+    amplitude: tuple[Number, Number]
     peak: float = math.nan
 
 
@@ -94,7 +94,8 @@ class Vibration:
 class Life:
     """The shortest life. quantity, target: of slow_time.until. count: NaN where no point reaches the target.
 
-    n_beyond: points computed to the end that do not reach it.
+    n_beyond: points computed to the end that do not reach it. n_unsure: those whose life is known to a factor of two
+    only.
     """
 
     quantity: str
@@ -102,6 +103,7 @@ class Life:
     count: Number
     where: str
     n_beyond: int
+    n_unsure: int = 0
 
 
 def where_is(result: Result, point: dict[str, int]) -> str:
@@ -200,7 +202,11 @@ def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibrati
     last = result.last_kept(point)
     amplitude = result.at("response_amplitude", point, [0, last]).transpose("cycle", "response").values
     of = int(np.argmax(amplitude[0]))
-    ends = float(amplitude[0, of]), float(amplitude[-1, of])
+    errors = np.full(2, np.nan)
+    if result.has("response_error"):
+        errors = np.asarray(result.at("response_error", point, [0, last]).values, dtype=float)
+    new, worn = (_known(*each) for each in zip(amplitude[:, of].tolist(), errors.tolist(), strict=True))
+    ends = new, worn
     name, where = result.responses[of], where_is(result, point)
     if result.followed and result.has("excitation_frequency"):
         first, end = result.at("excitation_frequency", point, [0, last]).values.tolist()
@@ -210,6 +216,11 @@ def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibrati
         return Vibration(name, where, result.followed, (first, Number(end, error)), ends)
     frequency, peak = _peak(result, point, of)
     return Vibration(name, where, "", (frequency, Number(math.nan)), ends, peak)
+
+
+def _known(value: float, error: float) -> Number:
+    """A number with its relative error; NaN where that says that it is not known."""
+    return Number(math.nan if error > WELL_ENOUGH else value, error * value)
 
 
 def _peak(result: Result, point: dict[str, int], of: int) -> tuple[float, float]:
@@ -234,11 +245,16 @@ def shortest_life(result: Result) -> Life | None:
         return None
     (quantity, target), *_ = until.items()
     found = result.computed & ~result.ended("sensitive")
-    lives = np.where(found, result.read("cycles_to_target").values, np.nan)
+    lives, errors = (result.read(name).values for name in ("cycles_to_target", "cycles_to_target_error"))
     beyond = int(np.count_nonzero(found & np.isnan(lives)))
+    unsure = found & (errors > WELL_ENOUGH * lives)
+    lives = np.where(found & ~unsure, lives, np.nan)
+    n_unsure = int(np.count_nonzero(unsure))
     if np.isnan(lives).all():
-        return Life(str(quantity), float(target), Number(math.nan), "", beyond)
+        return Life(str(quantity), float(target), Number(math.nan), "", beyond, n_unsure)
     place = np.unravel_index(int(np.nanargmin(lives)), lives.shape)
-    error = float(result.read("cycles_to_target_error").values[place])
+    error = float(errors[place])
     point = {name: int(index) for name, index in zip(result.axes, place, strict=True)}
-    return Life(str(quantity), float(target), Number(float(lives[place]), error), where_is(result, point), beyond)
+    return Life(
+        str(quantity), float(target), Number(float(lives[place]), error), where_is(result, point), beyond, n_unsure
+    )

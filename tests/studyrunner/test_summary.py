@@ -164,7 +164,7 @@ def test_the_peak_of_the_new_joint_lies_between_others():
         made = wearing(*GRID, volume=lambda p: 1e-9 * (p[0] == 2), response_amplitude=response)
         found = summary(made).vibration
         np.testing.assert_equal(found.frequency[0], expected)
-        assert found.amplitude[1] == pytest.approx(2.0 * found.amplitude[0])
+        assert found.amplitude[1].value == pytest.approx(2.0 * found.amplitude[0].value)
         assert found.where.startswith("212.5 Hz")
 
 

@@ -17,6 +17,7 @@ from studyrunner.report.reading.units import show_cycles
 from studyrunner.system.progress import count
 
 _MOST_NAMED = 10
+_LEAST = 1e-4  # relative error that is told, of any smaller one
 _AUTO = "auto"
 _OF_ADVICE = ("scheme", "sweep", "harmonics", "samples", "rtol")
 
@@ -50,7 +51,8 @@ class Certainty:
         """The certainty in one sentence."""
         aim = f"rtol = {show_rtol(self.rtol)}" if math.isfinite(self.rtol) else "their rtol"
         held = self.rtol if math.isfinite(self.rtol) else None
-        known = f"known within {show_percent(self.worst, held)}" if self.worst <= WELL_ENOUGH else "not known"
+        worst = self.worst if held is not None and held < _LEAST else max(self.worst, _LEAST)
+        known = f"known within {show_percent(worst, held)}" if worst <= WELL_ENOUGH else "not known"
         advice = f": {self.advice}" if self.advice else ""
         if self.n_points == 1 and not self.n_short:
             return f"the {self.of} is {known} ({aim}){advice}"

@@ -7,6 +7,7 @@ By hand: `xarray-schema` has no limits of sizes, and leaves texts as they are.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -283,6 +284,7 @@ def _clean(name: object, value: object) -> str:
     return _line(value, longest)
 
 
+@functools.lru_cache(maxsize=4096)  # most messages are the same
 def _line(value: object, longest: int) -> str:
     """Text in one line, without control characters. longest: number of characters."""
     text = value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value)
