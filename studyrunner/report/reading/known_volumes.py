@@ -115,7 +115,7 @@ def _certainty(result: Result, of: str, errors: NDArray[np.float64]) -> Certaint
 def tell_volumes(result: Result) -> str:
     """How well the worn volumes are known, in a sentence; empty where the file has no errors."""
     known = certainty_of(result) if result.tells_volumes else None
-    return f"{known.sentence}." if known else ""
+    return f"{known.sentence[0].upper()}{known.sentence[1:]}." if known else ""
 
 
 def show_error(result: Result, place: tuple[int, ...]) -> str:
