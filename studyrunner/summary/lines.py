@@ -98,7 +98,7 @@ def _deepest(deepest: Deepest, where: str) -> str:
     if deepest.edge_share > max(_SHARE, deepest.edge_area):
         shown = "all" if deepest.edge_share > 0.995 else show_percent(deepest.edge_share)
         what = f"the wear of {deepest.surface}" if deepest.surface else "the wear"
-        text += f"; {shown} of {what} is in pairs at the edge: correct if the contact ends there, otherwise extend it"
+        text += f"; {shown} of {what} is in edge pairs: correct if the contact ends there, otherwise extend it"
     return text
 
 

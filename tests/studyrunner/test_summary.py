@@ -111,7 +111,7 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
         assert deepest.edge_share == pytest.approx(edge)
         assert deepest.edge_area == pytest.approx(0.5)
         text = "\n".join(summary_lines(summary(made)))
-        assert ("at the edge" in text) is (edge > 0.5)
+        assert ("edge pairs" in text) is (edge > 0.5)
 
 
 # --- nothing wore ---
