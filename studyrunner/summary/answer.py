@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from studyrunner.report.reading.known_volumes import Certainty, advise_ended, certainty_of, describe_ended
 from studyrunner.report.reading.missions import as_history
-from studyrunner.report.reading.result import COMPLETE_WORDS, Result
+from studyrunner.report.reading.points import COMPLETE_WORDS
+from studyrunner.report.reading.result import Result
 from studyrunner.report.reading.sample_statistics import SAMPLE
 from studyrunner.report.reading.units import show_number
 from studyrunner.statistics.ranking import describe_ranking

@@ -259,7 +259,7 @@ def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
     made = wearing(*GRID, volume=lambda p: 1e-9 * (3 * p[0] + p[4]), slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
     whole = summary(made)
     for n_values in (1, 7, 50, 100):
-        monkeypatch.setattr("studyrunner.report.reading.result._AT_ONCE", n_values)
+        monkeypatch.setattr("studyrunner.report.reading.points._AT_ONCE", n_values)
         assert summary(made) == whole or str(summary(made)) == str(whole)
 
 

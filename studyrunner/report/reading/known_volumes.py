@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from studyrunner.advice import Used, advise, advise_error
 from studyrunner.percent import show_percent, show_rtol
-from studyrunner.report.reading.result import WELL_ENOUGH, Point, Result
+from studyrunner.report.reading.points import WELL_ENOUGH
+from studyrunner.report.reading.result import Point, Result
 from studyrunner.report.reading.units import show_cycles
 from studyrunner.system.progress import count
 
