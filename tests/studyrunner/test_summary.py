@@ -14,11 +14,11 @@ from studyrunner.report.reading.known_volumes import settings_of
 from studyrunner.report.reading.missions import as_history
 from studyrunner.report.reading.result import Result
 from studyrunner.study.study_file import read_study
-from studyrunner.summary.answer import summary
+from studyrunner.summary.answer import ModeRange, Samples, summary
 from studyrunner.summary.certificates import certificate_rows
 from studyrunner.summary.doubts import SMALL, contact_width
 from studyrunner.summary.lines import MOST_LINES, summary_lines
-from studyrunner.summary.mesh_change import compare_meshes, extrapolate
+from studyrunner.summary.mesh_change import MeshChange, compare_meshes, extrapolate
 from studyrunner.summary.wear import MostWear, NothingWore
 from studyrunner.variables import CERTIFICATE
 from tests.studyrunner.fakes import FACTS
@@ -249,10 +249,13 @@ def test_the_summary_is_short_whatever_came_out():
         error_estimate=lambda _: 0.3,
         facts=BY_SIX,
     )
-    lines = summary_lines(summary(made))
-    assert len(lines) <= MOST_LINES
-    assert all(line.isprintable() and line.isascii() for line in lines)
-    assert lines[-1].startswith("certainty")
+    found = summary(made)
+    of_all = {"samples": Samples("1 Hz", 3, "volumes", "ranking"), "mesh": MeshChange((1, 2), "", 0.1, 0.2, None)}
+    for each in (found, replace(found, **of_all, modes=(ModeRange(1, "", (1, 2), (0, 1), 1, 2),))):
+        lines = summary_lines(each)
+        assert len(lines) <= MOST_LINES
+        assert all(line.isprintable() and line.isascii() for line in lines)
+        assert lines[-1].startswith("certainty")
 
 
 def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
@@ -260,7 +263,13 @@ def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
     whole = summary(made)
     for n_values in (1, 7, 50, 100):
         monkeypatch.setattr("studyrunner.report.reading.points._AT_ONCE", n_values)
-        assert summary(made) == whole or str(summary(made)) == str(whole)
+        assert str(summary(made)) == str(whole)
+        largest = []
+        result_of(made).over_points(
+            "slip_range", lambda values, seen=largest: seen.append(values.size) or values[:, 0, 0]
+        )
+        # no less than one point at once, of 21 counts and 2 pairs
+        assert max(largest) <= max(n_values, 42)
 
 
 # --- certificates ---
