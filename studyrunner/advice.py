@@ -61,8 +61,7 @@ def advise(outcome: str, used: Used) -> str:
         if used.scheme not in _OF_ADAPTIVE_STEPS:
             return _try(*_other_steps(used))
         return _try("a smaller rtol") + (
-            " Where that leaves both apart, the joint itself is that sensitive: its friction coefficient and load,"
-            " varied a little, say more than one number."
+            " Where that leaves both apart, the joint itself is that sensitive: use [scatter]."
         )
     if outcome == "inaccurate":
         return _try(*_given(used))
@@ -85,13 +84,13 @@ def advise_error(error: float, wear_rate_error: Sequence[float], used: Used) -> 
     """
     of_start = len(wear_rate_error) > 0 and wear_rate_error[0] >= _OF_START * error > 0.0
     if _given(used) and of_start:
-        return " and ".join(_given(used))
+        return f"set {' and '.join(_given(used))}"
     if used.scheme not in _OF_ADAPTIVE_STEPS and not of_start:
-        return " or ".join(_other_steps(used))
+        return f"set {' or '.join(_other_steps(used))}"
     if error >= _FAR * used.rtol:
-        return "a smaller rtol"
+        return "set a smaller solver.rtol"
     # steps, harmonics and the walk to the start state all go by rtol: what comes out is about as many times smaller
-    return f"rtol = {_rounded_down(used.rtol**2 / error)}"
+    return f"set solver.rtol = {_rounded_down(used.rtol**2 / error)}"
 
 
 def advise_steps(used: Used) -> str:

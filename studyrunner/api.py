@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -15,8 +14,7 @@ from studyrunner.mpi.ranks import Alone
 from studyrunner.netcdf.creation_date import check_date
 from studyrunner.netcdf.existing_result import Target, check_result
 from studyrunner.netcdf.output import check_output
-from studyrunner.report.reading.opening import open_file
-from studyrunner.report.reading.schema_check import check_dataset, reading_errors
+from studyrunner.report.reading.opening import open_result
 from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
 from studyrunner.scene_building import build_scenes
 from studyrunner.study.study import Study
@@ -109,28 +107,6 @@ def run_study(
         kept = f"{n_done} of {summary.n_points} points are kept, {where}"
         raise KeyboardInterrupt(f"interrupted: {kept}, the same call goes on") from None
     return open_result(target.path)
-
-
-def open_result(path: str | Path) -> xr.Dataset:
-    """Open a result file, once a process of its own has read it without harm and it is known to be a result.
-
-    The dataset is that of `xarray.open_dataset(path)`, read when it is needed, and has the accessor `fretwear`. It
-    keeps the file open until it is closed: use it in a `with` statement, or call its `load` and `close`. A file that is
-    replaced meanwhile, by another run, stays as it was for this dataset.
-
-    Raises
-    ------
-    UserError
-        Where there is no such file, it is no result of `run-study`, or it is damaged: one line.
-    """
-    opened = open_file(path)
-    try:
-        with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
-            check_dataset(opened, str(path))
-    except BaseException:
-        opened.close()
-        raise
-    return opened
 
 
 def _check_output(path: Path, study: Study, *, overwrite: bool) -> Target:

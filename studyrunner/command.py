@@ -177,10 +177,10 @@ def _show_plan(study: Study) -> int:
     from studyrunner.plan.estimate import largest_memory
     from studyrunner.plan.plan_text import format_plan
     from studyrunner.plan.planning import build_tasks
+    from studyrunner.plan.plausibility import doubts_of_study
     from studyrunner.scene.drawn_contacts import contact_changes
     from studyrunner.scene.model_remarks import remarks_of_study
     from studyrunner.scene.planned_scenes import plan_scenes
-    from studyrunner.summary.plausibility import doubts_of_study
 
     before = largest_memory()
     planned = plan_scenes(study, _SlowSteps().say)
@@ -252,12 +252,23 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
         raise KeyboardInterrupt(f"interrupted: {what}, the same command goes on") from None
     failed = summary.n_points - summary.n_complete
     counts = f"{count(summary.n_points, 'point')}, {summary.n_complete} computed, {failed} failed"
-    head = f"{path}: {counts}, {format_seconds(progress.seconds)}"
-    untouched = [] if summary.written else [f"{path} is the finished result that it was"]
-    samples: list[str] = []
-    if study.scatter is not None and summary.written:
-        from studyrunner.sample_lines import describe_samples  # where it is used: it takes a second to load
-
-        samples = describe_samples(target.path)
-    print(head, summary.certificates, *summary.findings, *untouched, *samples, sep="\n", flush=True)
+    print(f"{path}: {counts}, {format_seconds(progress.seconds)}", *_answer(study, target.path), sep="\n", flush=True)
     return SOME_FAILED if failed else CONVERGED
+
+
+def _answer(study: Study, path: Path) -> tuple[str, ...]:
+    """What came out, in lines, read from the result."""
+    # where they are used: they take a second to load
+    from studyrunner.report.reading.opening import open_result
+    from studyrunner.study.room_for_wear import describe_room
+    from studyrunner.summary.answer import summary
+    from studyrunner.summary.lines import summary_lines
+
+    try:
+        with open_result(path) as dataset:
+            found = summary(dataset)
+    except UserError as error:
+        # the result is there all the same, but larger than what is read
+        return (f"no summary: {error}",)
+    room = any(failure.word == "contact_cut_off" for failure in found.failures) and describe_room(study)
+    return (*summary_lines(found), *([f"{'':<12}{room}"] if room else []))

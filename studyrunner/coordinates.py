@@ -45,6 +45,15 @@ SCENE: dict[str, dict[str, Variable]] = {
 }
 """What `outputs.variables` asks of the scene under one name; the exact answers alone have the axes of the study."""
 
+STUCK_FREQUENCY = Variable(
+    (),
+    "Hz",
+    "first natural frequency with the joint stuck, without damping",
+    content=_REFERENCE,
+    comment="At the nodal diameter of the excitation; NaN where nothing moves that has mass.",
+)
+"""Of the scene; along the axes along which the scenes of a study differ."""
+
 COORDINATES = {
     "frequency": Variable(
         (),
@@ -103,6 +112,14 @@ COORDINATES = {
         ("contact",), "m2", "area of the contact pair", comment="Weight alpha of the pair, Eq. (7) of the reference."
     ),
     "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair"),
+    "contact_edge": Variable(
+        ("contact",),
+        "1",
+        "whether the contact pair is at the edge of its surface",
+        "int8",
+        ("inside", "edge"),
+        comment="Found from the positions of the pairs of flat surfaces, or given by the scene.",
+    ),
     "contact_exists": Variable(
         ("contact",),
         "1",

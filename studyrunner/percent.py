@@ -27,8 +27,3 @@ def show_percent(fraction: float, rtol: float | None = None) -> str:
 def show_rtol(rtol: float) -> str:
     """The error that was asked for, as it was given: "1 %"."""
     return f"{100.0 * rtol:.6g} %"
-
-
-def known_to(error: float, rtol: float) -> str:
-    """What a relative error above `rtol` says of what it is the error of: "is known to 2.6 % only"."""
-    return f"is known to {show_percent(error, rtol)} only" if math.isfinite(error) else "is not known"

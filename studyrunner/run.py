@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,24 +13,26 @@ from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.database import NoLocksError, StoreInUseError
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
+from studyrunner.coordinates import STUCK_FREQUENCY
 from studyrunner.mpi.ranks import Ranks, wait_for_message
 from studyrunner.mpi.schedule import work_on_tasks
+from studyrunner.netcdf.attributes import SmallArray, coordinates, scene_arrays
 from studyrunner.netcdf.creation_date import describe_date
 from studyrunner.netcdf.existing_result import Label, Target
 from studyrunner.netcdf.output import older_folder, progress_file, remove_leftovers
-from studyrunner.netcdf.provenance import PACKAGES
+from studyrunner.netcdf.provenance import PACKAGES, describe_run
 from studyrunner.netcdf.sample_coordinates import sample_coordinates, worn_coordinate
 from studyrunner.netcdf.software import describe_software
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.planning import build_tasks
+from studyrunner.plan.plausibility import doubts_of_study
 from studyrunner.plan.tasks import TaskPlan
 from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.model_remarks import remarks_of_study
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import PairArrays, merge_facts, pair_arrays
+from studyrunner.scene.scene_set import merge_facts, pair_arrays, stuck_frequencies_of
 from studyrunner.scene_building import Scenes
 from studyrunner.study.study import Study
-from studyrunner.summary.plausibility import doubts_of_study
 from studyrunner.system.endings import begin_ending, is_ending
 from studyrunner.system.progress import ProgressDisplay, count
 from studyrunner.task_runs import evaluator, run_tasks
@@ -38,7 +40,6 @@ from studyrunner.user_error import UserError, Verbatim
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-    from studyrunner.netcdf.gather import Gathered
 
 
 _GO = "go"  # rank 0 has something to compute
@@ -60,8 +61,6 @@ class RunSummary:
     n_complete: number of points computed to the end.
     n_left: number of points that are not computed yet.
     n_found: number of points that an earlier run has left.
-    findings: lines on points that failed or are less exact than requested.
-    certificates: the table that begins with the worn volumes.
     written: whether the file was written; else a finished result was kept.
     """
 
@@ -69,8 +68,6 @@ class RunSummary:
     n_complete: int
     n_left: int
     n_found: int
-    findings: tuple[str, ...]
-    certificates: str
     written: bool
 
 
@@ -93,48 +90,48 @@ class _ResultWriter:
     """Writes the result file from the finished points.
 
     study, plan, facts: the study, its tasks, and facts of its scenes.
-    scenes, pairs: the scenes, and where their pairs are.
+    scenes: the scenes.
     target: the file.
     software: attributes on the program.
     date: as in `RunOptions`.
-    said: doubts that the user has seen.
     """
 
     study: Study
     plan: TaskPlan
     facts: SceneFacts
     scenes: Scenes
-    pairs: PairArrays
     target: Target
     software: Mapping[str, str]
     date: str | None
-    said: Sequence[str]
 
-    def write(self, completion: CompletionIndex, n_found: int, progress: ProgressDisplay) -> RunSummary:
+    def write(self, completion: CompletionIndex, n_found: int) -> RunSummary:
         """Writes the file. n_found: number of points that an earlier run has left."""
         # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
-        from studyrunner.netcdf.gather import gather
+        from studyrunner.netcdf.write import write_result
 
         completion.store.flush()
-        target = self.target
-        facts = self.scenes.facts
-        drawn = sample_coordinates(self.study, facts, self.scenes.scenes)
-        gathered = gather(
-            self.study,
-            self.facts,
-            completion,
-            target.path,
-            self.scenes.variables,
-            self.scenes.kept,
-            target.finished,
-            {**self.software, **describe_date(self.date)},
-            self.pairs,
-            (*worn_coordinate(self.study, facts), *drawn),
+        kept = self.scenes.kept
+        origin = {**describe_run(self.study, self.facts), **({} if kept is None else kept.origin)}
+        origin |= {**self.software, **describe_date(self.date)}
+        finished = self.target.finished
+        outcomes = write_result(
+            self.study, self.facts, completion, self.target.path, self._arrays(), origin, kept, keep_finished=finished
         )
-        for doubt in gathered.doubts:
-            if doubt not in self.said:
-                progress.note(doubt)
-        return _summarise(self.plan, n_found, gathered, target.finished)
+        left = outcomes[Outcome.NOT_COMPUTED]
+        n_complete = sum(outcomes[number] for number in COMPLETE)
+        return RunSummary(self.plan.n_points, n_complete, left, n_found, written=not (finished and left))
+
+    def _arrays(self) -> list[SmallArray]:
+        """Coordinates of the file, and its variables that no task computes."""
+        study, scenes, facts = self.study, self.scenes, self.scenes.facts
+        stuck = SmallArray("stuck_frequency", *stuck_frequencies_of(study, facts, scenes.scenes), STUCK_FREQUENCY)
+        return [
+            *coordinates(study, self.facts, pair_arrays(study, facts, scenes.scenes)),
+            stuck,
+            *worn_coordinate(study, facts),
+            *sample_coordinates(study, facts, scenes.scenes),
+            *scene_arrays(study, scenes.variables),
+        ]
 
 
 @contextlib.contextmanager
@@ -208,12 +205,12 @@ def serve_study(
             ranks.send(_GO, rank)
         run_tasks(ranks, completion, evaluator(scenes.model), progress, scenes)
         progress.say("writing the result")
-        summary = writer.write(completion, n_found, progress)
+        summary = writer.write(completion, n_found)
     except BaseException as error:
         if not is_ending(error):
             raise
         begin_ending()
-        raise Interrupted(writer.write(completion, n_found, progress)) from None
+        raise Interrupted(writer.write(completion, n_found)) from None
     if summary.n_left == 0:
         _tidy(completion)
     return summary
@@ -229,12 +226,11 @@ def _prepare(
     # The software is described when the run begins: a checkout may have changed at the end of the run.
     software = describe_software(PACKAGES[0])
     kind = record_type(study, facts)
-    said = doubts_of_study(study, facts)
     for note in (
         *store.notes,
         *_older(target.path),
         *scenes.notes,
-        *said,
+        *doubts_of_study(study, facts),
         *(f"{label}: {text}" for label, text in remarks_of_study(study)),
     ):
         progress.note(note)
@@ -243,9 +239,7 @@ def _prepare(
     completion = CompletionIndex(plan, identities, store, kind)
     label = Label.of(study)
     store.note_study(label.name, label.model)
-    pairs = pair_arrays(study, scenes.facts, scenes.scenes)
-    writer = _ResultWriter(study, plan, facts, scenes, pairs, target, software, options.date, said)
-    return completion, writer
+    return completion, _ResultWriter(study, plan, facts, scenes, target, software, options.date)
 
 
 def _older(target: Path) -> list[str]:
@@ -278,19 +272,6 @@ def _tidy(completion: CompletionIndex) -> None:
         completion.store.shrink()
     except KeyboardInterrupt:
         begin_ending()
-
-
-def _summarise(plan: TaskPlan, n_found: int, gathered: Gathered, keep_finished: bool) -> RunSummary:
-    outcomes = gathered.outcomes
-    return RunSummary(
-        n_points=plan.n_points,
-        n_complete=sum(outcomes[number] for number in COMPLETE),
-        n_left=outcomes[Outcome.NOT_COMPUTED],
-        n_found=n_found,
-        findings=gathered.findings,
-        certificates=gathered.certificates,
-        written=not (keep_finished and outcomes[Outcome.NOT_COMPUTED]),
-    )
 
 
 def work_on_job(ranks: Ranks, model: ReducedModel | None) -> None:

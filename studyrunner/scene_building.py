@@ -8,7 +8,7 @@ so that a rank holds few models, whatever their number.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -30,7 +30,6 @@ from studyrunner.scene.scene import (
 )
 from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.scene.scene_variables import exact_answers, join_scene_variables
-from studyrunner.scene.static_response import static_response
 from studyrunner.scene.variables import SceneVariable, build_scene_variables
 from studyrunner.scene_models import SceneModels
 from studyrunner.study.scene_axes import keys_as_given
@@ -144,7 +143,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
         if "natural_frequency" in study.scene_variables:
             say("finding the natural frequencies of the scene")
         variables = (*build_scene_variables(one, model, store), *exact_answers(study))
-        facts = replace(describe_scene(model), static_response=static_response(model))
+        facts = describe_scene(model)
         kept = scene_to_keep(one, model)
         handed, seeing = hand_out(ranks, model, new_partial(store.path))
         return Scenes(scenes, (facts,), variables, kept, (), handed, seeing, store)

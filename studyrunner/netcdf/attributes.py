@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,22 @@ from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import PairArrays
+from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
+
+
+@dataclass(frozen=True)
+class SmallArray:
+    """A coordinate, or a variable that no task computes. over_axes: whether it has the axes of the study, which may be
+    of length 1 in `values`.
+    """
+
+    name: str
+    dimensions: tuple[str, ...]
+    values: NDArray[np.generic]
+    entry: Variable
+    over_axes: bool = False
 
 
 def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, object]:
@@ -51,10 +66,8 @@ def coordinate_entry(study: Study, name: str) -> Variable:
     return COORDINATES[name]
 
 
-def coordinates(
-    study: Study, facts: SceneFacts, pairs: PairArrays
-) -> dict[str, tuple[tuple[str, ...], NDArray[np.generic]]]:
-    """Coordinates of the file: name, dimensions, values."""
+def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[SmallArray]:
+    """Coordinates of the file."""
     along: dict[str, NDArray[np.generic]] = {name: _labels(values) for name, values in study.dimensions.items()}
     if study.has_missions:
         along["mission"] = np.array(study.missions_kept, dtype=np.int32)
@@ -66,16 +79,26 @@ def coordinates(
     if study.outputs.loops:
         along["phase"] = 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES
         along["component"] = _labels(LOOP_COMPONENTS)
+    for name, values in along.items():
+        yield SmallArray(name, (name,), values, coordinate_entry(study, name))
     of_pairs: dict[str, NDArray[np.generic]] = {
         name: pairs.position[..., column] for column, name in enumerate(("contact_x", "contact_y", "contact_z"))
     }
     of_pairs |= {"contact_area": pairs.area, "contact_surface": pairs.surface}
     if pairs.exists is not None:
         of_pairs["contact_exists"] = pairs.exists.astype(np.int8)
-    return {
-        **{name: ((name,), values) for name, values in along.items()},
-        **{name: (pairs.dimensions, np.array(values)) for name, values in of_pairs.items()},
-    }
+    for name, values in of_pairs.items():
+        yield SmallArray(name, pairs.dimensions, np.array(values), COORDINATES[name])
+    if facts.edge is not None:
+        yield SmallArray("contact_edge", ("contact",), facts.edge.astype(np.int8), COORDINATES["contact_edge"])
+
+
+def scene_arrays(study: Study, of_scene: Sequence[SceneVariable]) -> Iterator[SmallArray]:
+    """Variables of the scene."""
+    for each in of_scene:
+        own = (each.name,) if each.coordinate else each.entry.dimensions
+        dimensions = (*study.dimensions, *own) if each.axes else own
+        yield SmallArray(each.name, dimensions, each.values, each.entry, over_axes=each.axes)
 
 
 def _labels(values: Sequence[object]) -> NDArray[np.generic]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.coordinates import COORDINATES
+from studyrunner.netcdf.attributes import SmallArray
 from studyrunner.scene.drawn_contacts import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import SceneSet
@@ -21,16 +21,7 @@ _BY_SCATTER = "By [scatter] of the study."
 _OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "area of the contact pair")}
 
 
-@dataclass(frozen=True)
-class InputCoordinate:
-    """A coordinate of the result file. values: with the dimensions of the entry."""
-
-    name: str
-    entry: Variable
-    values: NDArray[np.float64]
-
-
-def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[InputCoordinate]:
+def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
     """The drawn values of each input, in the unit of the input.
 
     Along the samples; along an axis as well where the input is drawn around the values of the axis; along the pairs
@@ -58,7 +49,7 @@ def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneS
         yield from _of_pairs(study, facts, scenes)
 
 
-def _of_pairs(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[InputCoordinate]:
+def _of_pairs(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
     """Values of the pairs along the axes on which they depend; NaN where a scene does not have a pair."""
     drawn = [of_part for _, _, of_part in drawn_pairs(study, scenes, facts)]
     n_contact = max(len(each.area) for each in facts)
@@ -77,7 +68,7 @@ def _of_pairs(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> It
         yield _coordinate(name, tuple(dimensions), values, *_describe(study, name))
 
 
-def worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[InputCoordinate]:
+def worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[SmallArray]:
     """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
     if study.scene.worn is None or len(facts) > 1:
         return
@@ -89,7 +80,7 @@ def worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[Input
     entry = Variable(
         dimensions, "m", "wear depth at the start", comment="Key scene.worn; wear_depth counts from there."
     )
-    yield InputCoordinate("worn_depth", entry, values[0] if axis is None else values)
+    yield SmallArray("worn_depth", dimensions, values[0] if axis is None else values, entry)
 
 
 def _comment(study: Study, name: str) -> str:
@@ -106,9 +97,9 @@ def _coordinate(
     units: str,
     meaning: str,
     comment: str = _BY_SCATTER,
-) -> InputCoordinate:
+) -> SmallArray:
     entry = Variable(dimensions, units, f"{meaning}, as the sample draws it", comment=comment)
-    return InputCoordinate(f"sample_{name}", entry, np.asarray(values, dtype=np.float64))
+    return SmallArray(f"sample_{name}", dimensions, np.asarray(values, dtype=np.float64), entry)
 
 
 def _describe(study: Study, name: str) -> tuple[str, str]:

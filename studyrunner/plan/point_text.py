@@ -1,14 +1,10 @@
-"""Points, cycle counts and errors in words, for what is printed at the end of a run and in messages of points."""
+"""Cycle counts in words, and how far a point came, for messages of points."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
 
-from studyrunner.advice import Used
 from studyrunner.percent import show_percent
-from studyrunner.study.study import Study
 
 _SHORT = 1e4
 
@@ -30,42 +26,3 @@ def show_count(cycle: float) -> str:
         text = f"{cycle:,.0f}".replace(",", " ")
         return text if cycle >= _SHORT else text.replace(" ", "")
     return f"{cycle:.6g}"
-
-
-def describe_point(study: Study, point: Sequence[int]) -> str:
-    """A point along those axes that have more than one value: "211.25 Hz, explicit"; empty where none has."""
-    texts = []
-    for (name, values), index in zip(study.dimensions.items(), point, strict=True):
-        if len(values) > 1:
-            texts.append(describe_value(study, name, values[index]))
-    return ", ".join(texts)
-
-
-def describe_value(study: Study, name: str, value: float | str) -> str:
-    """A value of an axis: the scheme by its word and the frequency by its unit, all others with their name."""
-    shown = value if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else f"{value:.8g}"
-    units = study.units(name)
-    after = f" {units}" if units != "1" and not isinstance(value, str) else ""
-    return f"{shown}{after}" if name in ("frequency", "scheme") else f"{name} {shown}{after}"
-
-
-def settings_of(study: Study, point: Sequence[int]) -> Used:
-    """What a point is computed with, for advice on it."""
-    axes = study.axes
-    at = {name: values[index] for (name, values), index in zip(study.dimensions.items(), point, strict=True)}
-
-    def of(key: str) -> Any:
-        return at.get(key, getattr(study.solver, key))
-
-    return Used(
-        scheme=str(at.get("scheme", axes.scheme[0])),
-        sweep=str(at["sweep"]),
-        harmonics=of("harmonics"),
-        samples=of("samples"),
-        rtol=of("rtol"),
-        schemes=axes.scheme,
-        # the excitation of a mode is none that could be raised
-        sweeps=(*axes.sweep, "ramp") if study.has_modes else axes.sweep,
-        by_depth=study.slow_time.largest_depth is not None,
-        until=study.until is not None,
-    )

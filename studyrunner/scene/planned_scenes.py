@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene
 from studyrunner.scene.scene_set import SceneSet, find_scenes
-from studyrunner.scene.static_response import static_response
 from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study
 
@@ -73,6 +72,6 @@ def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
         say(f"building scene {number + 1} of {len(scenes.studies)}")
         with keys_as_given(study.scene_axes):
             model = build_study_scene(scenes.studies[number], say)
-        facts[number] = replace(describe_scene(model), static_response=static_response(model))
+        facts[number] = describe_scene(model)
     each_takes = (time.monotonic() - began) / len(facts)
     return PlannedScenes(scenes, facts, tuple(nearest), each_takes * (len(scenes.studies) - len(facts)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,11 +16,11 @@ from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
 from studies.contact_compliance import make_compliant
+from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
 from studyrunner.scene.computed import Computed, InMemory, model_once, scene_parameters_of
 from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.scene.static_response import StaticResponse
 from studyrunner.scene.variables import build_mesh, check_outputs
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.sections import AUTO
@@ -38,10 +39,9 @@ class SceneFacts:
     position (n_contact, 3): m. area (n_contact,): m2. surface: label of each pair. response_names: n_response texts.
     digest: SHA-256 of all arrays and names of the reduced model, hexadecimal.
     largest_harmonics: largest number of harmonics for this scene; None without limit.
-    static_response: response to the harmonic load at rest; None where unknown or not requested.
+    stuck_frequency: Hz, first natural frequency with the joint stuck; NaN where there is none.
     gap, friction_coefficient (n_contact,): m and 1, of each pair; friction None where the study gives one for all.
     edge (n_contact,): whether a pair is at the edge of the contact (`edge_pairs`); False where unknown.
-    can_slide: whether any pair has a tangential displacement.
     """
 
     n_displacements: int
@@ -51,11 +51,10 @@ class SceneFacts:
     response_names: tuple[str, ...]
     digest: str
     largest_harmonics: int | None = None
-    static_response: StaticResponse | None = None
+    stuck_frequency: float = math.nan
     edge: NDArray[np.bool_] | None = None
     gap: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     friction_coefficient: NDArray[np.float64] | None = None
-    can_slide: bool = True
 
 
 def _silent(_: str) -> None:
@@ -219,8 +218,17 @@ def describe_scene(model: ReducedModel) -> SceneFacts:
         edge=edge_pairs(contact),
         gap=contact.gap,
         friction_coefficient=contact.friction_coefficient,
-        can_slide=bool((np.asarray(contact.dofs)[:, 1:] >= 0).any()),
+        stuck_frequency=_stuck_frequency(model),
     )
+
+
+def _stuck_frequency(model: ReducedModel) -> float:
+    """First natural frequency, Hz, with the joint stuck; NaN where nothing moves or holds."""
+    try:
+        found = stuck_frequencies(model)
+    except SceneError:
+        return math.nan
+    return float(found.frequencies[found.nodal_diameters.index(model.nodal_diameter), 0])
 
 
 def largest_harmonics(model: ReducedModel) -> int | None:

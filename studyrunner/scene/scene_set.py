@@ -89,7 +89,6 @@ def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
         n_displacements=max(each.n_displacements for each in facts),
         digest=hashlib.sha256("".join(each.digest for each in facts).encode()).hexdigest(),
         largest_harmonics=min(harmonics, default=None),
-        static_response=None,
         edge=largest.edge if all(len(each.area) == len(largest.area) for each in facts) else None,
     )
 
@@ -128,6 +127,17 @@ def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | No
     )
     exists = np.isfinite(area[numbers])
     return PairArrays((*names, "contact"), position[numbers], area[numbers], surface[numbers], exists)
+
+
+def stuck_frequencies_of(
+    study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
+) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    """First natural frequencies, Hz, with the joint stuck: axes along which they differ, and values along these."""
+    found = np.array([each.stuck_frequency for each in facts])
+    if np.unique(found).size == 1:
+        return (), found[0]
+    names, numbers = axes_of_difference(study, scenes, lambda a, b: np.array_equal(found[a], found[b], equal_nan=True))
+    return names, found[numbers]
 
 
 def axes_of_difference(

@@ -1,4 +1,4 @@
-"""Quantiles, mean and probabilities of exceedance of samples, with confidence intervals.
+"""Quantiles and probabilities of exceedance of samples, with confidence intervals.
 
 The intervals are of independent samples. Samples of a Sobol' sequence or a Latin hypercube fill the distribution more
 evenly: their intervals are wider than need be.
@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.stats import beta, binom, t
+from scipy.stats import beta, binom
 
 from studyrunner.statistics.bands import Array, Band, SampleValues
 
@@ -38,30 +38,6 @@ def quantile(values: SampleValues, probability: float, confidence: float) -> Ban
         high[..., last - 1] if last <= n else np.full(low.shape[:-1], np.inf),
         np.sort(widened.low)[..., rank - 1],
         np.sort(widened.high)[..., rank - 1],
-    )
-
-
-def mean(values: SampleValues, confidence: float) -> Band:
-    """The mean, with the interval of Student's t, which is too short for few samples of a skewed distribution.
-
-    Band of shape (...); its interval is infinite for one sample, and above where a sample has no upper bound.
-    """
-    n, widened = values.n_samples, values.widened
-    factor = float(t.ppf(0.5 + 0.5 * confidence, n - 1)) / math.sqrt(n) if n > 1 else np.inf
-    lowest, highest = values.low.mean(axis=-1), values.high.mean(axis=-1)
-    if n == 1:
-        below = above = np.full(lowest.shape, np.inf)
-    else:
-        bounded = np.isfinite(highest)
-        below = factor * values.low.std(axis=-1, ddof=1)
-        above = factor * np.where(bounded[..., None], values.high, 0.0).std(axis=-1, ddof=1)
-    return Band(
-        lowest,
-        highest,
-        lowest - below,
-        highest + above,
-        widened.low.mean(axis=-1),
-        widened.high.mean(axis=-1),
     )
 
 

@@ -49,7 +49,7 @@ def describe_ranking(point: xr.Dataset) -> str:
             return f"{int(point['n_samples'])} samples are too few to say which input decides"
         return ""
     untold = [word for word, row in zip(words, values, strict=True) if np.isnan(row).all()]
-    more = f" ({' and '.join(untold)} not told)" if untold else ""
+    more = f"; {' and '.join(untold)} {'is' if len(untold) == 1 else 'are'} not ranked" if untold else ""
     most, decides = leading_input(point), deciding_input(point) is not None
     low, high = intervals[most]
     if name == "first_index":
@@ -58,7 +58,11 @@ def describe_ranking(point: xr.Dataset) -> str:
     else:
         shown = f"rank correlation {_range(values[most], 2)}, interval {low:.2f} to {high:.2f}"
         says = f"{words[most]} decides most ({shown})"
-    return f"{says}{more}" if decides else f"which input decides is not known: {words[most]} has {shown}{more}"
+    return (
+        f"{says}{more}"
+        if decides
+        else f"which input decides is not known: {words[most]} has the largest estimate ({shown}){more}"
+    )
 
 
 def _strengths(point: xr.Dataset) -> Array | None:

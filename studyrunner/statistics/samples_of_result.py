@@ -41,16 +41,7 @@ def depth_samples(dataset: xr.Dataset) -> tuple[SampleValues, dict[Hashable, int
         return _samples(dataset, depth, None if error is None else error.max("contact"), relative=False)
     if "wear_depth_max" in dataset:
         return _samples(dataset, dataset["wear_depth_max"], dataset.get("wear_depth_max_error"), relative=False)
-    if "largest_wear_depth" not in dataset:
-        return None
-    depth = dataset["largest_wear_depth"]
-    found, dims = _samples(dataset, depth, None, relative=False)
-    if CYCLE not in depth.dims:
-        # of a point that ended early it is the depth until then
-        ended = dataset["worn_volume"].isel({CYCLE: -1}, missing_dims="ignore").isnull()
-        high = np.where(ended.transpose(*depth.transpose(..., SAMPLE).dims).values, np.inf, found.high)
-        found = SampleValues(found.low, high, found.error)
-    return found, dims
+    return None
 
 
 def inputs_of(dataset: xr.Dataset) -> dict[str, Array]:

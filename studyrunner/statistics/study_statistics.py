@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from studyrunner.scatter.design import SaltelliLayout
 from studyrunner.statistics.bands import Array, Band, SampleValues
 from studyrunner.statistics.indices import FEWEST, RANKS, SOBOL, rank_correlations, saltelli_indices
-from studyrunner.statistics.quantiles import exceedance, mean, quantile
+from studyrunner.statistics.quantiles import exceedance, quantile
 from studyrunner.statistics.samples_of_result import (
     CYCLE,
     SAMPLE,
@@ -62,11 +62,11 @@ def worn_volume_statistics(
     Returns
     -------
     xr.Dataset
-        worn_volume_quantile, worn_volume_mean (m3), worn_volume_exceedance, wear_depth_exceedance, and of each input
+        worn_volume_quantile (m3), worn_volume_exceedance, wear_depth_exceedance, and of each input
         first_index and total_index (1) with saltelli, else rank_correlation (1), each with _interval and _error;
         n_samples, n_without_value; of the last count
         worn_volume_density (1/m3) over worn_volume_grid (m3), group_size (2), group_gap (m3, two ends; NaN for one
-        group), deciding_contact (-1: none), deciding_depth (m).
+        group), deciding_contact (-1: none).
 
     Raises
     ------
@@ -89,10 +89,9 @@ def worn_volume_statistics(
     rows = _independent(dataset.sizes[SAMPLE], layout)
     values, names = everything.at((..., rows)), list(dims)
 
-    found = _band_arrays("worn_volume_mean", "mean worn volume", "m3", mean(values, confidence), names)
     axis = _axis("quantile", quantiles, "1", "probability")
     band = _stacked(values, quantiles, confidence)
-    found |= _band_arrays("worn_volume_quantile", "quantile of worn volume", "m3", band, names, axis)
+    found = _band_arrays("worn_volume_quantile", "quantile of worn volume", "m3", band, names, axis)
     axis = _axis("exceeded_volume", _thresholds(exceed, values), "m3", "worn volume")
     band = exceedance(values, axis.values, confidence)
     found |= _band_arrays("worn_volume_exceedance", "probability of a larger worn volume", "1", band, names, axis)
@@ -205,11 +204,10 @@ def _group_arrays(
         depths = depths.transpose(*axes, SAMPLE, "contact")
     grid, curve = np.full((*shape, _N_DENSITY), np.nan), np.full((*shape, _N_DENSITY), np.nan)
     sizes, gap = np.zeros((*shape, 2), dtype=np.int32), np.full((*shape, 2), np.nan)
-    contact, threshold = np.full(shape, -1, dtype=np.int32), np.full(shape, np.nan)
+    contact = np.full(shape, -1, dtype=np.int32)
     for point in np.ndindex(shape):
         samples = at_last.at(point)
-        groups = two_groups(samples)
-        known = samples.low[samples.is_known]
+        groups, known = two_groups(samples), samples.low[samples.is_known]
         sizes[point] = (known.size, 0) if groups is None else (groups.n_lower, groups.n_upper)
         if known.size:
             margin = 0.1 * float(np.ptp(known))
@@ -218,15 +216,13 @@ def _group_arrays(
         if groups is not None:
             gap[point] = groups.lower_end, groups.upper_end
             pair = None if depths is None else deciding_pair(depths.values[point], groups)
-            if pair is not None:
-                contact[point], threshold[point] = dataset["contact"].values[pair.contact], pair.threshold
+            contact[point] = -1 if pair is None else dataset["contact"].values[pair]
     return {
         "worn_volume_grid": _array(grid, [*axes, "grid"], "m3", "worn volume"),
         "worn_volume_density": _array(curve, [*axes, "grid"], "1/m3", "density of the samples at the last count"),
         "group_size": _array(sizes, [*axes, "group"], "1", "samples below and above the gap; all, 0: one group"),
         "group_gap": _array(gap, [*axes, "group"], "m3", "ends of the gap between two groups"),
         "deciding_contact": _array(contact, axes, "1", "contact pair that separates the groups best, -1: none"),
-        "deciding_depth": _array(threshold, axes, "m", "wear depth of this pair between the groups"),
     }
 
 

@@ -42,15 +42,6 @@ class Groups:
         return int(np.count_nonzero(self.is_placed & self.is_upper))
 
 
-@dataclass(frozen=True)
-class DecidingPair:
-    """The contact pair whose depth separates two groups best: its number, m between both, and in which it is deeper."""
-
-    contact: int
-    threshold: float
-    deeper_above: bool
-
-
 def two_groups(values: SampleValues) -> Groups | None:
     """The two groups of samples (n,), None where one hill of any form may be what they are of.
 
@@ -111,7 +102,7 @@ def density(values: SampleValues, groups: Groups | None, grid: Array) -> Array:
     return whole
 
 
-def deciding_pair(depths: Array, groups: Groups) -> DecidingPair | None:
+def deciding_pair(depths: Array, groups: Groups) -> int | None:
     """The pair that separates both groups best; None where the depths of each pair overlap.
 
     depths (n, n_pairs): m, NaN where not known. Of the pairs whose depths in one group are all larger than those in the
@@ -121,19 +112,11 @@ def deciding_pair(depths: Array, groups: Groups) -> DecidingPair | None:
     below, above = depths[known & ~groups.is_upper], depths[known & groups.is_upper]
     if len(below) == 0 or len(above) == 0:
         return None
-    rises = above.min(axis=0) > below.max(axis=0)
-    falls = above.max(axis=0) < below.min(axis=0)
-    if not (rises | falls).any():
-        return None
+    apart = (above.min(axis=0) > below.max(axis=0)) | (above.max(axis=0) < below.min(axis=0))
     width = np.sqrt(0.5 * (below.var(axis=0) + above.var(axis=0)))
     distance = np.abs(above.mean(axis=0) - below.mean(axis=0))
     ratio = np.divide(distance, width, out=np.full(len(width), np.inf), where=width > 0.0)
-    pair = int(np.argmax(np.where(rises | falls, ratio, -1.0)))
-    if rises[pair]:
-        threshold = 0.5 * (below[:, pair].max() + above[:, pair].min())
-    else:
-        threshold = 0.5 * (above[:, pair].max() + below[:, pair].min())
-    return DecidingPair(pair, float(threshold), bool(rises[pair]))
+    return int(np.argmax(np.where(apart, ratio, -1.0))) if apart.any() else None
 
 
 def _chance(gap: Array, number: NDArray[np.intp], length: Array) -> Array:

@@ -1,1 +1,1 @@
-"""What a run says of its results: worn volumes known to rtol, certificates, outcomes, findings."""
+"""What came out of a study: `answer.summary` of an opened result, and `lines.summary_lines`, its text."""

@@ -41,7 +41,7 @@ def test_result_does_not_depend_on_the_number_of_ranks(tmp_path):
             results[n_ranks] = result.load().drop_vars("run_time")
     for n_ranks in (1, 3):
         xr.testing.assert_identical(results[n_ranks], results[0])
-    assert tables == {results[0].attrs["certificate_summary"]}
+    assert len(tables) == 1
 
 
 def test_marches_are_done_while_their_branch_goes_on(tmp_path):

@@ -78,7 +78,7 @@ def test_a_file_that_claims_to_be_hdf5(command, folder, refused):
 def test_a_result_that_is_none(folder, refused):
     (folder / "result").write_bytes(b"CDF\x01" + bytes(100))
     assert "is no NetCDF file (NetCDF-4)" in refused(["result"], report.main)
-    assert "there is no such file" in refused(["none.nc"], report.main)
+    assert "there is none of this name" in refused(["none.nc"], report.main)
 
 
 def huge(file):

@@ -8,10 +8,6 @@ import pytest
 from solver.model import ContactInterface
 from studies import build_scene
 from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.study.study_file import read_study
-from studyrunner.summary.edge_wear import EdgeWear
-from tests.studyrunner.fakes import FACTS
-from tests.studyrunner.results_of import results_of, told
 
 
 def contact_at(position, surface=None):
@@ -59,44 +55,3 @@ def test_a_scene_that_says_its_edge_is_believed():
     assert edge_pairs(contact).tolist() == [False] * 5 + [True]
     # along a line the ends are the edge
     assert edge_pairs(replace(contact, edge=None)).tolist() == [True] + [False] * 4 + [True]
-
-
-GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=adaptive", "outputs.variables=['wear_depth']")
-AREA = np.array([1.0, 2.0, 1.0, 1.0, 2.0, 1.0]) * 1e-4
-BY_SIX = replace(
-    FACTS,
-    position=np.zeros((6, 3)),
-    area=AREA,
-    surface=("left",) * 3 + ("right",) * 3,
-    edge=np.array([True, False, True] * 2),
-)
-
-
-def row_of(depths, edge=BY_SIX.edge, **outcome):
-    """The rows where the second of three frequencies has these last depths, um, and the others wear in the middle."""
-    study = read_study("sdof_slider", GRID)
-    facts, n = replace(BY_SIX, edge=edge), len(study.cycles_kept)
-
-    def depth(point):
-        last = depths if point[0] == 1 else [0.0, 1.0, 0.0] * 2
-        return np.asarray(1e-6 * np.outer(np.linspace(0.0, 1.0, n), last))
-
-    results = results_of(study, wear_depth=depth, outcome=lambda point: outcome.get("at", 0) if point[0] == 1 else 0)
-    return told(EdgeWear.rows, lambda: EdgeWear(study, facts), study, results, facts)
-
-
-LABEL = "wear at the edge of the contact"
-REMARK = "right where the bodies end, else add pairs"
-
-
-def test_the_surface_with_most_at_its_edge_is_named():
-    assert row_of([3.0, 1.0, 1.0, 0.0, 3.0, 0.0]) == [
-        (LABEL, f"up to 67 % of the wear of left (50 % of its area), the deepest pair too, at 211.25 Hz: {REMARK}")
-    ]
-    # more than its share, though the deepest pair is inside
-    assert row_of([0.0, 3.0, 0.0, 2.0, 1.9, 2.0])[0][1].endswith(f"at 211.25 Hz: {REMARK}")
-    # less than its share is nothing to look at
-    assert row_of([0.5, 1.0, 0.0, 0.0, 1.0, 0.5]) == [
-        (LABEL, "up to 20 % of the wear of left (50 % of its area), at 211.25 Hz")
-    ]
-    assert row_of([0.0, 1.0, 0.0, 0.0, 1.0, 0.0]) == [(LABEL, "none")]

@@ -8,8 +8,10 @@ import pytest
 
 from solver.results.loops import LOOP_PHASES
 from studyrunner import variables
-from studyrunner.netcdf import gather
+from studyrunner.netcdf.attributes import coordinates
+from studyrunner.netcdf.write import write_result
 from studyrunner.plan.planning import build_tasks
+from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, changed, fake_march, fake_starts, open_completion, without_values
 
@@ -42,7 +44,7 @@ def write(tmp_path):
         completion.store.flush()
         path = tmp_path / f"{n_contact}.nc"
         with contextlib.closing(completion.store):
-            gather.gather(study, facts, completion, path)
+            write_result(study, facts, completion, path, [*coordinates(study, facts, pair_arrays(study, [facts]))], {})
         return path
 
     return write_file

@@ -44,11 +44,11 @@ def test_points_that_failed(monkeypatch, capsys):
 
     use_fake(monkeypatch, fail_one)
     assert main(SMALL) == 3
-    first, volume, *_, outcome, point = capsys.readouterr().out.splitlines()
+    first, *_, failed, certainty = capsys.readouterr().out.splitlines()
     assert "2 computed, 1 failed" in first
-    assert "2 of 3 points known to rtol = 1 %, 1 not computed to the end" in volume
-    assert outcome == f'1 x march_failed: {Outcome.MARCH_FAILED.sentence} Try scheme = "adaptive" or a smaller step.'
-    assert point == "  110 Hz: no state was found"
+    assert failed.startswith("failed ")
+    assert "110 Hz" in failed
+    assert "2 of 3 worn volumes" in certainty
     with xr.open_dataset("out.nc") as result:
         assert result.outcome.squeeze().values.tolist() == [0, int(Outcome.MARCH_FAILED), 0]
         assert result.worn_volume.squeeze().isnull().all("cycle").values.tolist() == [False, True, False]
@@ -66,15 +66,13 @@ def test_points_above_rtol_are_computed_points(outcome, monkeypatch, capsys):
 
     use_fake(monkeypatch, above)
     assert main(SMALL) == 0
-    first, *table = capsys.readouterr().out.splitlines()
-    volume, *_, head, point = table
+    first, *_, uncertain, certainty = capsys.readouterr().out.splitlines()
     assert first.startswith("out.nc: 3 points, 3 computed, 0 failed, ")
-    assert volume.endswith("2 of 3 points known to rtol = 1 %, 1 less well; worst 15 % at 110 Hz: a smaller rtol")
-    advice = ' Try scheme = "adaptive" or a smaller step.' if outcome is Outcome.SENSITIVE else ""
-    assert head == f"1 x {outcome.meaning}: {outcome.sentence}{advice}"
-    assert point == f"  110 Hz: {message}"
+    assert certainty.startswith("certainty ")
+    assert "15 % at 110 Hz" in certainty
+    assert uncertain.startswith("uncertain ")
+    assert "110 Hz" in uncertain
     with xr.open_dataset("out.nc") as result:
-        assert result.attrs["certificate_summary"].splitlines() == table[:-2]
         there = result.sel(frequency=110.0).squeeze()
         assert there.worn_volume.notnull().all()
         assert there.outcome == int(outcome)

@@ -1,6 +1,5 @@
 """What the result file holds of the scene itself."""
 
-import contextlib
 import math
 
 import numpy as np
@@ -9,8 +8,7 @@ import xarray as xr
 
 from studies.finite_element.joint.reduction import GluedStructureError, Reduction
 from studyrunner.cli import main
-from studyrunner.netcdf import gather
-from studyrunner.netcdf.output import progress_file
+from studyrunner.netcdf import write as writing
 from studyrunner.plan.planning import build_tasks
 from studyrunner.scene import computed
 from studyrunner.scene.scene import build_study_scene
@@ -19,8 +17,9 @@ from studyrunner.scene.variables import build_scene_variables
 from studyrunner.study.sections import WearSection
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
-from tests.studyrunner.dataset_twin import build_dataset, write_dataset
-from tests.studyrunner.fakes import FACTS, fake_completion, fake_histories
+from tests.studyrunner.fakes import FACTS, fake_histories
+from tests.studyrunner.made_results import build_dataset, write_dataset
+from tests.studyrunner.test_write_result import write_study
 
 SLIDER = ("axes.frequency=[160, 60, 150]", "slow_time.outputs=3", "axes.excitation_amplitude=[10, 11]")
 EXACT = "outputs.variables=['default', 'exact']"
@@ -31,7 +30,7 @@ COARSE = ("scene.mesh=1", "axes.frequency=212", "slow_time.cycles=0", "axes.sche
 @pytest.mark.slow
 @pytest.mark.parametrize("bytes_a_slab", [3000.0])
 def test_the_file_is_the_one_of_the_plain_twin(bytes_a_slab, tmp_path, monkeypatch):
-    monkeypatch.setattr(gather, "_BYTES_A_SLAB", bytes_a_slab)
+    monkeypatch.setattr(writing, "_BYTES_A_SLAB", bytes_a_slab)
     study = read_study("sdof_slider", GRID)
     of_scene = exact_answers(study)
     frequencies = read_study("two_masses", ["outputs.variables=['natural_frequency']"])
@@ -40,10 +39,8 @@ def test_the_file_is_the_one_of_the_plain_twin(bytes_a_slab, tmp_path, monkeypat
     of_scene += build_scene_variables(mesh, build_study_scene(mesh))
     plan = build_tasks(study, FACTS.n_displacements)
     results = [result for _, result in fake_histories(plan)]
-    completion = fake_completion(study, plan, results, progress_file(tmp_path / "out.nc"))
-    with contextlib.closing(completion.store):
-        gathered = gather.gather(study, FACTS, completion, tmp_path / "out.nc", of_scene)
-    twin_set = build_dataset(study, FACTS, results, gathered.certificates, of_scene)
+    write_study(study, results, tmp_path / "out.nc", of_scene)
+    twin_set = build_dataset(study, FACTS, results, of_scene)
     write_dataset(twin_set, tmp_path / "twin.nc")
     with xr.open_dataset(tmp_path / "out.nc") as opened, xr.open_dataset(tmp_path / "twin.nc") as twin:
         assert opened.exact_worn_volume.dims[-1] == "cycle"

@@ -1,22 +1,31 @@
-"""What a run says of its points in the end: worn volumes, findings, outcomes, small wear; the same in any order."""
+"""The summary of a result as data: what wears most, why nothing wore, what failed; and that its text is short."""
 
 import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from studyrunner.summary.certificates import certificate_rows
 
 from solver.outcome import Outcome
 from studyrunner.advice import Used, advise, advise_error, advise_steps
-from studyrunner.percent import known_to, show_percent, show_rtol
-from studyrunner.plan.point_text import describe_reach, settings_of
+from studyrunner.percent import show_percent, show_rtol
+from studyrunner.report.reading.known_volumes import settings_of
+from studyrunner.report.reading.missions import as_history
+from studyrunner.report.reading.result import Result
 from studyrunner.study.study_file import read_study
-from studyrunner.summary.findings import MOST_NAMED, Findings
-from studyrunner.summary.outcome_table import OutcomeTable
-from studyrunner.summary.small_wear import SMALL, SmallWear, contact_width
-from studyrunner.summary.worn_volumes import WornVolumes
+from studyrunner.summary.answer import ModeRange, Samples, summary
+from studyrunner.summary.doubts import SMALL, contact_width
+from studyrunner.summary.lines import MOST_LINES, summary_lines
+from studyrunner.summary.mesh_change import MeshChange, compare_meshes, extrapolate
+from studyrunner.summary.wear import MostWear, NothingWore
+from studyrunner.variables import CERTIFICATE
 from tests.studyrunner.fakes import FACTS
-from tests.studyrunner.results_of import results_of, told
+from tests.studyrunner.made_results import made_result
+
+GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=['implicit', 'explicit', 'adaptive']")
+SENSITIVE, FAILED, INACCURATE = int(Outcome.SENSITIVE), int(Outcome.MARCH_FAILED), int(Outcome.INACCURATE)
 
 
 def at(point):
@@ -24,191 +33,330 @@ def at(point):
     return point[0], point[4]
 
 
-# --- worn volumes: how many are known to `rtol`, the worst, and what to do ---
-
-GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=['implicit', 'explicit', 'adaptive']")
-
-
-def volumes_of(*overrides, error=lambda _: 0.005, outcome=lambda _: 0):
-    study = read_study("sdof_slider", overrides)
-    results = results_of(study, error_estimate=error, outcome=outcome)
-    return told(WornVolumes.format, lambda: WornVolumes(study), study, results)
+def wearing(*overrides, volume=lambda _: 1e-9, name="sdof_slider", facts=FACTS, **given):
+    """A result whose points wear these volumes, m3, in equal parts up to the last count."""
+    study = read_study(name, overrides)
+    share = np.linspace(0.0, 1.0, len(study.cycles_kept))
+    return made_result(study, facts, worn_volume=lambda point: volume(point) * share, **given)
 
 
-def test_an_error_just_above_rtol_is_not_shown_as_rtol():
-    one = ("axes.frequency=1", "axes.scheme=adaptive")
-    assert volumes_of(*one, error=lambda _: 0.010003) == (
-        "0 of 1 point known to rtol = 1 %, 1 less well; worst 1.0003 %: rtol = 0.0099"
+def result_of(dataset):
+    return Result("made.nc", as_history(dataset)[0])
+
+
+# --- where it wears most ---
+
+
+def test_of_numerical_settings_the_best_known_is_told():
+    """Explicit steps wear most, and are known least: they are no other case."""
+    volumes = {(0, 0): 1.0, (1, 0): 2.0, (1, 1): 9.0, (1, 2): 2.1, (2, 2): 2.05}
+    errors = {(1, 0): 0.04, (1, 1): 0.4, (1, 2): 0.01}
+    found = summary(
+        wearing(
+            *GRID, volume=lambda p: 1e-9 * volumes.get(at(p), 0.0), error_estimate=lambda p: errors.get(at(p), 0.02)
+        )
     )
-    # nor one just below a finer one as above it
-    assert volumes_of(*one, "solver.rtol=0.01165", error=lambda _: 0.01163).endswith("rtol = 1.165 %; worst 1.16 %")
+    wear = found.wear
+    assert isinstance(wear, MostWear)
+    assert (wear.point["frequency"], wear.point["scheme"]) == (1, 2)
+    assert (wear.n_compared, wear.n_left_out, wear.count) == (3, 0, 20_000.0)
+    assert wear.volume.value == pytest.approx(2.1e-9)
+    assert wear.volume.error == pytest.approx(2.1e-11)
 
 
 @pytest.mark.parametrize(
-    ("place", "remedy"), [((1, 1), "a smaller step"), ((1, 0), "a smaller step"), ((1, 2), "a smaller rtol")]
-)
-def test_the_worst_with_its_place_and_what_to_do(place, remedy):
-    scheme = ("implicit", "explicit", "adaptive")[place[1]]
-    found = volumes_of(*GRID, error=lambda p: 0.15 if at(p) == place else 0.02 if p[0] == 2 else 0.001)
-    assert found == f"5 of 9 points known to rtol = 1 %, 4 less well; worst 15 % at 211.25 Hz, {scheme}: {remedy}"
-
-
-def test_points_that_failed_or_were_never_estimated_are_not_within():
-    outcomes = {(0, 0): 4, (0, 1): 6, (0, 2): 15}
-    errors = {(0, 0): 9.0, (0, 1): 0.03, (0, 2): 1.2, (1, 0): float("nan")}
-    found = volumes_of(*GRID, error=lambda p: errors.get(at(p), 0.0), outcome=lambda p: outcomes.get(at(p), 0))
-    assert found == (
-        "5 of 9 points known to rtol = 1 %, 2 less well, 1 not computed to the end, 1 never estimated;"
-        " worst 120 % at 210 Hz, adaptive: a smaller rtol"
-    )
-
-
-def test_every_point_is_held_against_its_own_rtol():
-    study = ("axes.frequency=1", "axes.rtol=[1e-2, 1e-3]", "axes.scheme=adaptive")
-    assert volumes_of(*study, error=lambda _: 5e-3) == (
-        "1 of 2 points known to their rtol, 1 less well; worst 0.5 % at rtol 0.001: rtol = 0.0002"
-    )
-    assert "2 of 2" in volumes_of(*study, error=lambda _: 5e-4)
-    assert volumes_of("axes.frequency=1", "slow_time.cycles=0") == "not asked for: slow_time.cycles = 0"
-
-
-# --- findings: points that failed or are less exact than asked for, and not too many of them ---
-
-TWO = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=['implicit', 'explicit']")
-INACCURATE, MARCH_FAILED = int(Outcome.INACCURATE), int(Outcome.MARCH_FAILED)
-
-
-def findings_of(outcomes, messages=None, *overrides, last_cycle=20_000.0):
-    """Of a study whose points end as is said by frequency and scheme; all others converge."""
-    study, said = read_study("sdof_slider", overrides or TWO), messages or {}
-    results = results_of(
-        study,
-        outcome=lambda point: outcomes.get(at(point), 0),
-        message=lambda point: said.get(at(point), ""),
-        error_estimate=lambda _: 0.026,
-        last_cycle=lambda point: last_cycle if outcomes.get(at(point), 0) == MARCH_FAILED else 20_000.0,
-    )
-    numbers = {}
-    for result in results:
-        numbers[result.outcome] = numbers.get(result.outcome, 0) + len(result.points)
-    return told(lambda found: found.format(numbers), lambda: Findings(study, FACTS), study, results)
-
-
-def test_point_cycle_and_error_are_named():
-    message = "from cycle 31 000 on the wear rate is known to 2.6 % only"
-    assert findings_of({(1, 1): INACCURATE}, {(1, 1): message}) == (
-        f"1 x inaccurate: {Outcome.INACCURATE.sentence}",
-        f"  211.25 Hz, explicit: {message}",
-    )
-
-
-def test_how_far_a_point_came_that_ended_early():
-    head, line = findings_of({(2, 0): MARCH_FAILED}, last_cycle=12_500.0)
-    assert head == f'1 x march_failed: {Outcome.MARCH_FAILED.sentence} Try scheme = "adaptive" or a smaller step.'
-    assert line == "  212.5 Hz, implicit: computed up to cycle 12 500 of 20 000, the worn volume there to 2.6 %"
-    for message, last, expected in (
-        ("lost it", 0.0, "computed up to cycle 0 of 20 000; lost it"),
-        ("ended at cycle 12", 12.0, "ended at cycle 12"),
-        ("", float("nan"), "no state was found"),
-    ):
-        (_, line) = findings_of({(2, 0): MARCH_FAILED}, {(2, 0): message}, last_cycle=last)
-        assert line == f"  212.5 Hz, implicit: {expected}"
-    for error in (0.0, float("inf")):
-        assert describe_reach(2000.0, 1e5, error) == "computed up to cycle 2000 of 100 000"
-
-
-def test_points_that_were_computed_otherwise_have_advice_of_their_own():
-    """What was used decides: nothing that the study has, and no step for a scheme that has none."""
-    grid = ("axes.frequency=[210, 211]", "axes.scheme=['adaptive', 'explicit']")
-    found = findings_of({(0, 0): MARCH_FAILED, (0, 1): MARCH_FAILED, (1, 1): MARCH_FAILED}, None, *grid)
-    sentence = f"x march_failed: {Outcome.MARCH_FAILED.sentence}"
-    assert [line for line in found if not line.startswith(" ")] == [
-        f'1 {sentence} Try a smaller rtol, which makes the steps shorter, or scheme = "implicit" with a small step.',
-        f"2 {sentence} Try a smaller step.",
-    ]
-
-
-def test_no_more_than_some_are_named():
-    many = ("axes.frequency=" + str(list(range(100, 125))), "axes.scheme=implicit")
-    outcomes = {(place, 0): INACCURATE for place in range(20)}
-    found = findings_of(outcomes, None, *many)
-    assert len(found) == 1 + MOST_NAMED + 1
-    assert (found[1], found[-1]) == ("  100 Hz", f"  and {20 - MOST_NAMED} more")
-    both = findings_of(outcomes | {(22, 0): MARCH_FAILED}, None, *many)
-    assert len(both) == 1 + 1 + 1 + MOST_NAMED // 2 + 1
-    assert both[-1] == f"  and {20 - MOST_NAMED // 2} more"
-
-
-# --- outcomes over wear and excitation ---
-
-WEAR_AND_LOAD = ("axes.frequency=[100, 110]", "axes.wear_coefficient=[1e-14, 1e-11]", "axes.scheme=implicit")
-
-
-def outcomes_of(outcome, *overrides):
-    """By frequency, wear coefficient and excitation."""
-    study = read_study("sdof_slider", (*WEAR_AND_LOAD, "axes.excitation_amplitude=[0.5, 25]", *overrides))
-    results = results_of(
-        study,
-        outcome=lambda point: outcome.get(point[:3], 0),
-        error_estimate=lambda point: 0.02 if point[:2] == (0, 0) else 0.01,
-    )
-    return told(OutcomeTable.rows, lambda: OutcomeTable(study), study, results)
-
-
-def test_a_row_for_each_wear_coefficient_and_a_column_for_each_excitation():
-    assert outcomes_of({(0, 1, 1): 10, (1, 1, 1): 4, (1, 0, 1): 9}) == [
-        ("outcomes (known to rtol)", "excitation_amplitude 0.5 N | excitation_amplitude 25 N"),
-        ("  wear_coefficient 1e-14 1/Pa", "2 converged (1)            | 1 converged, 1 adrift (0)"),
-        ("  wear_coefficient 1e-11 1/Pa", "2 converged (2)            | 1 march_failed, 1 time_limit (0)"),
-    ]
-    outcome = {point: sum(point) % 5 for point in itertools.product(range(2), repeat=3)}
-    rows = outcomes_of(outcome, "axes.step=[100, 1000]", "axes.scheme=['implicit', 'explicit']")
-    numbers = [int(part.split()[0]) for _, text in rows[1:] for cell in text.split(" | ") for part in cell.split(", ")]
-    assert sum(numbers) == 2**5, "every point is counted once"
-
-
-@pytest.mark.parametrize(
-    ("overrides", "heads"),
+    ("given", "n_left_out"),
     [
-        (("axes.wear_coefficient=1e-11",), []),
-        (("axes.excitation_amplitude=1",), []),
-        (("axes.wear_coefficient=1e-11", "axes.step=[1, 10]"), ["step 1", "step 10"]),
-        (("axes.excitation_amplitude=1", "axes.step=[1, 10]"), [f"wear_coefficient {k} 1/Pa" for k in (1e-14, 1e-11)]),
+        ({"outcome": lambda p: SENSITIVE if p[0] == 2 else 0}, 1),
+        ({"outcome": lambda p: FAILED if p[0] == 2 else 0}, 1),
+        ({"error_estimate": lambda p: 0.7 if p[0] == 2 else 0.01}, 1),
+        ({"error_estimate": lambda p: math.nan if p[0] == 2 else 0.01}, 1),
     ],
 )
-def test_axes_are_those_that_vary(overrides, heads):
-    rows = outcomes_of({}, *overrides)
-    assert [label.strip() for label, _ in rows[1:]] == heads
-    assert bool(rows) is bool(heads)
+def test_what_is_not_known_is_no_result(given, n_left_out):
+    """The last frequency would wear most."""
+    dataset = wearing(*GRID, volume=lambda p: 1e-9 * (1.0 + p[0]), **given)
+    found = summary(dataset)
+    assert found.wear.volume.value == pytest.approx(2e-9)
+    assert found.wear.n_left_out == n_left_out
+    assert "may wear more" in summary_lines(found)[0]
+    nothing = summary(dataset.assign(outcome=dataset["outcome"] * 0 + FAILED))
+    assert nothing.wear is None
+    assert nothing.n_complete == 0
+    assert not any("mm3" in line for line in summary_lines(nothing))
 
 
-# --- wear is small against the width of the contact ---
-
-COEFFICIENTS = ("axes.frequency=[210, 211.25, 212.5]", "axes.wear_coefficient=[1e-11, 1e-5]", "axes.scheme=adaptive")
-
-
-def small_wear(depths):
-    """Largest depths by frequency and wear coefficient; 1 um everywhere else."""
-    study = read_study("sdof_slider", COEFFICIENTS)
-    results = results_of(study, largest_wear_depth=lambda point: depths.get((point[0], point[1]), 1e-6))
-    return told(SmallWear.format, lambda: SmallWear(study, FACTS), study, results)
+DEPTHS = np.array([3e-6, 1e-6, 2e-6, 0.0, 5e-6, 0.0])
+BY_SIX = replace(
+    FACTS,
+    position=np.arange(18.0).reshape(6, 3),
+    area=np.array([1.0, 2.0, 1.0, 1.0, 2.0, 1.0]) * 1e-4,
+    surface=("left",) * 3 + ("right",) * 3,
+    edge=np.array([True, False, True] * 2),
+)
 
 
-def test_small_wear_is_one_number():
-    # one pair on each surface: the side of the smaller one is 0.01 m
-    assert small_wear({(1, 0): 2e-4}) == "depth over contact width at most 0.02"
-    assert small_wear({(1, 0): SMALL * 0.01}) == "depth over contact width at most 0.1"
-    nowhere = {(place, wear): float("nan") for place in range(3) for wear in range(2)}
-    assert small_wear(nowhere) == "nothing was computed"
-    assert small_wear(nowhere | {(1, 0): 2e-4}) == "depth over contact width at most 0.02"
+@pytest.mark.parametrize("name", ["wear_depth", "wear_depth_last"])
+def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
+    study = read_study("sdof_slider", ("axes.frequency=100", f"outputs.variables=['worn_volume', '{name}']"))
+    share = np.linspace(0.0, 1.0, 21)
+    for depths, pair, edge in ((DEPTHS, 4, 0.0), (DEPTHS[[4, 1, 2, 3, 0, 5]], 0, 7.0 / 9.0)):
+        depth = np.outer(share, depths) if name == "wear_depth" else depths
+        made = made_result(study, BY_SIX, worn_volume=lambda _: 1e-9 * share, **{name: lambda _, depth=depth: depth})
+        deepest = summary(made).wear.deepest
+        assert deepest.depth.value == 5e-6
+        assert (deepest.pair, deepest.surface) == (pair, "right" if pair else "left")
+        np.testing.assert_allclose(deepest.position, BY_SIX.position[pair])
+        assert deepest.edge_share == pytest.approx(edge)
+        assert deepest.edge_area == pytest.approx(0.5)
+        text = "\n".join(summary_lines(summary(made)))
+        assert ("edge pairs" in text) is (edge > 0.5)
 
 
-def test_large_wear_says_where_and_asks_for_the_unit():
-    assert small_wear({(1, 1): 0.014, (2, 1): 0.002}) == (
-        "NOT MET: depth over contact width (0.01 m) is 1.4 at 211.25 Hz, wear_coefficient 1e-05 1/Pa, above 0.1 at"
-        " 2 points: is wear_coefficient in 1/Pa?"
+# --- nothing wore ---
+
+
+def test_nothing_wore_says_why():
+    still = summary(wearing("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive", volume=lambda _: 0.0))
+    assert still.wear == NothingWore(0.0, "all 3 frequencies")
+    slips = wearing("axes.frequency=[1, 2]", volume=lambda _: 0.0, slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
+    assert summary(slips).wear.largest_slip == 1e-6
+    some = wearing(*GRID, volume=lambda _: 0.0, outcome=lambda p: FAILED if p[0] else 0)
+    assert summary(some).wear.where.startswith("3 of 9 points")
+    told = summary(
+        made_result(read_study("dovetail", ("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive"))).assign(
+            stuck_frequency=212.6
+        )
     )
-    assert "points" not in small_wear({(1, 1): 0.014})
+    assert "nothing wore: all pairs stick at all 3 frequencies (first resonance 212.6 Hz)" in summary_lines(told)[0]
+    assert told.certainty.of == "response"
+
+
+def test_results_of_older_versions_have_an_answer():
+    """They hold fewer variables; a volume without an error says so."""
+    later = (
+        "last_cycle",
+        "error_estimate",
+        "worn_volume_error",
+        "largest_wear_depth",
+        "wear_depth_error",
+    )
+    old = wearing(*GRID, volume=lambda p: 1e-9 * p[0]).drop_vars([*later, "contact_edge"], errors="ignore")
+    found = summary(old)
+    assert found.wear.volume.value == 2e-9
+    assert math.isnan(found.wear.volume.error)
+    assert found.certainty.of == "response"
+    assert "error not known" in str(found)
+    assert summary(old.drop_vars(["response_error", "response_amplitude", "wear_depth"])).certainty is None
+
+
+# --- the resonance and the life ---
+
+
+def test_the_peak_of_the_new_joint_lies_between_others():
+    for peak, expected in ((1, 211.25), (0, math.nan), (2, math.nan)):
+
+        def response(point, peak=peak):
+            return np.linspace([1.0], [2.0], 21) * 1e-3 / (1.0 + (point[0] - peak) ** 2)
+
+        made = wearing(*GRID, volume=lambda p: 1e-9 * (p[0] == 2), response_amplitude=response)
+        found = summary(made).vibration
+        np.testing.assert_equal(found.frequency[0], expected)
+        assert found.amplitude[1].value == pytest.approx(2.0 * found.amplitude[0].value)
+        assert found.where.startswith("212.5 Hz")
+
+
+def test_where_a_followed_resonance_went():
+    study = ("axes.frequency='resonance'", "loading.between=[180, 230]", "axes.wear_coefficient=[1e-12, 1e-11]")
+    made = wearing(
+        *study,
+        "axes.scheme=adaptive",
+        volume=lambda p: 1e-9 * p[1],
+        excitation_frequency=lambda p: 200.0 - p[1] * np.arange(21.0),
+        excitation_frequency_error=lambda _: np.full(21, 0.25),
+    )
+    followed = summary(made).vibration
+    assert followed.followed == "resonance"
+    assert (followed.frequency[0], followed.frequency[1].value, followed.frequency[1].error) == (200.0, 180.0, 0.25)
+
+
+def test_the_shortest_life():
+    lives = (400.0, 300.0, math.nan)
+    made = wearing(
+        "axes.frequency=[1, 2, 3]",
+        "axes.scheme=adaptive",
+        "slow_time.until={wear_depth=1e-5}",
+        cycles_to_target=lambda p: lives[p[0]],
+        cycles_to_target_error=lambda _: 3.0,
+    )
+    life = summary(made).life
+    assert (life.quantity, life.target, life.n_beyond, life.where) == ("wear_depth", 1e-5, 1, "2 Hz")
+    assert (life.count.value, life.count.error) == (300.0, 3.0)
+    assert summary(wearing("axes.frequency=1")).life is None
+    never = summary(made.assign(cycles_to_target=made["cycles_to_target"] * math.nan)).life
+    assert math.isnan(never.count.value)
+    assert never.n_beyond == 3
+
+
+# --- certainty and failures ---
+
+
+def test_every_point_is_compared_with_its_own_rtol():
+    study = ("axes.frequency=1", "axes.rtol=[1e-2, 1e-3]", "axes.scheme=adaptive")
+    known = summary(wearing(*study, error_estimate=lambda _: 5e-3)).certainty
+    assert (known.n_known, known.n_less, known.worst) == (1, 1, 5e-3)
+    assert math.isnan(known.rtol)
+    assert known.where == "rtol 0.001"
+    assert "solver.rtol = 0.0002" in known.advice
+    assert summary(wearing(*study, error_estimate=lambda _: 5e-4)).certainty.n_known == 2
+
+
+def test_points_that_failed_or_were_never_estimated_are_not_known():
+    outcomes, errors = {(0, 0): FAILED, (0, 1): INACCURATE, (0, 2): SENSITIVE}, {(0, 0): 9.0, (0, 1): 0.03, (0, 2): 1.2}
+    made = wearing(
+        *GRID,
+        outcome=lambda p: outcomes.get(at(p), 0),
+        error_estimate=lambda p: errors.get(at(p), math.nan if at(p) == (1, 0) else 0.001),
+        last_cycle=lambda p: 5000.0 if at(p) == (0, 0) else 20_000.0,
+    )
+    found = summary(made)
+    known = found.certainty
+    assert (known.n_known, known.n_less, known.n_short, known.n_unknown, known.worst) == (5, 2, 1, 1, 1.2)
+    assert [(each.word, each.is_complete, each.n_points) for each in found.failures] == [
+        ("march_failed", False, 1),
+        ("inaccurate", True, 1),
+        ("sensitive", True, 1),
+    ]
+    assert "computed up to 5000 cycles" in found.failures[0].first.replace("\N{NO-BREAK SPACE}", "")
+
+
+@pytest.mark.parametrize("error", [0.010003, 0.02, 0.3])
+def test_an_error_above_rtol_is_not_shown_as_rtol(error):
+    made = wearing("axes.frequency=1", "axes.scheme=adaptive", error_estimate=lambda _: error)
+    assert f"known within {show_percent(error, 0.01)} (rtol = 1 %)" in summary(made).certainty.sentence
+    assert show_percent(error, 0.01) != "1 %"
+
+
+def test_the_summary_is_short_whatever_came_out():
+    outcomes = [int(each) for each in Outcome]
+    made = wearing(
+        *GRID,
+        "slow_time.until={wear_depth=1e-5}",
+        outcome=lambda p: outcomes[(3 * p[0] + p[4]) * 2],
+        largest_wear_depth=lambda _: 1.0,
+        error_estimate=lambda _: 0.3,
+        facts=BY_SIX,
+    )
+    found = summary(made)
+    of_all = {"samples": Samples("1 Hz", 3, "volumes", "ranking"), "mesh": MeshChange((1, 2), "", 0.1, 0.2, None)}
+    for each in (found, replace(found, **of_all, modes=(ModeRange(1, "", (1, 2), (0, 1), 1, 2),))):
+        lines = summary_lines(each)
+        assert len(lines) <= MOST_LINES
+        assert all(line.isprintable() and line.isascii() for line in lines)
+        assert lines[-1].startswith("certainty")
+
+
+def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
+    made = wearing(*GRID, volume=lambda p: 1e-9 * (3 * p[0] + p[4]), slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
+    whole = summary(made)
+    for n_values in (1, 7, 50, 100):
+        monkeypatch.setattr("studyrunner.report.reading.points._AT_ONCE", n_values)
+        assert str(summary(made)) == str(whole)
+        largest = []
+        result_of(made).over_points(
+            "slip_range", lambda values, seen=largest: seen.append(values.size) or values[:, 0, 0]
+        )
+        # no less than one point at once, of 21 counts and 2 pairs
+        assert max(largest) <= max(n_values, 42)
+
+
+# --- certificates ---
+
+
+def test_the_largest_certificates_are_those_of_a_plain_loop():
+    rng = np.random.default_rng(7)
+    values = {name: {} for name in CERTIFICATE}
+
+    def draw(name):
+        return lambda point: values[name].setdefault(point, rng.choice([0.0, np.nan, *rng.random(4)], 21))
+
+    made = wearing(*GRID, outcome=lambda p: FAILED if p[0] == 1 else 0, **{name: draw(name) for name in CERTIFICATE})
+    rows = certificate_rows(result_of(made))
+    assert [label for label, *_ in rows] == list(CERTIFICATE.values())
+    for points, (_, shown, where) in zip(values.values(), rows, strict=True):
+        worst = max((np.nanmax(each), point) for point, each in points.items() if point[0] != 1)
+        assert shown in (f"{worst[0]:.1e}", show_percent(worst[0]))
+        assert where.startswith(f"{(210, 211.25, 212.5)[worst[1][0]]:g} Hz")
+
+
+# --- meshes ---
+
+MESHES = ("axes.frequency='resonance'", "loading.between=[205, 216]", "axes.scheme=adaptive")
+
+
+def meshed(meshes, volumes, *overrides, error=1e-3):
+    """The comparison of meshes; volumes: by mesh and wear coefficient, mm3."""
+    given = overrides or MESHES
+    study = read_study("dovetail", (*given, f"axes.mesh={meshes}", "axes.wear_coefficient=[1e-12, 1e-11]"))
+    mesh, wear = (list(study.dimensions).index(name) for name in ("mesh", "wear_coefficient"))
+    share = np.linspace(0.0, 1.0, len(study.cycles_kept))
+    made = made_result(
+        study,
+        worn_volume=lambda p: 1e-9 * volumes[study.dimensions["mesh"][p[mesh]]][p[wear]] * share,
+        error_estimate=lambda _: error,
+    )
+    return compare_meshes(result_of(made))
+
+
+def test_meshes_are_compared_at_the_resonance_alone():
+    found = meshed([2, 3], {2: [2.0, 1.0], 3: [1.0, 1.1]})
+    assert found.meshes == (2.0, 3.0)
+    assert found.median == pytest.approx((0.5 + 0.1 / 1.1) / 2.0)
+    assert found.largest == pytest.approx(0.5)
+    assert found.limit is None
+    assert meshed([2, 3], {2: [0.0, 0.0], 3: [0.0, 0.0]}) is None
+    # at one frequency they would be at two distances to the resonance
+    assert meshed([2, 3], {2: [2.0, 1.0], 3: [1.0, 1.1]}, "axes.frequency=211.5", "axes.scheme=adaptive") is None
+    assert compare_meshes(result_of(wearing("axes.frequency=1"))) is None
+
+
+def test_meshes_that_converge_are_extrapolated():
+    """V = 1 + 0.5 / mesh^2 where most is worn."""
+    volumes = {mesh: [0.5, 1.0 + 0.5 / mesh**2] for mesh in (1, 2, 4)}
+    limit, order = meshed([4, 1, 2], volumes).limit
+    assert limit == pytest.approx(1e-9)
+    assert order == pytest.approx(2.0)
+    assert meshed([1, 2, 4], volumes, error=0.1).limit is None
+
+
+@pytest.mark.parametrize("order", [0.7, 1.0, 3.5])
+def test_limit_and_order_are_found(order):
+    volumes = [(mesh, (2.0 - mesh**-order, 1e-4)) for mesh in (2.0, 3.0, 4.0)]
+    limit, found = extrapolate(volumes) or (0.0, 0.0)
+    assert limit == pytest.approx(2.0, rel=1e-9)
+    assert found == pytest.approx(order, rel=1e-9)
+    assert extrapolate(volumes[:2]) is None
+    # apart by more than they fall, and by less than their errors
+    assert extrapolate([(2.0, (1.0, 0.0)), (3.0, (2.0, 0.0)), (4.0, (4.0, 0.0))]) is None
+    assert extrapolate([(mesh, (value, 0.5)) for mesh, (value, _) in volumes]) is None
+
+
+# --- values that are hardly what was meant ---
+
+
+def test_wear_that_is_not_small_is_pointed_out():
+    """One pair on each surface: the side of the smaller one is 0.01 m."""
+    for depth, is_small in ((SMALL * 0.01, True), (0.014, False)):
+        made = wearing(*GRID, largest_wear_depth=lambda p, depth=depth: depth if p[0] == 1 else 1e-6)
+        doubts = summary(made).doubts
+        assert bool(doubts) is not is_small
+        assert all("211.25 Hz" in doubt for doubt in doubts)
+
+
+@pytest.mark.parametrize(("frequencies", "asked"), [("[150, 160]", True), ("[20, 25]", False), ("[400, 500]", False)])
+def test_frequencies_in_radians_are_asked_about(frequencies, asked):
+    made = wearing(f"axes.frequency={frequencies}").assign(stuck_frequency=25.0)
+    assert any("rad/s" in doubt for doubt in summary(made).doubts) is asked
 
 
 @pytest.mark.parametrize(("n_along", "n_across"), [(1, 1), (2, 3), (8, 3), (40, 1), (1, 12), (40, 21)])
@@ -221,8 +369,11 @@ def test_the_width_is_that_of_the_surface_however_finely_it_is_divided(n_along, 
     facts = replace(FACTS, position=turned, area=area, surface=("a",) * len(flat))
     # a single pair, or a row of pairs across, does not say how long it is
     expected = 0.007 if n_along > 1 else 0.007 if n_across > 1 else np.sqrt(0.04 * 0.007)
-    assert contact_width(facts) == pytest.approx(expected, rel=0.2 if min(n_along, n_across) == 2 else 0.02)
+    width = contact_width(result_of(wearing("axes.frequency=1", facts=facts)))
+    assert width == pytest.approx(expected, rel=0.2 if min(n_along, n_across) == 2 else 0.02)
 
+
+# --- advice ---
 
 SCHEMES, SWEEPS = ("adaptive", "implicit", "explicit", "final"), ("up", "down", "ramp")
 ALL = [
@@ -258,12 +409,9 @@ def test_nothing_is_advised_that_is_in_use_or_not_used(used):
 
 def test_settings_of_a_point_are_its_own():
     changes = ("axes.scheme=['implicit', 'explicit']", "axes.harmonics=['auto', 5]", "axes.rtol=[1e-2, 1e-3]")
-    study = read_study("sdof_slider", (*changes, "slow_time.largest_depth=1e-6"))
-    names = list(study.dimensions)
-    point = [0] * len(names)
-    for name in ("scheme", "harmonics", "rtol"):
-        point[names.index(name)] = 1
-    assert settings_of(study, point) == Used(
+    result = result_of(wearing(*changes, "axes.frequency=1", "slow_time.largest_depth=1e-6"))
+    place = tuple(int(name in ("scheme", "harmonics", "rtol")) for name in result.axes)
+    assert settings_of(result, place) == Used(
         "explicit", "up", 5, "auto", 1e-3, ("implicit", "explicit"), ("up",), by_depth=True
     )
 
@@ -293,8 +441,3 @@ def test_an_error_is_shown_on_its_side_of_rtol(error, rtol, text):
     if error < 1.0:
         shown, limit = float(text.removesuffix(" %")), float(show_rtol(rtol).removesuffix(" %"))
         assert (shown <= limit) == (error <= rtol)
-
-
-def test_what_is_not_finite_is_not_known():
-    assert known_to(0.010003, 0.01) == "is known to 1.0003 % only"
-    assert known_to(float("inf"), 0.01) == "is not known"

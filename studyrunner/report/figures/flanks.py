@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.accessor import Grid, find_grid
+from studyrunner.report.reading.grid import Grid, find_grid
 from studyrunner.report.reading.result import Result
 
 JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}

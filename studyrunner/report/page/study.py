@@ -10,11 +10,13 @@ import xarray as xr
 
 from studyrunner.coordinates import COORDINATES
 from studyrunner.report.reading.endings import Ending
-from studyrunner.report.reading.known_volumes import advise_ended, describe_ended, tell_ends, tell_volumes
+from studyrunner.report.reading.known_volumes import advise_ended, describe_ended, tell_ends
 from studyrunner.report.reading.result import CONVERGED, Point, Result
 from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
 from studyrunner.report.reading.units import scale_for, show_cycles, show_number, units_of
 from studyrunner.statistics.sentence import sentence, sentences
+from studyrunner.summary.answer import summarise
+from studyrunner.summary.lines import summary_rows
 from studyrunner.system.progress import count
 
 _MOST_VALUES = 12
@@ -38,6 +40,7 @@ class StudyFacts:
     is more to say. facts: names and values. text: the effective study, None where the file has none.
     """
 
+    answer: tuple[tuple[str, str], ...]
     summary: str
     endings: list[Ended]
     facts: list[tuple[str, str]]
@@ -65,8 +68,14 @@ def describe_study(result: Result) -> StudyFacts:
         for number, ending in sorted(result.endings.items())
         if numbers[number] and number != CONVERGED
     ]
-    summary = " ".join(filter(None, (_tell_samples(result), tell_volumes(result), tell_ends(result))))
-    return StudyFacts(summary, endings, facts, str(attributes["study"]) if "study" in attributes else None)
+    summary = " ".join(filter(None, (_tell_samples(result), tell_ends(result))))
+    return StudyFacts(
+        summary_rows(summarise(result)),
+        summary,
+        endings,
+        facts,
+        str(attributes["study"]) if "study" in attributes else None,
+    )
 
 
 def _with_advice(result: Result, ending: Ending) -> str:

@@ -1,51 +1,116 @@
-"""Accuracy of the worn volumes of a file in sentences: known to rtol or less well, ended early, and why.
-
-Words, numbers and advice are those of the summary of a run.
-"""
+"""How well the numbers of a file are known, how points ended, and what to do about both."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from studyrunner.advice import Used, advise, advise_error
 from studyrunner.percent import show_percent, show_rtol
+from studyrunner.report.reading.points import WELL_ENOUGH
 from studyrunner.report.reading.result import Point, Result
 from studyrunner.report.reading.units import show_cycles
 from studyrunner.system.progress import count
 
 _MOST_NAMED = 10
+_LEAST = 1e-4  # relative error that is told, of any smaller one
 _AUTO = "auto"
 _OF_ADVICE = ("scheme", "sweep", "harmonics", "samples", "rtol")
 
 
-def tell_volumes(result: Result) -> str:
-    """Number of worn volumes known to rtol, the worst with its place, and advice.
+@dataclass(frozen=True)
+class Certainty:
+    """How well the numbers of a result are known.
 
-    Empty where the file has no errors.
+    of: what, as "worn volume". n_points: of the study. n_known, n_less, n_unknown: computed to the end and known to
+    `rtol`, less well, never estimated. rtol: NaN where it is an axis. worst: largest relative error, NaN without one.
+    where: its point in words. advice: what would make it smaller; empty where all are known to `rtol`.
     """
-    if not result.tells_volumes:
-        return ""
-    known = result.computed & np.isfinite(result.errors)
+
+    of: str
+    n_points: int
+    n_known: int
+    n_less: int
+    n_unknown: int
+    rtol: float
+    worst: float
+    where: str
+    advice: str
+
+    @property
+    def n_short(self) -> int:
+        """Points that were not computed to the end."""
+        return self.n_points - self.n_known - self.n_less - self.n_unknown
+
+    @property
+    def sentence(self) -> str:
+        """The certainty in one sentence."""
+        aim = f"rtol = {show_rtol(self.rtol)}" if math.isfinite(self.rtol) else "their rtol"
+        held = self.rtol if math.isfinite(self.rtol) else None
+        worst = self.worst if held is not None and held < _LEAST else max(self.worst, _LEAST)
+        known = f"known within {show_percent(worst, held)}" if worst <= WELL_ENOUGH else "not known"
+        advice = f": {self.advice}" if self.advice else ""
+        if self.n_points == 1 and not self.n_short:
+            return f"the {self.of} is {known} ({aim}){advice}"
+        text = f"{self.n_known} of {count(self.n_points, self.of)} are known within {aim}"
+        text += f", {self.n_short} not computed to the end" if self.n_short else ""
+        text += f", {self.n_unknown} without an estimate" if self.n_unknown else ""
+        if not self.worst > 0.0:
+            return text
+        at = f" at {self.where}" if self.where else ""
+        return f"{text}; the least certain is {known}{at}{advice}"
+
+
+def certainty_of(result: Result, *, wore: bool = True) -> Certainty | None:
+    """How well worn volumes are known; where nothing wore, the responses. Of modes natural frequency and damping ratio.
+
+    None where the file has no errors.
+    """
+    if result.has_modes:
+        return _certainty(result, "point", _of_modes(result))
+    responses = result.has("response_error") and result.blocks is None
+    if result.tells_volumes and (wore or not responses):
+        return _certainty(result, "worn volume", result.errors)
+    if responses:
+        last = result.over_points("response_error", lambda values: values[:, -1])
+        return _certainty(result, "response", last)
+    return None
+
+
+def _of_modes(result: Result) -> NDArray[np.float64]:
+    """Largest relative error of natural frequency and damping ratio; in the shape of the axes."""
+    errors = np.zeros(result.computed.shape)
+    for name in ("natural_frequency", "damping_ratio"):
+        if result.has(name, f"{name}_error"):
+            value = np.abs(result.read(name).values)
+            own = np.where(value > 0.0, result.read(f"{name}_error").values / np.where(value > 0.0, value, 1.0), 0.0)
+            errors = np.fmax(errors, own)
+    return errors
+
+
+def _certainty(result: Result, of: str, errors: NDArray[np.float64]) -> Certainty:
+    known = result.computed & np.isfinite(errors)
+    # each is compared with its own rtol: one that is above it is worse than any that is not
+    above = result.computed & (errors > result.rtol)
+    within = known & ~above
     several = np.unique(result.rtol[np.isfinite(result.rtol)])
-    aim = f"rtol = {show_rtol(float(several[0]))}" if several.size == 1 else "their rtol"
-    n_known, n_less = int(np.count_nonzero(result.known)), int(np.count_nonzero(result.above))
-    text = f"The worn volume of {n_known} of {count(known.size, 'point')} is known to {aim}"
-    text += f", of {n_less} less well" if n_less else ""
-    n_short = int(np.count_nonzero(~result.computed))
-    text += f", {n_short} not computed to the end" if n_short else ""
-    n_unknown = int(np.count_nonzero(result.computed & ~known))
-    text += f", of {n_unknown} it was never estimated" if n_unknown else ""
-    if not known.any():
-        return f"{text}."
-    # each is held against its own rtol: one that is above it is worse than any that is not
-    worst = np.where(result.above if n_less else known, result.errors, -1.0)
-    place = tuple(int(index) for index in np.unravel_index(int(np.argmax(worst)), worst.shape))
-    where = f", at {result.describe(_point(result, place))}" if result.varying else ""
-    text += f"; the worst is known to {show_error(result, place)}{where}."
-    return f"{text} What may help: {advise_volume(result, place)}." if n_less else text
+    n_unknown = int(np.count_nonzero(result.computed & np.isnan(errors)))
+    worst, where, advice = math.nan, "", ""
+    if above.any() or known.any():
+        order = np.where(above if above.any() else known, errors, -1.0)
+        place = tuple(int(index) for index in np.unravel_index(int(np.argmax(order)), order.shape))
+        worst, where = float(errors[place]), result.describe(_point(result, place)) if result.varying else ""
+        if above.any():
+            found = advise_volume(result, place) if of == "worn volume" else "set a smaller solver.rtol"
+            advice = f"for {show_rtol(float(result.rtol[place]))} {found}"
+    n_known, n_less = (int(np.count_nonzero(each)) for each in (within, above))
+    rtol = float(several[0]) if several.size == 1 else math.nan
+    return Certainty(of, errors.size, n_known, n_less, n_unknown, rtol, worst, where, advice)
 
 
 def show_error(result: Result, place: tuple[int, ...]) -> str:
@@ -78,7 +143,7 @@ def describe_ended(result: Result, number: int) -> list[str]:
                 if result.computed[place]
                 else f"computed up to {show_cycles(float(result.last_cycle[place]), result.counted)}"
             )
-            known = f"worn volume known to {show_error(result, place)}" if np.isfinite(error) and error > 0.0 else ""
+            known = f"worn volume known within {show_error(result, place)}" if 0.0 < error <= WELL_ENOUGH else ""
             said = ", ".join(filter(None, (end, known, said)))
         where = result.describe(_point(result, place))
         lines += [f"{where}: {said}"] if said else []
@@ -124,7 +189,8 @@ def settings_of(result: Result, place: tuple[int, ...]) -> Used:
         return tuple(str(word) for word in dataset[key].values) if key in point else ()
 
     return Used(
-        scheme=str(of("scheme")),
+        # missions and modes have neither step nor scheme, and what they take of their own controls its error
+        scheme=str(of("scheme")) if "scheme" in point else "adaptive",
         sweep=str(of("sweep")),
         harmonics=_AUTO if str(of("harmonics")) == _AUTO else int(float(of("harmonics"))),
         samples=_AUTO if str(of("samples")) == _AUTO else int(float(of("samples"))),

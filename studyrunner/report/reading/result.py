@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,20 +13,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.report.reading.chosen import find_values
-from studyrunner.report.reading.endings import Ending, read_endings
 from studyrunner.report.reading.measured import Profile, read_profile
 from studyrunner.report.reading.missions import as_history
-from studyrunner.report.reading.opening import open_file
+from studyrunner.report.reading.opening import open_known
+from studyrunner.report.reading.points import CONVERGED, Points
 from studyrunner.report.reading.sample_statistics import SAMPLE, statistics_of
-from studyrunner.report.reading.schema_check import check_dataset, reading_errors, study_tables
 from studyrunner.report.reading.units import show_cycles, show_value
-from studyrunner.user_error import UserError, show_text
+from studyrunner.user_error import show_text
 
-CONVERGED = 0
-"""The `outcome` of a point that was computed to the end without restriction."""
-
-_COMPLETE = ("converged", "inaccurate", "sensitive")
-"""Outcomes of points that were computed to the end."""
+__all__ = ["CONVERGED", "NO_VOLUME", "Point", "Result", "as_sentences", "open_for_report"]
 
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
@@ -37,7 +31,7 @@ Point = Mapping[str, int]
 
 
 @dataclass(frozen=True)
-class Result:
+class Result(Points):
     """A result file. A point is one combination of the axes.
 
     dataset: read lazily. A variable that was read as a whole stays in memory. fixed: axes of which this holds one value
@@ -52,93 +46,6 @@ class Result:
     blocks: xr.Dataset | None = None
     chosen: Mapping[str, float | str] = field(default_factory=dict)
     measured: Profile | None = None
-
-    @cached_property
-    def axes(self) -> tuple[str, ...]:
-        """Dimensions of a point, in the order of the file."""
-        return tuple(str(name) for name in self.dataset["outcome"].dims)
-
-    @cached_property
-    def varying(self) -> tuple[str, ...]:
-        """Axes of more than one value."""
-        return tuple(name for name in self.axes if self.dataset.sizes[name] > 1)
-
-    @property
-    def has_modes(self) -> bool:
-        """Whether the points are those of nonlinear modes, which have no slow time: `cycle` is then an axis."""
-        return "modal_amplitude" in self.axes
-
-    @property
-    def counted(self) -> str:
-        """What slow time counts: "cycles", or "missions"."""
-        return "cycles" if self.blocks is None else "missions"
-
-    @cached_property
-    def computed(self) -> NDArray[np.bool_]:
-        """Points that were computed to the end, in the shape of the axes."""
-        outcome = self.dataset["outcome"].values
-        if not self.has("last_cycle") and not self.has_modes:
-            # an older file holds nothing of any other point
-            return np.asarray(outcome == CONVERGED)
-        complete = [number for number, ending in self.endings.items() if ending.word in _COMPLETE]
-        return np.asarray(np.isin(outcome, complete))
-
-    @cached_property
-    def last_cycle(self) -> NDArray[np.float64]:
-        """Last cycle counts with values, NaN without values; in the shape of the axes."""
-        last = self.dataset["last_cycle"].values if self.has("last_cycle") else np.nan
-        if self.has_modes:
-            return np.where(self.computed, 0.0, np.nan)
-        # points of an older file, or of one that was joined to this
-        return np.where(self.computed & np.isnan(last), self.dataset["cycle"].values[-1], last)
-
-    @cached_property
-    def held(self) -> NDArray[np.bool_]:
-        """Points with values, be it of the first cycles only; in the shape of the axes."""
-        if self.has_modes:
-            return self.computed
-        return np.asarray(self.computed | (self.last_cycle >= self.dataset["cycle"].values[0]))
-
-    @cached_property
-    def errors(self) -> NDArray[np.float64]:
-        """Estimated relative errors of the last worn volumes; NaN where the file has none; in the shape of the axes."""
-        known = self.dataset["error_estimate"].values if self.has("error_estimate") else np.nan
-        return np.broadcast_to(np.asarray(known, dtype=float), self.computed.shape)
-
-    @cached_property
-    def rtol(self) -> NDArray[np.float64]:
-        """Relative error that each point was to keep below; NaN where the file does not say."""
-        outcome = self.dataset["outcome"]
-        if "rtol" in outcome.dims:
-            return np.asarray(self.dataset["rtol"].broadcast_like(outcome).transpose(*self.axes).values, dtype=float)
-        return np.full(outcome.shape, self.study_number("solver", "rtol"))
-
-    @cached_property
-    def above(self) -> NDArray[np.bool_]:
-        """Points that were computed to the end with a worn volume known less well than rtol; shape of the axes."""
-        return np.asarray(self.computed & (self.errors > self.rtol))
-
-    @cached_property
-    def known(self) -> NDArray[np.bool_]:
-        """Points that were computed to the end with a worn volume known to `rtol`; in the shape of the axes."""
-        return np.asarray(self.computed & (self.errors <= self.rtol))
-
-    @property
-    def tells_volumes(self) -> bool:
-        """Whether the file says how well worn volumes are known: with an rtol, and not of unworn states only."""
-        wears = self.has("cycle_count") or self.dataset["cycle"].values[-1] > 0.0
-        return bool(wears and self.has("error_estimate") and np.isfinite(self.rtol).any() and self.computed.any())
-
-    @cached_property
-    def worn(self) -> NDArray[np.float64]:
-        """Worn volume of each point at its last cycle, m3, or where it ended early; NaN without a state."""
-        worn = self.read("worn_volume").isel(cycle=-1).fillna(self.read("worn_volume").max("cycle"))
-        return np.asarray(worn.transpose(*self.axes).values, dtype=float)
-
-    def ended(self, word: str) -> NDArray[np.bool_]:
-        """Points with the outcome of this word; in the shape of the axes."""
-        numbers = [number for number, ending in self.endings.items() if ending.word == word]
-        return np.asarray(np.isin(self.dataset["outcome"].values, numbers))
 
     @cached_property
     def cycles(self) -> NDArray[np.float64]:
@@ -174,29 +81,17 @@ class Result:
         """Title of the study, or the name of the file."""
         return str(self.dataset.attrs.get("title") or show_text(self.path.stem))
 
-    @cached_property
-    def study(self) -> dict[str, dict[str, object]]:
-        """The effective study in the file, by table; empty where there is none that can be read."""
-        try:
-            return study_tables(self.dataset.attrs)
-        except UserError:
-            return {}
-
     @property
     def followed(self) -> str:
         """What the frequency of the excitation follows, "resonance" or "peak"; empty for given frequencies."""
         given = self.study.get("axes", {}).get("frequency")
         return given if isinstance(given, str) else ""
 
-    def study_number(self, table: str, key: str) -> float:
-        """A number of the study; NaN where the file does not say."""
-        value = self.study.get(table, {}).get(key)
-        return float(value) if isinstance(value, int | float) else math.nan
-
-    @cached_property
-    def endings(self) -> dict[int, Ending]:
-        """All ways for a point to end that the file names, by number."""
-        return read_endings(self.dataset["outcome"])
+    @property
+    def stuck_frequency(self) -> float:
+        """First natural frequency with the joint stuck, Hz; NaN where there are several, or the file has none."""
+        found = self.dataset["stuck_frequency"].values if self.has("stuck_frequency") else np.array(math.nan)
+        return float(found) if found.ndim == 0 else math.nan
 
     @cached_property
     def responses(self) -> tuple[str, ...]:
@@ -204,10 +99,6 @@ class Result:
         if "response" not in self.dataset.coords:
             return ()
         return tuple(str(name) for name in self.dataset["response"].values)
-
-    def has(self, *names: str) -> bool:
-        """Whether the file holds all of these variables."""
-        return all(name in self.dataset.variables for name in names)
 
     def lacks(self, *names: str) -> str:
         """Sentence that says which of these variables to ask for; empty where the file has all."""
@@ -245,34 +136,33 @@ class Result:
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show.
 
-        Among the points computed to the end this is the point with the largest final worn volume. Where nothing is
-        worn, or the file has no wear, it is the point with the largest response at the first kept cycle count; else the
-        first computed point; else the first point. Explicit and sensitive histories, which wear too much,
-        count only where there is no other; histories that ended early count only where none was computed to the end.
+        Of `best_known` the one with the largest final worn volume. Where nothing is worn, or the file has no wear, the
+        one with the largest response at the first kept cycle count. Other points count only where there is none.
         """
         return dict(self._shown)
 
     @cached_property
     def _shown(self) -> dict[str, int]:
-        candidates = []
+        measures = [np.ones(self.computed.shape)]
         if self.has_modes:
             amplitude = self.dataset["modal_amplitude"].broadcast_like(self.dataset["outcome"])
-            candidates.append(amplitude.transpose(*self.axes).values)
-        elif self.has("worn_volume"):
-            candidates.append(self.worn)
-        if self.has("response_amplitude") and not self.has_modes:
+            measures.insert(0, amplitude.transpose(*self.axes).values)
+        elif self.has("response_amplitude"):
             amplitude = self.read("response_amplitude").isel(cycle=0)
-            candidates.append(amplitude.max("response", skipna=False).values)
-        candidates.append(np.ones(self.computed.shape))
-        wanted = self._wanted
-        usable = self.computed & wanted if (self.computed & wanted).any() else self.held & wanted
-        trusted = usable & self._trusted
-        for measure in candidates:
-            known = np.where((trusted if trusted.any() else usable) & np.isfinite(measure), measure, 0.0)
+            measures.insert(0, amplitude.max("response", skipna=False).transpose(*self.axes).values)
+        if not self.has_modes and self.has("worn_volume"):
+            measures.insert(0, self.worn)
+        marched = np.ones(self.computed.shape, np.bool_)
+        if self.has("cycle_count"):
+            marched = np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
+        usable, best = self.usable, self.best_known
+        sets = (best & marched, usable & marched, best, self.computed, self.held, np.ones_like(marched))
+        points = next(each & self._wanted for each in sets if (each & self._wanted).any())
+        for measure in measures:
+            known = np.where(points & np.isfinite(measure), measure, 0.0)
             if known.max() > 0.0:
-                place = np.unravel_index(int(np.argmax(known)), known.shape)
-                return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
-        place = np.unravel_index(int(np.argmax(wanted)), wanted.shape)
+                break
+        place = np.unravel_index(int(np.argmax(known)), known.shape)
         return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
 
     @property
@@ -284,18 +174,6 @@ class Result:
             if name in outcome.dims and self.dataset.sizes[name] > 1:
                 wanted = wanted & (self.dataset[name] == value)
         return np.asarray(wanted.transpose(*self.axes).values)
-
-    @property
-    def _trusted(self) -> NDArray[np.bool_]:
-        """Histories neither explicit nor sensitive, no final states without a history; in the shape of the axes."""
-        outcome = self.dataset["outcome"]
-        trusted = xr.ones_like(outcome, dtype=bool)
-        if "scheme" in outcome.dims:
-            trusted = trusted & (self.dataset["scheme"] != "explicit")
-        if self.has("cycle_count"):
-            trusted = trusted & np.isfinite(self.dataset["cycle_count"].isel(cycle=-1))
-        found: NDArray[np.bool_] = trusted.transpose(*self.axes).values & ~self.ended("sensitive")
-        return found
 
     @cached_property
     def course_axis(self) -> str | None:
@@ -349,8 +227,6 @@ def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None, m
         Where there is no such file, it is no result of `run-study`, or it has no such point.
     """
     profile = None if measured is None else read_profile(measured)
-    opened = open_file(path)
-    with reading_errors(str(path), every=True), warnings.catch_warnings(action="ignore"):
-        dataset, blocks = as_history(check_dataset(opened, str(path)))
-        values = find_values(dataset, chosen or {})
-        return Result(Path(path), dataset, blocks=blocks, chosen=values, measured=profile)
+    dataset, blocks = as_history(open_known(path))
+    values = find_values(dataset, chosen or {})
+    return Result(Path(path), dataset, blocks=blocks, chosen=values, measured=profile)

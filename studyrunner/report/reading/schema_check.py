@@ -1,13 +1,13 @@
-"""Schema check of the result file that the report reads: known variables of the right shape and type, nothing else.
+"""Schema check of a result file: known variables of the right dimensions, types and sizes; nothing else is read.
 
-Names and sentences of the file are cleaned: they contain no markup, no control characters and no line breaks, and have
-at most the length of a label. Variables that the report does not draw are left out.
+Texts of the file stay texts: they hold no control characters and no line breaks, and are as long as a sentence at most.
 
 By hand: `xarray-schema` has no limits of sizes, and leaves texts as they are.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,7 +15,7 @@ from contextlib import contextmanager
 import numpy as np
 import xarray as xr
 
-from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
 from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS
 from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
@@ -26,34 +26,31 @@ from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, KEPT, LOOPS, Varia
 MOST_POINTS = 10**6
 """Largest number of points of a study."""
 
-_MOST_VALUES = 2**27  # of a variable without contact pairs, which is read as a whole
+_MOST_VALUES = 2**27  # of a variable without contact pairs, which may be read as a whole
+_MOST_NAMES = 2**20  # values along any dimension
+_MOST_INPUTS, _MOST_DRAWN = 100, 2**24  # inputs that scatter, values of one of them
 _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
-_INFINITE = (
-    "natural_frequency_error",
-    "damping_ratio_error",
-    "step_limit",
-    "error_estimate",
-    "worn_volume_error",
-    "cycle_count",
-    "block_worn_volume_error",
-    "missions_to_target_error",
-    "cycles_to_target_error",
-    "response_error",
-    *CERTIFICATE,
-)
-_MOST_INPUTS, _MOST_DRAWN = 100, 2**24  # inputs that scatter, values of one of them
-_MOST_NAMES = 2**20  # values along any dimension
-_LONGEST_NAME, _LONGEST_SENTENCE, _LONGEST_TEXT = 120, 400, 20_000
-_DEEPEST = 3  # of what is nested in a study
-_INTEGERS = 2.0**63
+_INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", *CERTIFICATE)
+"""Ends of the names of variables that may be infinite: errors that are not known, what comes after any cycle."""
+_LONGEST_NAME, _LONGEST_SENTENCE = 120, 400
+_DEEPEST, _INTEGERS = 3, 2.0**63  # of what is nested in a study
 _REMEDY = "give a result file of run-study that is whole"
 
-_WITHOUT_AXES = {name: entry for table in ("mesh", "natural_frequency") for name, entry in SCENE[table].items()}
+_WITHOUT_AXES = SCENE["mesh"] | SCENE["natural_frequency"] | {"stuck_frequency": STUCK_FREQUENCY}
 _WITH_AXES = ASKED | KEPT | LOOPS | COUNTS | SCENE["exact"]
 _OF_CONTACTS = {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
-_ATTRIBUTES = {"units": _LONGEST_NAME, "long_name": _LONGEST_SENTENCE, "flag_meanings": _LONGEST_TEXT}
 _TEXTS = ("scheme", "sweep", "response", "component", "block")
+_MANY_LINES = ("study", "sentences")
+
+
+class _WrongError(Exception):
+    """A variable of a file is wrong. name: of the variable. found: what is wrong."""
+
+    def __init__(self, name: str, found: str) -> None:
+        super().__init__(name, found)
+        self.name = name
+        self.found = found
 
 
 def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
@@ -71,46 +68,24 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
     UserError
         Where a needed variable is missing or has a wrong shape or type.
     """
-    slow = slow_dimension(dataset)
+    slow = "mission" if "mission" in dataset.dims else "cycle"
     lacking = [name for name in ("outcome", slow, "contact") if name not in dataset.variables]
     if lacking:
         raise UserError(source, "OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
     axes = tuple(map(str, dataset["outcome"].dims))
-    with_axes = OF_MISSIONS | OF_A_MISSION if slow == "mission" else _WITH_AXES
-    if "modal_amplitude" in axes:
-        with_axes = OF_MODES | OF_A_MODE_POINT
-    without_axes = {name: entry for name, entry in _WITHOUT_AXES.items() if name not in with_axes}
-    if not math.prod(dataset["outcome"].shape):
-        raise UserError(source, "OUT.nc", None, f"holds no point; {_REMEDY}")
     try:
-        _check_sizes(dataset, (*axes, slow))
-        kept = {name: _check_coordinate(dataset, name) for name in _coordinates(dataset, axes)}
-        for name, entry in with_axes.items():
-            if name in dataset.variables:
-                kept[name] = _check_variable(dataset, name, entry, (*axes, *entry.dimensions))
-        for name, entry in (without_axes | _OF_CONTACTS).items():
-            if name in dataset.variables:
-                # where scenes differ, along the axes along which they do
-                along = tuple(axis for axis in axes if axis in dataset.variables[name].dims)
-                kept[name] = _check_variable(dataset, name, entry, (*along, *entry.dimensions))
-        drawn = {name: _check_drawn(dataset, name, axes) for name in _drawn_names(dataset)}
-        _check_values(kept, axes, slow)
+        _check_sizes(dataset, axes, slow)
+        coordinates = {name: _check_coordinate(dataset, name) for name in _coordinates(dataset, axes)}
+        coordinates |= {name: _check_drawn(dataset, name, axes) for name in _drawn_names(dataset)}
+        kept = _check_variables(dataset, axes, slow)
+        coordinates |= {name: kept.pop(name) for name in _OF_CONTACTS if name in kept}
+        _check_values(coordinates | kept, axes, slow)
     except _WrongError as wrong:
         raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
-    names = set(_OF_CONTACTS) | set(_coordinates(dataset, axes))
-    checked = xr.Dataset(
-        {name: variable for name, variable in kept.items() if name not in names},
-        {**{name: variable for name, variable in kept.items() if name in names}, **drawn},
-        {str(name): _clean(value, _limit(str(name))) for name, value in dataset.attrs.items()},
-    )
+    checked = xr.Dataset(kept, coordinates, {str(name): _clean(name, value) for name, value in dataset.attrs.items()})
     checked.set_close(dataset.close)
     study_tables(checked.attrs, source)
     return checked
-
-
-def slow_dimension(dataset: xr.Dataset) -> str:
-    """Name of the dimension of slow time: "mission" in a result of missions, else "cycle"."""
-    return "mission" if "mission" in dataset.dims else "cycle"
 
 
 def check_numbers(dataset: xr.Dataset, source: str) -> None:
@@ -123,12 +98,11 @@ def check_numbers(dataset: xr.Dataset, source: str) -> None:
     UserError
         Where there is such a number.
     """
-    # a final state that was found without slow time comes after any number of cycles
-    infinite = (*_INFINITE, "last_cycle") if "cycle_count" in dataset.variables else _INFINITE
     for name, variable in dataset.variables.items():
         if variable.dtype.kind == "f" and variable.size * variable.dtype.itemsize <= _LARGEST_READ:
             sizes = np.abs(variable.values)
-            wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (name not in infinite))]
+            may_be_infinite = str(name).endswith(_INFINITE)
+            wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (not may_be_infinite))]
             if wrong.size:
                 raise UserError(source, str(name), Verbatim(f"{wrong[0]:g}"), _REMEDY)
 
@@ -150,33 +124,20 @@ def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
 
 
 def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
-    """The effective study of a file, by table; empty where it is no TOML.
-
-    Numbers are limited, texts are cleaned, and deeply nested values are left out.
+    """The effective study of a file, by table; empty where it is no TOML. Very deeply nested values are left out.
 
     Raises
     ------
     UserError
         Where the study is no text in UTF-8, too long, or nested too deeply.
     """
-    text = str(attributes.get("study", ""))
     try:
-        tables = read_toml(text.encode("utf-8", "replace"), source)
+        tables = read_toml(str(attributes.get("study", "")).encode("utf-8", "replace"), source)
     except NoTomlError:
         return {}
     except UserError as error:
         raise UserError(source, "the attribute study", None, error.remedy) from None
-    plain = {name: _plain(table, _DEEPEST) for name, table in tables.items()}
-    return {name: table for name, table in plain.items() if isinstance(table, dict)}
-
-
-class _WrongError(Exception):
-    """A variable of a file is wrong. name: of the variable. found: what is wrong."""
-
-    def __init__(self, name: str, found: str) -> None:
-        super().__init__(name, found)
-        self.name = name
-        self.found = found
+    return {name: found for name, table in tables.items() if isinstance(found := _plain(table, _DEEPEST), dict)}
 
 
 def _coordinates(dataset: xr.Dataset, axes: Sequence[str]) -> list[str]:
@@ -185,18 +146,13 @@ def _coordinates(dataset: xr.Dataset, axes: Sequence[str]) -> list[str]:
     return [*axes, *(name for name in others if name in dataset.variables and name in dataset.dims)]
 
 
-def _check_sizes(dataset: xr.Dataset, names: Sequence[str]) -> None:
-    """names: of the axes, and that of the dimension of slow time."""
-    *axes, slow = names
+def _check_sizes(dataset: xr.Dataset, axes: Sequence[str], slow: str) -> None:
     if not all(name.isidentifier() and len(name) <= _LONGEST_NAME for name in axes):
         raise _WrongError("outcome", "axes with unusual names")
     sizes = {str(name): size for name, size in dataset.sizes.items()}
-    for name in (*names, "contact"):
-        if not sizes.get(name, 0):
-            raise _WrongError(name, "no values")
-    for name in sizes:
-        if (name in COORDINATES or name in axes) and sizes[name] > _MOST_NAMES:
-            raise _WrongError(name, f"{sizes[name]} values")
+    for name in (*axes, slow, "contact"):
+        if not 0 < sizes.get(name, 0) <= _MOST_NAMES:
+            raise _WrongError(name, f"{sizes.get(name, 0)} values")
     n_points = math.prod(sizes[name] for name in axes)
     n_values = n_points * sizes[slow] * sizes.get("response", 1) * (sizes.get("block", 1) if slow == "mission" else 1)
     if n_points > MOST_POINTS or n_values > _MOST_VALUES:
@@ -205,11 +161,9 @@ def _check_sizes(dataset: xr.Dataset, names: Sequence[str]) -> None:
 
 def _check_coordinate(dataset: xr.Dataset, name: str) -> xr.Variable:
     """Values along the dimension of this name: finite numbers, or texts."""
-    if name not in dataset.variables:
-        raise _WrongError(name, "no values")
+    if name not in dataset.variables or dataset.variables[name].dims != (name,):
+        raise _WrongError(name, "no values along the dimension of this name")
     variable = dataset.variables[name]
-    if variable.dims != (name,):
-        raise _WrongError(name, f"dimensions {variable.dims}")
     if variable.dtype.kind not in "iuf":
         texts = _texts(variable, name)
         if name in COORDINATES and name not in _TEXTS and not all(map(_is_choice, texts.values.tolist())):
@@ -220,6 +174,14 @@ def _check_coordinate(dataset: xr.Dataset, name: str) -> xr.Variable:
     if not np.isfinite(variable.values).all():
         raise _WrongError(name, "a value that is no finite number")
     return xr.Variable((name,), variable.values, _attributes(variable))
+
+
+def _is_choice(text: str) -> bool:
+    """Whether a text stands for a number: the values of an axis with numbers and "auto" are texts."""
+    try:
+        return text == "auto" or math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def _drawn_names(dataset: xr.Dataset) -> list[str]:
@@ -250,17 +212,21 @@ def _check_drawn(dataset: xr.Dataset, name: str, axes: Sequence[str]) -> xr.Vari
     return xr.Variable(variable.dims, variable.values, _attributes(variable))
 
 
-def _is_choice(text: str) -> bool:
-    """Whether a text stands for a number: the values of an axis with numbers and "auto" are texts."""
-    try:
-        return text == "auto" or math.isfinite(float(text))
-    except ValueError:
-        return False
+def _check_variables(dataset: xr.Dataset, axes: Sequence[str], slow: str) -> dict[str, xr.Variable]:
+    """Those that the report knows, unread but for texts."""
+    with_axes: dict[str, Variable] = OF_MISSIONS | OF_A_MISSION if slow == "mission" else _WITH_AXES
+    if "modal_amplitude" in axes:
+        with_axes = OF_MODES | OF_A_MODE_POINT
+    kept = {}
+    for name, entry in (_WITHOUT_AXES | _OF_CONTACTS | with_axes).items():
+        if name in dataset.variables:
+            # what is of the scene has those axes along which scenes differ
+            along = tuple(axis for axis in axes if name in with_axes or axis in dataset.variables[name].dims)
+            kept[name] = _check_variable(dataset.variables[name], name, entry, (*along, *entry.dimensions))
+    return kept
 
 
-def _check_variable(dataset: xr.Dataset, name: str, entry: Variable, dimensions: tuple[str, ...]) -> xr.Variable:
-    """The variable, unread but for texts."""
-    variable = dataset.variables[name]
+def _check_variable(variable: xr.Variable, name: str, entry: Variable, dimensions: tuple[str, ...]) -> xr.Variable:
     if variable.dims != dimensions:
         raise _WrongError(name, f"dimensions {', '.join(map(str, variable.dims))}")
     if {"scale_factor", "add_offset"} & set(variable.encoding):
@@ -283,8 +249,7 @@ def _check_values(kept: Mapping[str, xr.Variable], axes: Sequence[str], slow: st
     pairs = kept["contact"].values
     if pairs.dtype.kind not in "iu" or len(set(pairs.tolist())) < pairs.size:
         raise _WrongError("contact", "no whole numbers that differ")
-    flags = np.atleast_1d(kept["outcome"].attrs.get("flag_values", np.zeros(0, int)))
-    if flags.dtype.kind not in "iu":
+    if np.atleast_1d(kept["outcome"].attrs.get("flag_values", np.zeros(0, int))).dtype.kind not in "iu":
         raise _WrongError("outcome:flag_values", "no whole numbers")
     if not all(np.isfinite(kept[name].values).all() for name in kept if name in ("mesh_x", "mesh_y", "mesh_z")):
         raise _WrongError("mesh_x", "no finite number, here or beside it")
@@ -298,49 +263,43 @@ def _check_values(kept: Mapping[str, xr.Variable], axes: Sequence[str], slow: st
 def _texts(variable: xr.Variable, name: str) -> xr.Variable:
     if variable.dtype.kind not in "OSU" or variable.size > _MOST_NAMES:
         raise _WrongError(name, f"type {variable.dtype} of shape {variable.shape}")
-    texts = [_clean(each, _LONGEST_SENTENCE if name == "message" else _LONGEST_NAME) for each in variable.values.flat]
+    longest = _LONGEST_SENTENCE if name == "message" else _LONGEST_NAME
+    texts = [_line(each, longest) for each in variable.values.flat]
     values = np.array(texts, dtype=np.str_).reshape(variable.shape)
     return xr.Variable(variable.dims, values, _attributes(variable))
 
 
 def _attributes(variable: xr.Variable) -> dict[str, object]:
     """Attributes that the report reads."""
-    kept: dict[str, object] = {}
-    for name, longest in _ATTRIBUTES.items():
-        if name in variable.attrs:
-            kept[name] = _clean(variable.attrs[name], longest)
-    if "sentences" in variable.attrs:
-        lines = str(variable.attrs["sentences"])[:_LONGEST_TEXT].splitlines()
-        kept["sentences"] = "\n".join(_clean(line, _LONGEST_SENTENCE) for line in lines)
-    if "flag_values" in variable.attrs:
-        kept["flag_values"] = variable.attrs["flag_values"]
-    return kept
+    named = ("units", "long_name", "flag_meanings", "sentences")
+    kept: dict[str, object] = {name: _clean(name, variable.attrs[name]) for name in named if name in variable.attrs}
+    return kept | {name: variable.attrs[name] for name in ("flag_values",) if name in variable.attrs}
 
 
-def _limit(name: str) -> int | None:
-    """Largest number of characters of an attribute; None where the attribute has several lines."""
-    return None if name in ("study", "certificate_summary") else _LONGEST_SENTENCE
+def _clean(name: object, value: object) -> str:
+    """Text of an attribute without control characters."""
+    if name in _MANY_LINES:
+        return show_text(value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value))
+    longest = {"units": _LONGEST_NAME, "flag_meanings": 50 * _LONGEST_SENTENCE}.get(str(name), _LONGEST_SENTENCE)
+    return _line(value, longest)
 
 
-def _clean(value: object, longest: int | None) -> str:
-    """Text without markup and control characters. longest: number of characters; None for a text of many lines."""
+@functools.lru_cache(maxsize=4096)  # most messages are the same
+def _line(value: object, longest: int) -> str:
+    """Text in one line, without control characters. longest: number of characters."""
     text = value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value)
-    if longest is None:
-        return show_text(text)
     text = show_text(" ".join(text[: 2 * longest].split()))
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
 
 
 def _plain(value: object, deepest: int) -> object:
     """A value of a study for text and arithmetic; None where it is nested too deeply."""
-    if isinstance(value, bool | float):
-        return value
-    if isinstance(value, int):
+    if isinstance(value, int) and not isinstance(value, bool):
         return value if abs(value) < _INTEGERS else math.copysign(math.inf, value)
     if isinstance(value, dict | list) and deepest == 0:
         return None
     if isinstance(value, dict):
-        return {_clean(name, _LONGEST_NAME): _plain(item, deepest - 1) for name, item in value.items()}
+        return {_line(name, _LONGEST_NAME): _plain(item, deepest - 1) for name, item in value.items()}
     if isinstance(value, list):
         return [_plain(item, deepest - 1) for item in value]
-    return _clean(value, _LONGEST_NAME)
+    return value if isinstance(value, bool | float) else _line(value, _LONGEST_NAME)

@@ -22,10 +22,6 @@ SENTENCES = (
     "Two.",
 )
 
-SUMMARY = """worst certificate of              3 points computed to the end
-  scaled residual                 1.0e-08 at frequency 2 Hz
-folds in the sweeps               none"""
-
 
 def make_result(
     *,
@@ -105,7 +101,6 @@ def make_result(
     variables["outcome"] = (AXES, outcome, flags)
     attributes = {
         "title": "Made up",
-        "certificate_summary": SUMMARY,
         "study": "[scene]\nnodal_diameter = 0\n[solver]\nrtol = 0.01\n[slow_time]\ncycles = 1\n",
     }
     return Result(Path("made.nc"), xr.Dataset(variables, coordinates, attributes))

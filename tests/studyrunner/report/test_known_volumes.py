@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from studyrunner.plan.point_text import settings_of as of_study
+from studyrunner.report.drawing import Table
+from studyrunner.report.figures.outcome import draw_outcomes
+from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.page import write_page
-from studyrunner.report.reading.known_volumes import describe_ended, settings_of, tell_ends, tell_volumes
+from studyrunner.report.reading.known_volumes import certainty_of, describe_ended, tell_ends
 from studyrunner.report.reading.result import Result
-from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.report.figure_cases import make_result, with_endings
 from tests.studyrunner.report.figure_numbers import draw_figure
 
@@ -23,16 +24,16 @@ def mixed():
 
 def test_sentences_begin_with_the_worn_volume(tmp_path):
     result = mixed()
-    assert tell_volumes(result) == (
-        "The worn volume of 2 of 8 points is known to rtol = 1 %, of 4 less well, 2 not computed to the end; the worst"
-        " is known to 2 %, at 202 Hz, implicit scheme. What may help: rtol = 0.005."
-    )
+    known = certainty_of(result)
+    assert (known.n_points, known.n_known, known.n_less, known.n_short) == (8, 2, 4, 2)
+    assert (known.worst, known.where) == (0.02, "202 Hz, implicit scheme")
+    assert "solver.rtol = 0.005" in known.advice
     assert tell_ends(result) == (
         "8 points, 6 computed to the end, 1 ended early and hold what was computed until then, 1 without a result."
     )
     write_page(result, [], tmp_path / "index.html")
     html = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert html.index("The worn volume of 2 of 8") < html.index("8 points, 6 computed") < html.index("Above.")
+    assert html.index(known.sentence.replace('"', "&quot;")) < html.index("8 points, 6 computed") < html.index("Above.")
     assert "202 Hz, implicit scheme: from cycle 1000 on the wear rate is known to 2.6 % only" in html
 
 
@@ -42,7 +43,7 @@ def test_points_are_named_with_cycle_and_error():
         "202 Hz, implicit scheme: from cycle 1000 on the wear rate is known to 2.6 % only"
     ]
     assert describe_ended(result, 3) == [
-        "201 Hz, implicit scheme: computed up to 6000 cycles, worn volume known to 1.3 %, it broke off"
+        "201 Hz, implicit scheme: computed up to 6000 cycles, worn volume known within 1.3 %, it broke off"
     ]
     many = with_endings(make_result(frequency=range(100, 120)), dict.fromkeys(range(40), (6, 20_000.0)), {})
     lines = describe_ended(many, 6)
@@ -54,12 +55,9 @@ def test_errors_that_were_never_estimated_say_so():
     estimates = result.dataset["error_estimate"].copy(deep=True)
     estimates.values.flat[[0, 1]] = np.nan
     unknown = Result(result.path, result.dataset.assign(error_estimate=estimates))
-    assert "of 2 it was never estimated" in tell_volumes(unknown)
-    none = Result(result.path, result.dataset.assign(error_estimate=estimates * np.nan))
-    assert tell_volumes(none) == (
-        "The worn volume of 0 of 8 points is known to rtol = 1 %, 2 not computed to the end, of 6 it was never"
-        " estimated."
-    )
+    assert certainty_of(unknown).n_unknown == 2
+    none = certainty_of(Result(result.path, result.dataset.assign(error_estimate=estimates * np.nan)))
+    assert (none.n_known, none.n_less, none.n_unknown, none.n_short) == (0, 0, 6, 2)
 
 
 def test_an_inaccurate_state_is_no_volume_above_rtol():
@@ -67,18 +65,13 @@ def test_an_inaccurate_state_is_no_volume_above_rtol():
     result = with_endings(make_result(), {0: (6, 20_000.0)}, {0: "the response is known to 3 % only"})
     assert float(result.errors.flat[0]) < 0.01
     assert not result.above.flat[0]
-    assert int(result.known.sum()) == 2
-    assert "of 2 of 8 points is known to rtol = 1 %, of 6 less well" in tell_volumes(result)
-
-
-def test_the_report_and_the_run_advise_the_same():
-    """Settings of a point by its file are those by its study."""
-    changes = ("axes.frequency=[200, 201]", "axes.scheme=['implicit', 'explicit']", "solver.harmonics=5")
-    study = read_study("sdof_slider", (*changes, "slow_time.largest_depth=1e-6"))
-    made = make_result(frequency=(200.0, 201.0))
-    result = Result(made.path, made.dataset.assign_attrs(study=format_study(study)))
-    for place in np.ndindex(result.above.shape):
-        assert settings_of(result, place) == of_study(study, place)
+    table = next(item for item in draw_outcomes(result) if isinstance(item, Table))
+    place = table.columns.index("known to rtol")
+    assert [row[1:4] for row in table.rows] == [("converged", "7", "1"), ("inaccurate", "1", "1")]
+    assert sum(int(row[place]) for row in table.rows) == int(result.known.sum()) == 2
+    assert table.note.startswith(certainty_of(result).sentence)
+    remarks = build_page_data(result, 1e7).content["remarks"]
+    assert remarks["0"] == "the response is known to 3 % only."
 
 
 def test_a_point_at_its_target_is_drawn_where_it_ended():

@@ -31,11 +31,11 @@ NO_POINT = xr.Dataset({"outcome": ("frequency", np.zeros(0, np.int8))}, {"cycle"
 @pytest.mark.parametrize(
     ("content", "remedy"),
     [
-        (None, "there is no such file"),
+        (None, "there is none of this name"),
         (b"no NetCDF at all", "is no NetCDF file"),
         (b"", "is no NetCDF file"),
         (xr.Dataset({"a": ("x", [1.0])}), "holds no outcome and no cycle and no contact"),
-        (NO_POINT, "holds no point"),
+        (NO_POINT, "frequency = 0 values"),
     ],
 )
 @pytest.mark.parametrize("opening", [open_for_report, open_result])

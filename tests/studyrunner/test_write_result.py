@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from solver.outcome import Outcome
 from studyrunner.accessor import FretwearAccessor
-from studyrunner.netcdf import gather
+from studyrunner.netcdf import write as writing
+from studyrunner.netcdf.attributes import coordinates, scene_arrays
 from studyrunner.netcdf.output import progress_file
+from studyrunner.netcdf.provenance import describe_run
 from studyrunner.plan.planning import build_tasks
+from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
-from tests.studyrunner.dataset_twin import build_dataset, write_dataset
 from tests.studyrunner.fakes import FACTS, fake_completion, fake_histories, fake_march, fake_starts, without_values
+from tests.studyrunner.made_results import build_dataset, write_dataset
 
 OVERRIDES = (
     "axes.frequency=[160.0, 150.0]",
@@ -40,11 +42,15 @@ def fake_results(*overrides):
 
 def write(results, path, *overrides):
     """The file of a run of the study with these results."""
-    study = read_study("sdof_slider", (*OVERRIDES, *overrides))
+    return write_study(read_study("sdof_slider", (*OVERRIDES, *overrides)), results, path)
+
+
+def write_study(study, results, path, of_scene=()):
     plan = build_tasks(study, FACTS.n_displacements)
     completion = fake_completion(study, plan, results, progress_file(path))
+    arrays = [*coordinates(study, FACTS, pair_arrays(study, [FACTS])), *scene_arrays(study, of_scene)]
     with contextlib.closing(completion.store):
-        return gather.gather(study, FACTS, completion, path)
+        return writing.write_result(study, FACTS, completion, path, arrays, describe_run(study, FACTS))
 
 
 @pytest.fixture
@@ -90,7 +96,7 @@ def test_all_variables_with_their_dimensions_and_units(opened):
 def test_a_point_that_failed_opens_as_nan_and_0(tmp_path):
     results = fake_results()
     results[0] = without_values(results[0], 6)
-    assert write(results, tmp_path / "out.nc").outcomes == {0: 7, 6: 1, Outcome.NOT_COMPUTED: 0}
+    assert write(results, tmp_path / "out.nc") == {0: 7, 6: 1}
     with xr.open_dataset(tmp_path / "out.nc") as opened:
         (point,) = results[0].points
         assert opened.outcome.values[point] == 6
@@ -110,13 +116,13 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path):
 @pytest.mark.parametrize(("overrides", "bytes_a_slab"), [((), 1e9), ((*SHARED, LOOP), 3000.0), ((WEAR_RATE,), 1.0)])
 def test_the_file_is_the_one_of_the_plain_twin(overrides, bytes_a_slab, tmp_path, monkeypatch):
     """Whatever is in memory at once, and in whatever order the results came: every value, attribute and encoding."""
-    monkeypatch.setattr(gather, "_BYTES_A_SLAB", bytes_a_slab)
+    monkeypatch.setattr(writing, "_BYTES_A_SLAB", bytes_a_slab)
     results = fake_results(*overrides)
     results[1] = without_values(results[1], 6)
     shuffled = [results[place] for place in np.random.default_rng(3).permutation(len(results))]
-    gathered = write(shuffled, tmp_path / "out.nc", *overrides)
+    write(shuffled, tmp_path / "out.nc", *overrides)
     study = read_study("sdof_slider", (*OVERRIDES, *overrides))
-    write_dataset(build_dataset(study, FACTS, results, gathered.certificates), tmp_path / "twin.nc")
+    write_dataset(build_dataset(study, FACTS, results), tmp_path / "twin.nc")
     with xr.open_dataset(tmp_path / "out.nc") as opened, xr.open_dataset(tmp_path / "twin.nc") as twin:
         xr.testing.assert_identical(opened, twin)
         assert list(opened.variables) == list(twin.variables)
@@ -152,11 +158,7 @@ def test_the_examples_of_readme_and_pages_run(tmp_path, monkeypatch):
     assert all(hasattr(FretwearAccessor, name) for name in re.findall(r"\.fretwear\.(\w+)", of_accessor))
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]", "outputs.loops=[]"])
     plan = build_tasks(study, FACTS.n_displacements)
-    completion = fake_completion(
-        study, plan, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "out.nc.progress"
-    )
-    with contextlib.closing(completion.store):
-        gather.gather(study, FACTS, completion, tmp_path / "dovetail.nc")
+    write_study(study, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)
     for page, code in zip(pages, (short, example), strict=False):
         exec(compile(code, page, "exec"), {})

@@ -1,0 +1,248 @@
+"""Writes the result of a study to one NetCDF file, under a temporary name that is changed at the end.
+
+The records of histories are read from the file of the run and written in slabs: only one slab is in memory, whatever
+the number of points.
+
+By hand: `to_netcdf` of xarray has the whole result in memory, or needs dask.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.outcome import Outcome
+from studyrunner.checkpoint.completion_index import CompletionIndex
+from studyrunner.checkpoint.records import variable_sizes
+from studyrunner.netcdf.attributes import SmallArray, attributes
+from studyrunner.netcdf.provenance import POINTS_LEFT
+from studyrunner.netcdf.scene_group import write_scene_group
+from studyrunner.scene.scene import KeptScene, SceneFacts
+from studyrunner.study.study import Study
+from studyrunner.system.files import find_fault, replacing
+from studyrunner.user_error import StorageError
+from studyrunner.variables import COUNTS, LOOPS, Variable
+
+_BYTES_A_SLAB = 16e6
+_BYTES_OF_CACHE = 2**16
+_KEY_TYPE = "S32"
+
+Region = tuple[slice, ...]
+Slab = tuple[Region, NDArray[np.void]]
+
+
+def write_result(
+    study: Study,
+    facts: SceneFacts,
+    completion: CompletionIndex,
+    path: Path,
+    arrays: Sequence[SmallArray],
+    origin: Mapping[str, object],
+    scene: KeptScene | None = None,
+    *,
+    keep_finished: bool = False,
+) -> Counter[int]:
+    """Writes the result of a study: axes in the order of the study, then cycle or mission, then others.
+
+    Points that are not computed yet have the outcome `not_computed`.
+
+    Parameters
+    ----------
+    study, facts
+        The study, and facts of its scene.
+    completion
+        The finished histories.
+    path
+        The result file, which is replaced as a whole or not at all.
+    arrays
+        Coordinates, and variables that no task computes.
+    origin
+        Attributes of the file.
+    scene
+        Contents of the group of the scene; None for none.
+    keep_finished
+        Whether `path` holds a finished result, which is kept where points of the new result are missing.
+
+    Returns
+    -------
+    Counter[int]
+        Number of points of each outcome.
+
+    Raises
+    ------
+    StorageError
+        Where the file cannot be written, or the file of the run cannot be read.
+    """
+    shape = tuple(len(values) for values in study.dimensions.values())
+    slab = _slab_shape(shape, completion.kind.itemsize)
+    keys, outcomes = _keys(shape, completion), Counter[int]()
+    if keep_finished and not keys.all():
+        for _, records in _slabs(shape, slab, completion, keys):
+            outcomes.update(records["outcome"].tolist())
+        return outcomes
+    try:
+        with replacing(path) as temporary, _writing(temporary) as file:
+            file.setncatts(origin)
+            variables = _create_all(file, study, facts, slab, arrays)
+            for region, records in _slabs(shape, slab, completion, keys):
+                _write_slab(file, region, variables, study.outputs.loops, records)
+                outcomes.update(records["outcome"].tolist())
+            file.setncattr(POINTS_LEFT, np.int32(outcomes[Outcome.NOT_COMPUTED]))
+            for array in arrays:
+                _write_array(file, study, slab, array)
+            if scene is not None:
+                write_scene_group(file, scene)
+    except OSError as error:
+        raise StorageError(path, error) from error
+    return outcomes
+
+
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[netCDF4.Dataset]:
+    """A new NetCDF file. Raises OSError with the reason of the system.
+
+    The library itself reports missing permission or an error of HDF, whatever the reason.
+    """
+    try:
+        with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+            yield file
+    except (OSError, RuntimeError) as error:
+        raise find_fault(path) or OSError(None, f"the NetCDF library cannot write it ({error})") from error
+
+
+def _keys(shape: Sequence[int], completion: CompletionIndex) -> NDArray[np.bytes_]:
+    """Hashes of the histories of points, in the order of the result file; empty for points that are not computed."""
+    keys = np.zeros(math.prod(shape), _KEY_TYPE)
+    for march in itertools.chain.from_iterable(completion.plan.marches):
+        if completion.is_finished(march):
+            for key, scaled in zip(completion.histories(march), march.histories, strict=True):
+                keys[np.ravel_multi_index(np.transpose(scaled.points), shape)] = key.encode()
+    return keys
+
+
+def _create_all(
+    file: netCDF4.Dataset, study: Study, facts: SceneFacts, slab: Sequence[int], arrays: Sequence[SmallArray]
+) -> dict[str, Variable]:
+    """Dimensions and variables of the histories."""
+    sizes = {name: len(values) for name, values in study.dimensions.items()} | variable_sizes(study, facts)
+    asked = {name: entry for name, entry in study.variables.items() if name in study.outputs.variables}
+    variables = {**asked, **(LOOPS if study.outputs.loops else {}), **study.kept}
+    variables |= COUNTS if study.to_the_end else {}
+    for name, size in sizes.items():
+        file.createDimension(name, size)
+    on_contact = sorted(each.name for each in arrays if each.name.startswith("contact_"))
+    drawn = [each for each in arrays if each.name.startswith(("sample_", "worn_depth"))]
+    for name, entry in variables.items():
+        dimensions = (*study.dimensions, *entry.dimensions)
+        if entry.is_text:
+            # of any length, which cannot be compressed
+            file.createVariable(name, str, dimensions).setncatts(attributes(name, entry))
+            continue
+        # a chunk of loops holds a single pair: then pairs without loops take no room
+        own = (1 if name in LOOPS and each == "contact" else sizes[each] for each in entry.dimensions)
+        variable = _create(file, name, entry, dimensions, (*slab, *own))
+        variable.setncatts(attributes(name, entry, study.has_modes))
+        if "contact" in entry.dimensions or drawn:
+            named = [each.name for each in drawn if set(each.dimensions) <= set(dimensions)]
+            variable.setncattr("coordinates", " ".join(on_contact * ("contact" in entry.dimensions) + named))
+    if not any("contact" in entry.dimensions for entry in variables.values()):
+        file.setncattr("coordinates", " ".join(on_contact))
+    return variables
+
+
+def _create(
+    file: netCDF4.Dataset, name: str, entry: Variable, dimensions: Sequence[str], chunks: Sequence[int]
+) -> netCDF4.Variable[Any]:
+    """A compressed variable with its attributes."""
+    fill = math.nan if entry.dtype.startswith("float") else None
+    options: Any = {"compression": "zlib", "complevel": 1, "shuffle": True, "chunksizes": chunks, "fill_value": fill}
+    variable = file.createVariable(name, entry.dtype, dimensions, **options)
+    # a chunk is written once and not looked at again, where the library would keep megabytes of each variable
+    variable.set_var_chunk_cache(size=_BYTES_OF_CACHE, nelems=1)
+    variable.setncatts(attributes(name, entry))
+    return variable
+
+
+def _write_slab(
+    file: netCDF4.Dataset,
+    region: Region,
+    variables: Mapping[str, Variable],
+    loops: Sequence[int],
+    records: NDArray[np.void],
+) -> None:
+    """Writes the records of all points of a region."""
+    lengths = [at.stop - at.start for at in region]
+    for name, entry in variables.items():
+        values = records[name].reshape(*lengths, *records[name].shape[1:])
+        if entry.is_text:
+            values = values.astype(object)
+        if name not in LOOPS:
+            file[name][(*region, *(slice(None) for _ in entry.dimensions))] = values
+            continue
+        for place, pair in enumerate(loops):
+            file[name][(*region, slice(None), pair)] = values[..., place, :, :]
+
+
+def _slab_shape(shape: Sequence[int], bytes_a_point: int) -> tuple[int, ...]:
+    """Points along each axis that are written at once and make a compressed chunk."""
+    left = max(1, int(_BYTES_A_SLAB // bytes_a_point))
+    lengths = []
+    for size in reversed(shape):
+        lengths.append(min(size, left))
+        # Points that are next to each other in the file: an axis that does not fit ends the slab.
+        left = left // size if left >= size else 1
+    return tuple(reversed(lengths))
+
+
+def _regions(shape: Sequence[int], slab: Sequence[int]) -> Iterator[Region]:
+    """Regions of the axes, in the order of the file."""
+    starts = (range(0, size, length) for size, length in zip(shape, slab, strict=True))
+    for corner in itertools.product(*starts):
+        yield tuple(
+            slice(start, min(start + length, size)) for start, length, size in zip(corner, slab, shape, strict=True)
+        )
+
+
+def _slabs(
+    shape: Sequence[int], slab: Sequence[int], completion: CompletionIndex, keys: NDArray[np.bytes_]
+) -> Iterator[Slab]:
+    """Regions of the axes, each with the records of its points. Raises StorageError."""
+    first = 0
+    for region in _regions(shape, slab):
+        last = first + math.prod(at.stop - at.start for at in region)
+        different, places = np.unique(keys[first:last], return_inverse=True)
+        records, there = completion.read_histories([key.decode() for key in different.tolist()])
+        if not (there | (different == b"")).all():
+            raise StorageError(completion.store.path, ValueError("a result is damaged"), "give the command again")
+        records["outcome"][~there] = Outcome.NOT_COMPUTED
+        yield region, records[places]
+        first = last
+
+
+def _write_array(file: netCDF4.Dataset, study: Study, slab: Sequence[int], array: SmallArray) -> None:
+    """Writes a coordinate or another small array; an exact answer, with the axes of the study, in slabs."""
+    values, texts = array.values, array.values.dtype.kind == "U"
+    for dimension, size in zip(array.dimensions, values.shape, strict=True):
+        if dimension not in file.dimensions:
+            file.createDimension(dimension, size)
+    if array.over_axes:
+        shape = tuple(len(axis) for axis in study.dimensions.values())
+        own = values.shape[len(shape) :]
+        variable = _create(file, array.name, array.entry, array.dimensions, (*slab, *own))
+        values = np.broadcast_to(values, (*shape, *own))
+        for region in _regions(shape, slab):
+            variable[region] = values[region]
+        return
+    kind: Any = str if texts else values.dtype
+    variable = file.createVariable(array.name, kind, array.dimensions)
+    variable.setncatts(attributes(array.name, array.entry))
+    variable[:] = values.astype(object) if texts else values

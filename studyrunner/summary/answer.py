@@ -1,0 +1,195 @@
+"""What came out of a study, as data, from its result alone.
+
+`summary(dataset)` is for the command, the page and notebooks; `lines.summary_lines` writes it. Only results are in it:
+a history that was not computed to the end, or is known to a factor of two only, has no number here.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from studyrunner.report.reading.known_volumes import Certainty, advise_ended, certainty_of, describe_ended
+from studyrunner.report.reading.missions import as_history
+from studyrunner.report.reading.points import COMPLETE_WORDS
+from studyrunner.report.reading.result import Result
+from studyrunner.report.reading.sample_statistics import SAMPLE
+from studyrunner.report.reading.units import show_number
+from studyrunner.statistics.ranking import describe_ranking
+from studyrunner.statistics.sentence import describe_volumes
+from studyrunner.summary.doubts import doubts
+from studyrunner.summary.mesh_change import MeshChange, compare_meshes
+from studyrunner.summary.wear import (
+    Life,
+    MostWear,
+    NothingWore,
+    Vibration,
+    most_wear,
+    shortest_life,
+    vibration_of,
+    where_is,
+)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What the samples say, at the point of the other axes where their median is largest.
+
+    where: this point in words. n_points: how many there are. volumes, ranking: range and median of the worn volumes,
+    and which input decides, in words.
+    """
+
+    where: str
+    n_points: int
+    volumes: str
+    ranking: str
+
+
+@dataclass(frozen=True)
+class ModeRange:
+    """Natural frequency, Hz, and damping ratio of a mode: ends of their ranges over the points that were found.
+
+    over: what varies, in words.
+    """
+
+    number: int
+    over: str
+    frequency: tuple[float, float]
+    damping: tuple[float, float]
+    n_found: int
+    n_points: int
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Points that ended in one way but `converged`. sentence, advice: on them. first: of them, in words.
+
+    is_complete: whether they were computed to the end, and are uncertain only.
+    """
+
+    word: str
+    is_complete: bool
+    n_points: int
+    sentence: str
+    advice: str
+    first: str
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What came out.
+
+    n_points, n_complete: points of the study, and those computed to the end. counted: "cycles" or "missions".
+    wear: the point that wears most, or why nothing wore; None where that is not known or not asked for.
+    samples: with [scatter]. vibration: where the joint responds most, or where its resonance went.
+    life: the shortest, where there is a target. mesh: how far meshes are apart, where they can be compared.
+    modes: of nonlinear modes, one each. stuck_frequency: Hz, first natural frequency of the joint that sticks; NaN
+    where there is none, or several. failures: of each way to fail. certainty: how well the answer is known.
+    doubts: sentences on values that are hardly what was meant.
+    """
+
+    n_points: int
+    n_complete: int
+    counted: str
+    failures: tuple[Failure, ...]
+    certainty: Certainty | None
+    wear: MostWear | NothingWore | None = None
+    samples: Samples | None = None
+    vibration: Vibration | None = None
+    life: Life | None = None
+    mesh: MeshChange | None = None
+    modes: tuple[ModeRange, ...] = ()
+    stuck_frequency: float = np.nan
+    doubts: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """The summary as text."""
+        from studyrunner.summary.lines import summary_lines
+
+        return "\n".join(summary_lines(self))
+
+
+def summary(dataset: xr.Dataset) -> Summary:
+    """The summary of a result, as `open_result` gives it; variables are read some points at a time."""
+    history, blocks = as_history(dataset)
+    return summarise(Result(Path(str(dataset.encoding.get("source", "result"))), history, blocks=blocks))
+
+
+def summarise(result: Result) -> Summary:
+    """The summary of a result that is opened for the report."""
+    numbers = result.computed.size, int(result.computed.sum()), result.counted, _failures(result)
+    if result.has_modes:
+        return Summary(*numbers, certainty_of(result), modes=_modes(result))
+    wear = most_wear(result)
+    return Summary(
+        *numbers,
+        certainty_of(result, wore=not isinstance(wear, NothingWore)),
+        wear,
+        _samples(result) if isinstance(wear, MostWear) else None,
+        vibration_of(result, wear),
+        shortest_life(result),
+        compare_meshes(result),
+        stuck_frequency=result.stuck_frequency,
+        doubts=doubts(result),
+    )
+
+
+def _samples(result: Result) -> Samples | None:
+    statistics = result.statistics
+    if statistics is None:
+        return None
+    last = statistics.isel(cycle=-1, missing_dims="ignore")
+    medians = last["worn_volume_quantile"].sel(quantile=0.5).isel(bound=0)
+    place = np.unravel_index(int(np.argmax(medians.values)), medians.shape)
+    point = {str(name): int(index) for name, index in zip(medians.dims, place, strict=True)}
+    where = result.describe(point, [name for name in result.varying if name != SAMPLE])
+    point_of_all = last.isel(point)
+    return Samples(where, int(medians.size), describe_volumes(point_of_all), describe_ranking(point_of_all))
+
+
+def _modes(result: Result) -> tuple[ModeRange, ...]:
+    place, found = result.axes.index("mode"), []
+    ends = ((name, result.dataset[name].values) for name in result.varying if name != "mode")
+    over = ", ".join(
+        f"{name.replace('_', ' ')} {' to '.join(show_number(float(each)) for each in (values[0], values[-1]))}"
+        for name, values in ends
+        if values.dtype.kind in "iuf"
+    )
+    for index, number in enumerate(result.dataset["mode"].values.tolist()):
+        computed = np.asarray(result.computed.take(index, axis=place))
+        frequency, damping = (_ends(result, name, index, computed) for name in ("natural_frequency", "damping_ratio"))
+        found.append(ModeRange(int(number), over, frequency, damping, int(computed.sum()), computed.size))
+    return tuple(found)
+
+
+def _ends(result: Result, name: str, mode: int, computed: NDArray[np.bool_]) -> tuple[float, float]:
+    """Smallest and largest value over the computed points of a mode."""
+    if not result.has(name) or not computed.any():
+        return np.nan, np.nan
+    values = result.read(name).values.take(mode, axis=result.axes.index("mode"))[computed]
+    return float(values.min()), float(values.max())
+
+
+def _failures(result: Result) -> tuple[Failure, ...]:
+    numbers, counts = np.unique(result.dataset["outcome"].values, return_counts=True)
+    found = []
+    for number, n_points in zip(numbers.tolist(), counts.tolist(), strict=True):
+        ending = result.endings[number]
+        if ending.word == "converged":
+            continue
+        is_complete = ending.word in COMPLETE_WORDS
+        lines = describe_ended(result, number)
+        if ending.word == "sensitive" or not lines:
+            # what the message of a sensitive one holds is no result
+            place = np.argwhere(result.dataset["outcome"].values == number)[0]
+            lines = [where_is(result, dict(zip(result.axes, map(int, place), strict=True)))]
+        first = re.split(r"[.:](?:\s|$)", ending.sentence)[0]
+        advice = " ".join(advise_ended(result, number)[:1]).rstrip(".")
+        found.append(Failure(ending.word, is_complete, n_points, first, advice, lines[0]))
+    found.sort(key=lambda each: (each.is_complete, -each.n_points))
+    return tuple(found)

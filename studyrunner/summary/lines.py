@@ -1,0 +1,183 @@
+"""The summary of a result in at most nine lines of plain text: the answer first, then failures, then certainty."""
+
+from __future__ import annotations
+
+import math
+
+from studyrunner.percent import show_percent
+from studyrunner.report.reading.units import scale_for, show_cycles, show_number
+from studyrunner.summary.answer import Failure, ModeRange, Samples, Summary
+from studyrunner.summary.wear import Deepest, Life, MostWear, NothingWore, Number, Vibration
+from studyrunner.system.progress import count
+
+MOST_LINES = 9
+_MOST_FAILURES, _MOST_MODES, _MOST_DOUBTS = 2, 4, 1
+_WIDTH, _LONGEST = 12, 160
+_LEAST = 1e-4  # relative error that is told, of any smaller one
+_PLAIN = str.maketrans({"³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
+_SHARE = 0.5
+"""Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
+
+
+def summary_lines(summary: Summary) -> tuple[str, ...]:
+    """Lines of plain text: label and text of `summary_rows`."""
+    return tuple(f"{label:<{_WIDTH}}{text}".translate(_PLAIN) for label, text in summary_rows(summary))
+
+
+def summary_rows(summary: Summary) -> tuple[tuple[str, str], ...]:
+    """Label and text of each line, in the order in which an engineer asks."""
+    rows: list[tuple[str, str]] = []
+    wear = summary.wear
+    if isinstance(wear, NothingWore):
+        rows.append(("wear", _nothing(wear, summary)))
+    elif summary.samples is not None:
+        rows += _samples(summary.samples, summary)
+    elif isinstance(wear, MostWear):
+        rows.append(("most wear" if wear.n_compared > 1 else "wear", _most(wear, summary)))
+    elif summary.certainty is not None and summary.certainty.of == "worn volume":
+        rows.append(("wear", "no worn volume is known within 50 %"))
+    if isinstance(wear, MostWear):
+        at = f" in the sample that wears most, {wear.where}" if summary.samples is not None else ""
+        rows.append(("deepest", _deepest(wear.deepest, at)))
+        if wear.blocks:
+            rows.append(("blocks", ", ".join(f"{name} {show_percent(share)}" for name, share in wear.blocks)))
+    if summary.vibration is not None:
+        rows.append(_vibration(summary.vibration, summary))
+    rows += [(f"mode {mode.number}", _mode(mode)) for mode in summary.modes[:_MOST_MODES]]
+    if summary.life is not None:
+        rows.append(("life", _life(summary.life, summary)))
+    if summary.mesh is not None:
+        rows.append(("mesh", _mesh(summary)))
+    for each in summary.failures[:_MOST_FAILURES]:
+        rows.append(("uncertain" if each.is_complete else "failed", _failure(each, summary.n_points)))
+    if (left := summary.failures[_MOST_FAILURES:]) and rows:
+        label, text = rows[-1]
+        rows[-1] = label, f"{text}; {count(sum(each.n_points for each in left), 'point')} ended otherwise"
+    rows += [("beware", doubt) for doubt in summary.doubts[:_MOST_DOUBTS]]
+    rows = rows[: MOST_LINES - 1]
+    if summary.certainty is not None:
+        rows.append(("certainty", summary.certainty.sentence))
+    return tuple(rows)
+
+
+def _count(value: float, summary: Summary) -> str:
+    return show_cycles(value, summary.counted)
+
+
+def show_known(number: Number, units: str) -> str:
+    """A number with its error: "1.52 mm3 +- 1.3 %"."""
+    text = scale_for(units, number.value).show(number.value)
+    if math.isnan(number.error):
+        return f"{text} (error not known)"
+    return f"{text} +- {show_percent(max(number.error / number.value, _LEAST))}" if number.value > 0.0 else text
+
+
+def _most(wear: MostWear, summary: Summary) -> str:
+    at = f" at {wear.where}" if wear.where else ""
+    when = "in the final state" if math.isinf(wear.count) else f"after {_count(wear.count, summary)}"
+    text = f"{show_known(wear.volume, 'm3')} {when}{at}"
+    if wear.n_left_out:
+        more = f"{count(wear.n_left_out, 'case')} without a known volume"
+        text += f", the most of {wear.n_compared} cases; {more} may wear more"
+    return text
+
+
+def _samples(samples: Samples, summary: Summary) -> list[tuple[str, str]]:
+    text = samples.volumes
+    if isinstance(summary.wear, MostWear):
+        text += f" after {_count(summary.wear.count, summary)}"
+    if samples.where:
+        text += f", at {samples.where}"
+    if samples.n_points > 1:
+        text += f", the most of {samples.n_points} points"
+    return [("wear", text), *([("input", samples.ranking)] if samples.ranking else [])]
+
+
+def _deepest(deepest: Deepest, where: str) -> str:
+    text = show_known(deepest.depth, "m")
+    if deepest.pair is not None:
+        text += f" at contact pair {deepest.pair}" + (f" of {deepest.surface}" if deepest.surface else "")
+        if all(map(math.isfinite, deepest.position)):
+            text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in deepest.position)}) mm"
+    text += where
+    if deepest.edge_share > max(_SHARE, deepest.edge_area):
+        shown = "all" if deepest.edge_share > 0.995 else show_percent(deepest.edge_share)
+        what = f"the wear of {deepest.surface}" if deepest.surface else "the wear"
+        text += f"; {shown} of {what} is in edge pairs: correct if the contact ends there, otherwise extend it"
+    return text
+
+
+def _nothing(wear: NothingWore, summary: Summary) -> str:
+    why = ""
+    if wear.largest_slip == 0.0:
+        why = ": all pairs stick"
+    elif wear.largest_slip > 0.0:
+        why = f": pairs slip by up to {scale_for('m', wear.largest_slip).show(wear.largest_slip)} without wear"
+    stuck = f" (first resonance {summary.stuck_frequency:.4g} Hz)" if math.isfinite(summary.stuck_frequency) else ""
+    return f"nothing wore{why} at {wear.where}{stuck}"
+
+
+def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
+    first, last = ("not known" if math.isnan(each.value) else show_known(each, "m") for each in vibration.amplitude)
+    start, end = vibration.frequency
+    worn = isinstance(summary.wear, MostWear)
+    at = " in this case" if worn else f" at {vibration.where}" if vibration.where else ""
+    if vibration.followed:
+        known = "" if math.isnan(end.error) else f" +- {end.error:.2g}"
+        moved = f"moved from {start:.6g} to {end.value:.6g}{known} Hz" if worn else f"at {start:.6g} Hz"
+        return vibration.followed, f"{moved}, response of {vibration.of} {f'{first} to {last}' if worn else first}"
+    text = f"{vibration.of}{at}: {first}"
+    text += f" when new, {last} when worn" if worn else ""
+    if math.isfinite(start):
+        peak = scale_for("m", vibration.peak).show(vibration.peak)
+        text += f"; the new joint responds most at {start:.6g} Hz ({peak})"
+    if worn and math.isfinite(summary.stuck_frequency):
+        text += f"; first resonance {summary.stuck_frequency:.4g} Hz when all pairs stick"
+    return "response", text
+
+
+def _life(life: Life, summary: Summary) -> str:
+    units = {"wear_depth": "m", "worn_volume": "m3", "frequency_shift": "Hz"}.get(life.quantity, "1")
+    target = f"{life.quantity.replace('_', ' ')} {scale_for(units, life.target).show(life.target)}"
+    beyond = f"{count(life.n_beyond, 'point')} {'does' if life.n_beyond == 1 else 'do'} not reach it"
+    if math.isnan(life.count.value):
+        unsure = f"the life of {count(life.n_unsure, 'point')} is not known; " if life.n_unsure else ""
+        return f"{unsure}{target} is not reached by {'another' if unsure else 'any'} point computed to the end"
+    known = "error not known"
+    if math.isfinite(life.count.error):
+        known = f"+- {show_percent(life.count.error / life.count.value)}"
+    text = f"{_count(round(life.count.value), summary)} {known} to {target}"
+    text += f", the shortest, at {life.where}" if life.where and summary.n_points > 1 else ""
+    text += f"; that of {count(life.n_unsure, 'point')} is not known" if life.n_unsure else ""
+    return text + (f"; {beyond}" if life.n_beyond else "")
+
+
+def _mode(mode: ModeRange) -> str:
+    if not mode.n_found:
+        return f"found at none of {count(mode.n_points, 'point')}"
+    low, high = (f"{each:.6g}" for each in mode.frequency)
+    least, most = (f"{100.0 * each:.3g}" for each in mode.damping)
+    frequency = low if low == high else f"{low} to {high}"
+    damping = least if least == most else f"{least} to {most}"
+    found = "" if mode.n_found == mode.n_points else f", found at {mode.n_found} of {mode.n_points} points"
+    over = f" over {mode.over}" if mode.over else ""
+    return f"natural frequency {frequency} Hz, damping ratio {damping} %{over}{found}"
+
+
+def _mesh(summary: Summary) -> str:
+    mesh = summary.mesh
+    assert mesh is not None
+    coarse, fine = (show_number(each) for each in mesh.meshes)
+    text = f"worn volumes of meshes {coarse} and {fine} differ by {show_percent(mesh.median)} {mesh.at}"
+    text += f", at most {show_percent(mesh.largest)}" if mesh.largest > mesh.median else ""
+    if mesh.limit is not None:
+        volume, order = mesh.limit
+        text += f"; an infinitely fine one would wear {scale_for('m3', volume).show(volume)} (order {order:.1f})"
+    return text
+
+
+def _failure(failure: Failure, n_points: int) -> str:
+    text = f"{failure.n_points} of {count(n_points, 'point')}: {failure.sentence or failure.word}."
+    text += f" {failure.advice}." if failure.advice else ""
+    first = failure.first if len(failure.first) <= _LONGEST else f"{failure.first[:_LONGEST].rsplit(' ', 1)[0]} ..."
+    return text + (f" First: {first}" if first else "")

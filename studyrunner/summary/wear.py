@@ -1,0 +1,261 @@
+"""Where a joint wears most, how much and how deep; why nothing wore; where its resonance went; how long it lives."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from studyrunner.report.reading.points import WELL_ENOUGH
+from studyrunner.report.reading.result import NO_VOLUME, Result
+from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
+
+_NO_SLIP = 1e-12  # m, round-off: less than the size of an atom
+
+
+@dataclass(frozen=True)
+class Number:
+    """A value and its absolute error, NaN where that was not estimated; SI."""
+
+    value: float
+    error: float = math.nan
+
+
+@dataclass(frozen=True)
+class Deepest:
+    """The deepest pair of a point. depth: m; its error is that of this pair.
+
+    pair: index along `contact`, with surface and position (3,), m, NaN where the file has none; None where the file
+    holds no depths of single pairs. edge_share, edge_area: of the volume and of the area of its surface, what belongs
+    to pairs at the edge of the contact; NaN where not known.
+    """
+
+    depth: Number
+    pair: int | None = None
+    surface: str = ""
+    position: tuple[float, ...] = (math.nan,) * 3
+    edge_share: float = math.nan
+    edge_area: float = math.nan
+
+
+@dataclass(frozen=True)
+class MostWear:
+    """The point with the largest worn volume.
+
+    Of points that differ in numerical settings only, it is the best known one. point: index along each axis. where:
+    the point in words. n_compared: cases that it is the largest of. n_left_out: cases without a worn volume that is
+    known, which may wear more. count: cycles or missions, inf for the final state. volume: m3. blocks: of missions,
+    share of each block.
+    """
+
+    point: dict[str, int]
+    where: str
+    n_compared: int
+    n_left_out: int
+    count: float
+    volume: Number
+    deepest: Deepest
+    blocks: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class NothingWore:
+    """No point that was computed to the end wears.
+
+    largest_slip: m, of any pair, 0 where all stick; NaN where the file does not say. where: these points in words, as
+    "212 Hz" or "all 3 frequencies".
+    """
+
+    largest_slip: float
+    where: str
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """How the joint responds. of: name of the response. where: the point in words.
+
+    followed: "resonance" or "peak", whose frequency goes from `frequency[0]` to `frequency[1]`, Hz, while the joint
+    wears. Else empty: frequency[0] is where the unworn joint responds most among the frequencies, NaN where none lies
+    between two others; frequency[1] is NaN. amplitude: m, of the unworn and of the worn joint at `where`; NaN where it
+    is known to a factor of two only. peak: m, of the unworn joint at frequency[0].
+    """
+
+    of: str
+    where: str
+    followed: str
+    frequency: tuple[float, Number]
+    amplitude: tuple[Number, Number]
+    peak: float = math.nan
+
+
+@dataclass(frozen=True)
+class Life:
+    """The shortest life. quantity, target: of slow_time.until. count: NaN where no point reaches the target.
+
+    n_beyond: points computed to the end that do not reach it. n_unsure: those whose life is known to a factor of two
+    only.
+    """
+
+    quantity: str
+    target: float
+    count: Number
+    where: str
+    n_beyond: int
+    n_unsure: int = 0
+
+
+def where_is(result: Result, point: dict[str, int]) -> str:
+    """A point in words, along the axes that vary; where none does, its frequency."""
+    return result.describe(point, result.varying or ("frequency",))
+
+
+def most_wear(result: Result) -> MostWear | NothingWore | None:
+    """The point that wears most; None where no wear was asked for, or no worn volume is known."""
+    best = result.best_known
+    if not result.wears or not result.has("worn_volume") or not best.any():
+        return None
+    worn = np.where(best, result.worn, -1.0)
+    if worn.max() <= NO_VOLUME:
+        return _nothing(result, best)
+    place = np.unravel_index(int(np.argmax(worn)), worn.shape)
+    point = {name: int(index) for name, index in zip(result.axes, place, strict=True)}
+    volume, at = float(worn[place]), result.last_kept(point)
+    return MostWear(
+        point,
+        where_is(result, point),
+        *_count_cases(result),
+        float(result.counts(point)[at]),
+        Number(volume, volume * float(result.errors[place])),
+        _deepest(result, point, at),
+        _blocks(result, point, volume),
+    )
+
+
+def _count_cases(result: Result) -> tuple[int, int]:
+    """Number of cases with a worn volume that is known, and without: points that differ in more than steps."""
+    best = xr.DataArray(result.best_known, dims=result.axes)
+    known = best.any(result.numerical)
+    return int(known.sum()), int(known.size - known.sum())
+
+
+def _deepest(result: Result, point: dict[str, int], at: int) -> Deepest:
+    if not tells_depth(result):
+        own = result.at("largest_wear_depth", point).values if result.has("largest_wear_depth") else math.nan
+        return Deepest(Number(float(own)))
+    depth = np.nan_to_num(last_depth(result, point), nan=0.0)
+    pair = int(np.argmax(depth))
+    error = math.nan
+    if result.has("wear_depth_error"):
+        error = float(result.at("wear_depth_error", point, at).values[pair])
+    elif result.has("wear_depth_max_error"):
+        error = float(result.at("wear_depth_max_error", point, at).values)
+    names = [str(name) for name in result.dataset.coords if str(name).startswith("contact_")]
+    found = {name: result.at(name, point).values for name in names}
+    surface, area = found.get("contact_surface"), found.get("contact_area")
+    share = of_area = math.nan
+    if surface is not None and area is not None and "contact_edge" in found:
+        own, edge = surface == surface[pair], found["contact_edge"] != 0
+        if edge[own].any() and depth[own].any():
+            share, of_area = (float(each[own & edge].sum() / each[own].sum()) for each in (depth * area, area))
+    return Deepest(
+        Number(float(depth[pair]), error),
+        int(result.dataset["contact"].values[pair]),
+        "" if surface is None else str(surface[pair]),
+        tuple(float(found[f"contact_{axis}"][pair]) if f"contact_{axis}" in found else math.nan for axis in "xyz"),
+        share,
+        of_area,
+    )
+
+
+def _blocks(result: Result, point: dict[str, int], volume: float) -> tuple[tuple[str, float], ...]:
+    if result.blocks is None or "block_worn_volume" not in result.blocks:
+        return ()
+    own = result.blocks["block_worn_volume"].isel(point).isel(cycle=result.last_kept(point))
+    return tuple(zip(own["block"].values.tolist(), (own.values / volume).tolist(), strict=True))
+
+
+def _nothing(result: Result, best: NDArray[np.bool_]) -> NothingWore:
+    slip = math.nan
+    if result.has("slip_range"):
+        largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=(1, 2)))
+        slip = float(largest[best].max())
+    return NothingWore(0.0 if slip < _NO_SLIP else slip, _all_points(result))
+
+
+def _all_points(result: Result) -> str:
+    n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
+    one = result.varying[0] if len(result.varying) == 1 else ""
+    words = {"frequency": "frequencies", "sample": "samples"}.get(one, "points")
+    if n_computed < n_points:
+        return f"{n_computed} of {n_points} {words}, the others have no result"
+    return f"all {n_points} {words}" if n_points > 1 else where_is(result, result.shown_point()) or "the only point"
+
+
+def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibration | None:
+    """How the joint responds at the point that wears most, else at the one that is shown."""
+    point = wear.point if isinstance(wear, MostWear) else result.shown_point()
+    place = tuple(point[name] for name in result.axes)
+    if result.blocks is not None or not result.has("response_amplitude") or not result.computed[place]:
+        return None
+    last = result.last_kept(point)
+    amplitude = result.at("response_amplitude", point, [0, last]).transpose("cycle", "response").values
+    of = int(np.argmax(amplitude[0]))
+    errors = np.full(2, np.nan)
+    if result.has("response_error"):
+        errors = np.asarray(result.at("response_error", point, [0, last]).values, dtype=float)
+    new, worn = (_known(*each) for each in zip(amplitude[:, of].tolist(), errors.tolist(), strict=True))
+    ends = new, worn
+    name, where = result.responses[of], where_is(result, point)
+    if result.followed and result.has("excitation_frequency"):
+        first, end = result.at("excitation_frequency", point, [0, last]).values.tolist()
+        error = math.nan
+        if result.has("excitation_frequency_error"):
+            error = float(result.at("excitation_frequency_error", point, last).values)
+        return Vibration(name, where, result.followed, (first, Number(end, error)), ends)
+    frequency, peak = _peak(result, point, of)
+    return Vibration(name, where, "", (frequency, Number(math.nan)), ends, peak)
+
+
+def _known(value: float, error: float) -> Number:
+    """A number with its relative error; NaN where that says that it is not known."""
+    return Number(math.nan if error > WELL_ENOUGH else value, error * value)
+
+
+def _peak(result: Result, point: dict[str, int], of: int) -> tuple[float, float]:
+    """Frequency, Hz, and amplitude, m, of the largest response of the unworn joint; NaN at the ends of the range."""
+    if result.dataset.sizes.get("frequency", 1) < 3:
+        return math.nan, math.nan
+    others = {name: index for name, index in point.items() if name != "frequency"}
+    row = result.at("response_amplitude", others, 0).isel(response=of)
+    held = result.held[tuple(others.get(name, slice(None)) for name in result.axes)]
+    order = np.argsort(row["frequency"].values)
+    values = np.where(held, row.values, np.nan)[order]
+    top = 0 if np.isnan(values).all() else int(np.nanargmax(values))
+    if not 0 < top < len(values) - 1 or np.isnan(values[top - 1 : top + 2]).any():
+        return math.nan, math.nan
+    return float(row["frequency"].values[order][top]), float(values[top])
+
+
+def shortest_life(result: Result) -> Life | None:
+    """The shortest life of the points of a study with a target; None without a target."""
+    until = result.study.get("slow_time", {}).get("until")
+    if not isinstance(until, dict) or not result.has("cycles_to_target"):
+        return None
+    (quantity, target), *_ = until.items()
+    found = result.computed & ~result.ended("sensitive")
+    lives, errors = (result.read(name).values for name in ("cycles_to_target", "cycles_to_target_error"))
+    beyond = int(np.count_nonzero(found & np.isnan(lives)))
+    unsure = found & (errors > WELL_ENOUGH * lives)
+    lives = np.where(found & ~unsure, lives, np.nan)
+    n_unsure = int(np.count_nonzero(unsure))
+    if np.isnan(lives).all():
+        return Life(str(quantity), float(target), Number(math.nan), "", beyond, n_unsure)
+    place = np.unravel_index(int(np.nanargmin(lives)), lives.shape)
+    error = float(errors[place])
+    point = {name: int(index) for name, index in zip(result.axes, place, strict=True)}
+    return Life(
+        str(quantity), float(target), Number(float(lives[place]), error), where_is(result, point), beyond, n_unsure
+    )
