@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 import pytest
-from studyrunner.summary.plausibility import doubts_of_study
 
 from studyrunner.cli import main
+from studyrunner.plan.plausibility import doubts_of_study
 from studyrunner.study.study_file import bundled_studies, read_study
 from tests.studyrunner.fakes import FACTS
 

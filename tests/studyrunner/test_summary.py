@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from studyrunner.summary.certificates import certificate_rows
 
 from solver.outcome import Outcome
 from studyrunner.advice import Used, advise, advise_error, advise_steps
 from studyrunner.percent import show_percent, show_rtol
+from studyrunner.report.figures.outcome import list_certificates
 from studyrunner.report.reading.known_volumes import settings_of
 from studyrunner.report.reading.missions import as_history
 from studyrunner.report.reading.result import Result
@@ -281,7 +281,8 @@ def test_the_largest_certificates_are_those_of_a_plain_loop():
         return lambda point: values[name].setdefault(point, rng.choice([0.0, np.nan, *rng.random(4)], 21))
 
     made = wearing(*GRID, outcome=lambda p: FAILED if p[0] == 1 else 0, **{name: draw(name) for name in CERTIFICATE})
-    rows = certificate_rows(result_of(made))
+    (table,) = list_certificates(result_of(made))
+    rows = table.rows
     assert [label for label, *_ in rows] == list(CERTIFICATE.values())
     for points, (_, shown, where) in zip(values.values(), rows, strict=True):
         worst = max((np.nanmax(each), point) for point, each in points.items() if point[0] != 1)
