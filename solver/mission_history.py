@@ -1,4 +1,4 @@
-"""The wear of one joint over missions: blocks of vibration in order, flown thousands of times, in Python."""
+"""The wear of one joint over missions: blocks of vibration in order, repeated thousands of times, in Python."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def integrate_mission(
     sweep: Direction = "up",
     largest_step: int | None = None,
 ) -> MissionHistory:
-    """Mission history of a joint from its unworn state on: blocks of vibration in order, flown many times.
+    """Mission history of a joint from its unworn state on: blocks of vibration in order, repeated many times.
 
     Depths are carried from block to block. Thousands of missions are integrated in steps of many missions at once
     (`solver.missions.step`). A failure is no exception: `outcome` and `message` of the history give the reason.
@@ -38,11 +38,11 @@ def integrate_mission(
     Parameters
     ----------
     blocks
-        Blocks in the order in which they are flown; of `solver.Block`.
+        Blocks in the order; of `solver.Block`.
     wear_coefficient
         k_w of Eq. (2), 1/Pa; with the law "energy" the energy wear coefficient.
     missions
-        Ascending whole numbers of flown missions at which the history is reported, or the last number alone. A missing
+        Ascending whole numbers of missions at which the history is reported, or the last number alone. A missing
         0 is added.
     settings
         The defaults of `SolverSettings` if not given.
@@ -53,7 +53,7 @@ def integrate_mission(
     sweep
         Way to the state of the first mission, where its first block continues the last one of the mission before.
     largest_step
-        Most missions that are flown at once; 1: every mission by itself. By default the error decides.
+        Most missions that are computed at once; 1: every mission by itself. By default the error decides.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Missions: blocks of vibration in order, flown thousands of times, and the wear of a joint over them."""
+"""Missions: blocks of vibration in order, repeated thousands of times, and the wear of a joint over them."""

@@ -33,7 +33,7 @@ from solver.wear.wearing_joint import WearingJoint
 @packable
 @dataclass(frozen=True)
 class BlockRun:
-    """A block that was flown once. Rows of the responses: begin and end.
+    """A block that was computed once. Rows of the responses: begin and end.
 
     failure: reason of the end; the outcome CONVERGED for a regular end.
     growth (n_contact,): depth worn in the block, m.
@@ -72,13 +72,13 @@ class BlockRun:
 
     @property
     def completed(self) -> bool:
-        """Whether the block was flown to its end."""
+        """Whether the block was computed to its end."""
         return self.failure.outcome is Outcome.CONVERGED
 
 
 @dataclass(frozen=True)
 class BlockCase:
-    """What a block is flown with.
+    """What a block is computed with.
 
     mission, place: the mission, and the place of the block in it.
     depth (n_contact,): m, worn before the block.
@@ -120,14 +120,14 @@ class BlockCase:
 
 
 def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
-    """Fly a block, or its reference solution.
+    """Compute a block, or its reference solution.
 
     A failure is a value. With `like`, of the same block in the history, the reference solution is integrated.
     """
     began, block = computing_time(), case.block
     start, begun = _start(case)
     if start.state is None:
-        return not_flown(case, Failure(start.outcome, start.message), start.newton_iterations)
+        return not_computed(case, Failure(start.outcome, start.message), start.newton_iterations)
     left = replace(case.settings, time_limit=case.settings.time_limit - (computing_time() - began))
     model, counts = worn(block.model, case.depth), np.array([0.0, block.steady[1]])
     asked = SlowTime(
@@ -146,14 +146,14 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
         ended = solutions.follow(like, counts)
         output = solutions.output_of_reference(ended)
     if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
-        return not_flown(case, ended.failure, start.newton_iterations + ended.iterations)
-    flown = _read(case, ended, output.read(counts), start)
+        return not_computed(case, ended.failure, start.newton_iterations + ended.iterations)
+    computed = _read(case, ended, output.read(counts), start)
     if case.with_slope:
         work = WearingJoint.of(of_block, start.state, asked.wear_coefficient, asked.law)
-        flown = replace(flown, slope=_slope(work, ended, case, flown.growth))
-    flown = replace(flown, begun=begun)
+        computed = replace(computed, slope=_slope(work, ended, case, computed.growth))
+    computed = replace(computed, begun=begun)
     # as read from a file: an interrupted mission goes on with equal bits
-    return in_rows(flown)
+    return in_rows(computed)
 
 
 def _start(case: BlockCase) -> tuple[StartState, StartState | None]:
@@ -180,7 +180,7 @@ def _slope(work: WearingJoint, ended: Ended, case: BlockCase, growth: FloatArray
 
 
 def _read(case: BlockCase, ended: Ended, values: dict[str, Any], start: StartState) -> BlockRun:
-    """The result of a block that was flown to its end."""
+    """The result of a block that was computed to its end."""
     state, course, end = ended.state, ended.output.course, case.block.steady[1]
     assert state is not None
     growth = values["wear_depth"][-1]
@@ -229,8 +229,8 @@ def _last(case: BlockCase, ended: Ended, start: StartState) -> StartState:
     )
 
 
-def not_flown(case: BlockCase, failure: Failure, iterations: int) -> BlockRun:
-    """A block that was not flown to its end."""
+def not_computed(case: BlockCase, failure: Failure, iterations: int) -> BlockRun:
+    """A block that was not computed to its end."""
     nothing = np.full((2, len(case.block.model.response_names)), np.nan)
     unknown = np.full_like(case.depth, np.nan)
     return BlockRun(failure, unknown, None, nothing.astype(complex), nothing, iterations=iterations)

@@ -1,4 +1,4 @@
-"""What a mission is: blocks of vibration in order, and how often they are flown."""
+"""What a mission is: blocks of vibration in order, and how often they are repeated."""
 
 from __future__ import annotations
 
@@ -82,16 +82,16 @@ class Block:
 
 @dataclass(frozen=True)
 class Mission:
-    """Blocks in order, flown a number of times.
+    """Blocks in order, repeated a number of times.
 
     - blocks: in their order, at least one.
     - wear_coefficient: k_w, 1/Pa.
-    - missions (n_output,): ascending numbers of flown missions at which the history is reported, whole, the first 0.
+    - missions (n_output,): ascending numbers of missions at which the history is reported, whole, the first 0.
     - settings: numerical settings.
     - law: the wear law.
     - until: target at which the history ends; "frequency_shift" is no target of missions.
     - first: how the first mission begins where its first block continues.
-    - largest_step: most missions flown in one step; 1 for every mission by itself.
+    - largest_step: most missions computed in one step; 1 for every mission by itself.
     """
 
     blocks: tuple[Block, ...]

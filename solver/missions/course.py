@@ -23,9 +23,9 @@ RESPONSES = ("response_begin", "response_end", "response_peak_begin", "response_
 @packable
 @dataclass(frozen=True)
 class MissionNode:
-    """The end of a step over missions, of which the last mission was flown.
+    """The end of a step over missions, of which the last mission was computed.
 
-    mission: missions flown so far.
+    mission: missions computed so far.
     growth (n_block, n_contact): depth worn by each block so far, m.
     rate (n_block, n_contact): depth worn by each block in the last mission, m; in the first node in the first mission.
     local (n_contact,): sum of the local errors of the steps and of the errors of the blocks so far, m.
@@ -80,7 +80,7 @@ class MissionCourse:
         return cls((MissionNode(0, nothing, nothing, nothing[0]),), None, np.zeros(n_block), np.zeros(n_block))
 
     def longer(self, node: MissionNode, runs: tuple[BlockRun, ...]) -> MissionCourse:
-        """The course with another step; runs: blocks that were flown for it, in the order of the mission."""
+        """The course with another step; runs: blocks that were computed for it, in the order of the mission."""
         before, n_block = self.nodes[-1], len(self.inaccurate)
         kept = MissionNode(0, before.growth, node.rate, before.local) if before.mission == 0 else before
         found = {
@@ -116,18 +116,18 @@ class MissionCourse:
     def values_at(self, missions: FloatArray) -> dict[str, NDArray[Any]]:
         """Values of the nodes (n, n_block, ...) in the missions that end at some numbers, by name.
 
-        They are linear in the worn volume between the missions that were flown, as the vibration depends on the wear.
+        They are linear in the worn volume between the computed missions, as the vibration depends on the wear.
         At the number 0 those of the first mission; NaN beyond the last step. Empty before the first mission.
         """
-        flown, read = self.nodes[1:], dict[str, NDArray[Any]]()
-        if not flown:
+        computed, read = self.nodes[1:], dict[str, NDArray[Any]]()
+        if not computed:
             return read
-        worn, depths = np.array([node.depth.sum() for node in flown]), self.growth_at(missions).sum(axis=(1, 2))
+        worn, depths = np.array([node.depth.sum() for node in computed]), self.growth_at(missions).sum(axis=(1, 2))
         place = np.clip(np.searchsorted(self.ends[1:], missions, "left") - 1, 0, None)
-        beyond, reached = np.minimum(place + 1, len(flown) - 1), missions <= self.ends[-1]
+        beyond, reached = np.minimum(place + 1, len(computed) - 1), missions <= self.ends[-1]
         width, ahead = worn[beyond] - worn[place], np.nan_to_num(depths - worn[place])
         share = np.clip(np.divide(ahead, width, out=np.zeros_like(width), where=width > 0.0), 0.0, 1.0)
-        nodes = [{"rate": node.rate, "local": node.local, **(node.values or {})} for node in flown]
+        nodes = [{"rate": node.rate, "local": node.local, **(node.values or {})} for node in computed]
         for name in nodes[0]:
             values = np.array([node[name] for node in nodes])
             first, weights = values[place], share.reshape(-1, *[1] * (values.ndim - 1))

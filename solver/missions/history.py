@@ -128,7 +128,7 @@ def _read(
 
 
 def _values(mission: Mission, course: MissionCourse, counts: FloatArray) -> dict[str, NDArray[Any]]:
-    """Values of a course at the counts; NaN where no mission was flown."""
+    """Values of a course at the counts; NaN where no mission was computed."""
     responses = len(mission.blocks), len(mission.blocks[0].model.response_names)
     shapes = dict.fromkeys(RESPONSES, responses) | {"rate": course.nodes[0].growth.shape, "local": (mission.area.size,)}
     shapes |= dict.fromkeys(("response_error", "growth_error"), (len(mission.blocks),))

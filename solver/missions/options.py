@@ -14,7 +14,7 @@ class MissionOptions:
     rtol. Missions of a slider: estimated over true error at least 1.7. With 0.25 two cases of the tests compute 21.5
     and 33 of 2000 missions, with 0.5 fewer than 20 and 30."""
     step_iterations: int = 6
-    """Most missions flown for a step, whose depth is found by Newton's method. Sliders and roots need 1 to 3."""
+    """Most missions computed for a step, whose depth is found by Newton's method. Sliders and roots need 1 to 3."""
     depth_tolerance: float = 0.1
     """Last correction of this depth, as worn volume, over the allowed error of the step."""
 

@@ -34,7 +34,7 @@ from solver.clock import computing_time
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.start_states import follow_line
-from solver.missions.block_run import BlockCase, BlockRun, not_flown
+from solver.missions.block_run import BlockCase, BlockRun, not_computed
 from solver.missions.blocks import Passage, worn
 from solver.missions.delay import Delay, delay_of
 from solver.missions.options import MISSIONS
@@ -88,12 +88,12 @@ class Swept:
 
 
 def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
-    """Fly a passage, or its reference solution, as `block_run.run_block`."""
+    """Compute a passage, or its reference solution, as `block_run.run_block`."""
     passage = case.block.frequency
     assert isinstance(passage, Passage)
     first = _swept(case, passage, like)
     if isinstance(first, Failure):
-        return not_flown(case, first, 0)
+        return not_computed(case, first, 0)
     order = 1 if passage.stop > passage.start else -1
     states = first.states[::order]
     area, volume = case.mission.area, float(first.wear @ case.mission.area)

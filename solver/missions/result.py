@@ -10,9 +10,9 @@ from solver.outcome import Outcome
 
 @dataclass(frozen=True)
 class MissionHistory:
-    """A joint over its missions, at `n_output` numbers of flown missions. Values not reached are NaN.
+    """A joint over its missions, at `n_output` numbers of missions. Values not reached are NaN.
 
-    - missions (n_output,): numbers of flown missions.
+    - missions (n_output,): numbers of missions.
     - worn_volume (n_output,): m3.
     - worn_volume_error (n_output,): estimated relative error by the steps over missions, the integration of each block
       and their propagation, harmonics, samples and start states; 0 where nothing has worn.
@@ -29,7 +29,7 @@ class MissionHistory:
       nothing wears and for other blocks. A passage far below 1 wears as its steady states (`solver.missions.delay`).
     - error_estimate: `worn_volume_error` at the last number that was reached.
     - last_mission: number of missions up to which the history was computed.
-    - steps (n_step,): missions flown in each step.
+    - steps (n_step,): missions computed in each step.
     - missions_to_target: number of missions at which the target was reached, NaN if never or without a target.
     - missions_to_target_error: its estimated error, missions; NaN if it was never reached.
     - newton_iterations: of history and reference solution.

@@ -12,12 +12,12 @@ import numpy as np
 from solver.accuracy.reference import RTOL_RATIO
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure
-from solver.missions.block_run import BlockCase, BlockRun, not_flown, run_block
+from solver.missions.block_run import BlockCase, BlockRun, not_computed, run_block
 from solver.missions.blocks import Mission, Passage
 from solver.missions.course import MissionCourse, MissionNode, growth_within
 from solver.missions.options import MISSIONS
 from solver.missions.passage import run_passage
-from solver.missions.step import Fly, Step, take_step
+from solver.missions.step import RunBlock, Step, take_step
 from solver.model import FloatArray
 from solver.options import COMMON
 from solver.outcome import Outcome
@@ -36,7 +36,7 @@ class MissionProgress:
     course: the present integration so far.
     length: missions of its next step.
     fine: the finished history, while its reference solution is integrated; else None.
-    runs: blocks flown since the last step, in order.
+    runs: blocks computed since the last step, in order.
     spent: CPU seconds so far.
     """
 
@@ -93,14 +93,14 @@ class MissionSolutions:
     def _integrate(self, rtol: float, last: int, fine: MissionCourse | None) -> MissionCourse:
         """Take steps up to a number of missions."""
         while (course := self.progress.course).failure is None:
-            flown = course.nodes[-1].mission
-            if flown >= last or (fine is None and self.missions_to_target(course) <= flown):
+            computed = course.nodes[-1].mission
+            if computed >= last or (fine is None and self.missions_to_target(course) <= computed):
                 self.progress = replace(self.progress, course=replace(course, failure=Failure(Outcome.CONVERGED)))
                 break
-            longest = min(last - flown, self.mission.largest_step or last, last if len(course.nodes) > 2 else 1)
+            longest = min(last - computed, self.mission.largest_step or last, last if len(course.nodes) > 2 else 1)
             length = min(self.progress.length, longest)
             allowed = partial(allowed_error, MISSIONS.step_error_fraction * rtol)
-            step = take_step(self.mission, course.nodes, length, self._fly(fine, flown + length), allowed)
+            step = take_step(self.mission, course.nodes, length, self._run_block(fine, computed + length), allowed)
             self.progress = self._after(step, length, allowed)
         return self.progress.course
 
@@ -142,10 +142,10 @@ class MissionSolutions:
             return float(depth.max(initial=0.0))
         return float(depth @ self.mission.area)
 
-    def _fly(self, fine: MissionCourse | None, mission: int) -> Fly:
-        """Function that flies a block, from the progress where it was flown before an interruption.
+    def _run_block(self, fine: MissionCourse | None, mission: int) -> RunBlock:
+        """Function that computes a block, from the progress where it was computed before an interruption.
 
-        fine: the history, for a block of the reference solution; mission: number of the mission that is flown.
+        fine: the history, for a block of the reference solution; mission: number of the mission that is computed.
         """
         known = iter(self.progress.runs)
         node = self.progress.course.nodes[-1]
@@ -163,8 +163,8 @@ class MissionSolutions:
             begun = node.begun[place] if node.begun else None
             case = BlockCase(self.mission, place, depth, carried, with_slope, left, frequencies, begun, every)
             through = run_passage if isinstance(case.block.frequency, Passage) else run_block
-            flown = guarded(lambda: through(case, likes[place] if likes else None))
-            found = not_flown(case, flown, 0) if isinstance(flown, Failure) else flown
+            computed = guarded(lambda: through(case, likes[place] if likes else None))
+            found = not_computed(case, computed, 0) if isinstance(computed, Failure) else computed
             if found.failure.outcome is not Outcome.TIME_LIMIT:
                 # with more time it goes on from the block before
                 self.progress = replace(self.progress, runs=(*self.progress.runs, found), spent=self.spent)

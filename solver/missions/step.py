@@ -1,8 +1,8 @@
 """One step over many missions: the missions between are left out, and the wear of one mission is the rate.
 
 A mission takes the depth W before it to W + R(W) after it; R is the wear of its blocks, one after the other. Over many
-missions the depth is a smooth sequence W(n). A step from n to n + H flies only the last of its missions, which begins
-at the depth Z. The parabola through the depths at n - a, n (the two nodes before) and n + H has this mission for its
+missions the depth is a smooth sequence W(n). A step from n to n + H computes only its last mission, which begins at
+the depth Z. The parabola through the depths at n - a, n (the two nodes before) and n + H has this mission for its
 last one, p(n + H) - p(n + H - 1) = R(Z) with Z = p(n + H - 1), so that
 
     Z = W(n) + (H - 1) H / (2H - 1 + a) (W(n) - W(n - a)) / a + (H - 1) (H - 1 + a) / (2H - 1 + a) R(Z),
@@ -35,8 +35,8 @@ from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.results.history import StartState
 
-Fly = Callable[[int, FloatArray, StartState | None, bool], BlockRun]
-"""Flies a block: place, depth before (n_contact,), m, state that it continues, whether the slope is asked for."""
+RunBlock = Callable[[int, FloatArray, StartState | None, bool], BlockRun]
+"""Computes a block: place, depth before (n_contact,), m, state that it continues, whether the slope is asked for."""
 
 Allowed = Callable[[float, float, int, int], float]
 """Allowed error of a step, m3: worn volumes at its start and end, m3, number of missions at its start, its length."""
@@ -44,10 +44,10 @@ Allowed = Callable[[float, float, int, int], float]
 
 @dataclass(frozen=True)
 class Step:
-    """A step that was flown.
+    """A step that was computed.
 
     node: its end.
-    runs: of all blocks, in order, once for each mission that was flown.
+    runs: of all blocks, in order, once for each mission that was computed.
     error: estimated local error, as worn volume, m3.
     """
 
@@ -56,15 +56,21 @@ class Step:
     error: float
 
 
-def fly(
-    mission: Mission, flown: int, depth: FloatArray, carried: StartState | None, run: Fly, *, with_slopes: bool = False
+def run_mission(
+    mission: Mission,
+    computed: int,
+    depth: FloatArray,
+    carried: StartState | None,
+    run: RunBlock,
+    *,
+    with_slopes: bool = False,
 ) -> tuple[BlockRun, ...] | Failure:
-    """Fly the blocks of one mission. flown: missions before, for messages; depth (n_contact,), m: before."""
+    """Compute the blocks of one mission. computed: missions before, for messages; depth (n_contact,), m: before."""
     runs: list[BlockRun] = []
     for place in range(len(mission.blocks)):
         found = run(place, depth, carried, with_slopes)
         if not found.completed:
-            said = f"in mission {flown + 1}, {mission.called(place)}"
+            said = f"in mission {computed + 1}, {mission.called(place)}"
             return Failure(found.failure.outcome, ": ".join(filter(None, (said, found.failure.message))))
         runs.append(found)
         depth, carried = depth + found.growth, found.last
@@ -72,7 +78,7 @@ def fly(
 
 
 def take_step(
-    mission: Mission, nodes: tuple[MissionNode, ...], length: int, run: Fly, allowed: Allowed
+    mission: Mission, nodes: tuple[MissionNode, ...], length: int, run: RunBlock, allowed: Allowed
 ) -> Step | Failure:
     """A step over missions; over more than one from the third mission on.
 
@@ -85,13 +91,13 @@ def take_step(
     length
         H, missions.
     run
-        Flies a block.
+        Computes a block.
     allowed
         Allowed error of a step.
     """
     now = nodes[-1]
     if length == 1:
-        runs = fly(mission, now.mission, now.depth, now.carried, run)
+        runs = run_mission(mission, now.mission, now.depth, now.carried, run)
         return (
             runs
             if isinstance(runs, Failure)
@@ -149,17 +155,17 @@ class _Formula:
 
 
 def _solve(
-    mission: Mission, now: MissionNode, formula: _Formula, run: Fly, allowed: Allowed
+    mission: Mission, now: MissionNode, formula: _Formula, run: RunBlock, allowed: Allowed
 ) -> tuple[FloatArray, tuple[BlockRun, ...], FloatArray] | Failure:
-    """The depth Z (n_contact,), m, all blocks that were flown, and its last correction (n_contact,), m."""
+    """The depth Z (n_contact,), m, all blocks that were computed, and its last correction (n_contact,), m."""
     base, factor, depth = formula.base.sum(axis=0), formula.factor, formula.first
-    flown, slope, last = list[BlockRun](), np.zeros((base.size, base.size)), None
+    computed, slope, last = list[BlockRun](), np.zeros((base.size, base.size)), None
     start, missions = float(now.depth @ mission.area), now.mission + formula.length - 1
     for iteration in range(MISSIONS.step_iterations):
-        runs = fly(mission, missions, depth, now.carried, run, with_slopes=iteration == 0)
+        runs = run_mission(mission, missions, depth, now.carried, run, with_slopes=iteration == 0)
         if isinstance(runs, Failure):
             return runs
-        flown.extend(runs)
+        computed.extend(runs)
         rate = np.sum([each.growth for each in runs], axis=0)
         if last is None:
             slope = mission_slope(runs)
@@ -177,7 +183,7 @@ def _solve(
         left = np.abs(depth - last[0])
         end = float((depth + (depth - base) / factor) @ mission.area)
         if left @ mission.area <= MISSIONS.depth_tolerance * allowed(start, end, now.mission, formula.length):
-            return depth, tuple(flown), left
+            return depth, tuple(computed), left
     said = f"the depth before mission {missions + 1}, {formula.length} missions at once, was not found"
     return Failure(Outcome.MARCH_FAILED, said)
 

@@ -113,8 +113,8 @@ def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution)
     point = work.run.move(old, joint, state.point)
     if point is None:
         return None
-    tuned = work.tuned(replace(state, point=point, resolution=resolution, change=None))
-    return None if isinstance(tuned, Failure) else tuned
+    state_there = work.at_followed(replace(state, point=point, resolution=resolution, change=None))
+    return None if isinstance(state_there, Failure) else state_there
 
 
 def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
@@ -156,7 +156,7 @@ def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
     resolution = refined.case.resolution
     choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
     change = state.change if resolution == state.resolution else None
-    return work.tuned(replace(state, point=refined.point, resolution=resolution, choice=choice, change=change))
+    return work.at_followed(replace(state, point=refined.point, resolution=resolution, choice=choice, change=change))
 
 
 def _note_accuracy(state: WearState) -> WearState:

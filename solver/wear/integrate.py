@@ -17,7 +17,7 @@ from solver.packing import in_rows, packable
 from solver.wear.check import Checked
 from solver.wear.control import Control
 from solver.wear.followed import lost_resonance, out_of_range
-from solver.wear.jump import land
+from solver.wear.jump import jump
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput
 from solver.wear.state import WearState
@@ -81,8 +81,8 @@ class Integration:
 
     def begin(self, work: WearingJoint, state: WearState) -> Progress | Failure:
         """Check and store the first state."""
-        tuned = work.tuned(state)
-        checked = tuned if isinstance(tuned, Failure) else self.check(work, tuned)
+        state_there = work.at_followed(state)
+        checked = state_there if isinstance(state_there, Failure) else self.check(work, state_there)
         if isinstance(checked, Failure):
             return checked
         self.output.add(state.cycle, checked.report, work.rate(checked.state.point.evaluation), 0.0)
@@ -112,19 +112,20 @@ class Integration:
         if isinstance(step, Failure):
             return step
         if step.arrived:
-            return self._kept(work, step.state, step.volume_error(work.area))
+            return self._stored(work, step.state, step.volume_error(work.area))
         if step.state.cycle > state.cycle:
             # the last state before the end of the branch counts, too
-            reached = self._kept(work, step.state, step.volume_error(work.area))
+            reached = self._stored(work, step.state, step.volume_error(work.area))
             if isinstance(reached, Failure):
                 return reached
             step = replace(step, state=reached)
-        landed = land(work, step, bounded=self.bounded)
-        if work.follow is not None:
-            landed = lost_resonance(work.follow, step.state) if isinstance(landed, Failure) else work.tuned(landed)
-        return landed if isinstance(landed, Failure) else self._kept(work, landed, 0.0)
+        behind = jump(work, step, bounded=self.bounded)
+        if isinstance(behind, Failure):
+            return behind if work.follow is None else lost_resonance(work.follow, step.state)
+        behind = work.at_followed(behind)
+        return behind if isinstance(behind, Failure) else self._stored(work, behind, 0.0)
 
-    def _kept(self, work: WearingJoint, state: WearState, error: float) -> WearState | Failure:
+    def _stored(self, work: WearingJoint, state: WearState, error: float) -> WearState | Failure:
         """Check a state and store it in the output."""
         if (left := out_of_range(work.follow, state)) is not None:
             return left

@@ -41,7 +41,7 @@ from solver.wear.step_limit import too_long
 from solver.wear.wearing_joint import WearingJoint, is_stable_when_held
 
 
-def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failure:
+def jump(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failure:
     """A stable state a little beyond the end of the branch that a step has reached.
 
     bounded: whether a jump that moves many times the normal forces is refused.
@@ -53,11 +53,11 @@ def land(work: WearingJoint, step: Step, *, bounded: bool) -> WearState | Failur
     if bounded and (said := too_long(joint, at, worn, state.cycle, beyond)) is not None:
         return Failure(Outcome.STEP_TOO_LONG, said)
     work.run.budget.limit = work.run.budget.iterations + CONTINUATION.search_iterations
-    landed = _held(work, state, worn) or _on_another_branch(work, state, worn)
+    reached = _held(work, state, worn) or _on_another_branch(work, state, worn)
     work.run.budget.limit = float("inf")
-    if isinstance(landed, Failure):
-        return landed
-    return replace(landed, cycle=state.cycle + beyond, change=None, previous=None)
+    if isinstance(reached, Failure):
+        return reached
+    return replace(reached, cycle=state.cycle + beyond, change=None, previous=None)
 
 
 def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
@@ -67,14 +67,14 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
         if isinstance(found, Outcome):
             return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
         # a search along the frequency keeps the old depth: the state has to exist at the depths `worn`, too
-        landed = _at_depth(work, joint, found, worn)
-        if landed is None:
+        reached = _at_depth(work, joint, found, worn)
+        if reached is None:
             continue
-        if vibration_change(state.point.evaluation, landed.evaluation) <= STABILITY.other_branch:
+        if vibration_change(state.point.evaluation, reached.evaluation) <= STABILITY.other_branch:
             # a small fold of the branch at a corner is no jump, and there may be many corners
-            return replace(state, point=landed)
+            return replace(state, point=reached)
         first = state.cycle if np.isnan(state.jump_cycle) else state.jump_cycle
-        return replace(state, point=landed, jump_cycle=first)
+        return replace(state, point=reached, jump_cycle=first)
     return Failure(Outcome.MARCH_FAILED)
 
 

@@ -180,7 +180,7 @@ class WearingJoint:
         point = self.run.state(balance, start, most=CONTINUATION.near_iterations)
         return None if point is None else Reached(point, state.omega, state.lag, state.half_width)
 
-    def tuned(self, state: WearState) -> WearState | Failure:
+    def at_followed(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depths and its tangential history."""
         if self.follow is None:
             return state

@@ -1,4 +1,4 @@
-"""Missions: blocks in order, flown many times, against wear histories, exact volumes and missions one by one."""
+"""Missions: blocks in order, computed many times, against wear histories, exact volumes and missions one by one."""
 
 import re
 from dataclasses import fields, replace
@@ -54,9 +54,9 @@ def integrate(blocks, missions, **more):
 # --- one block ---
 
 
-@pytest.mark.parametrize("flown", [(1, 4e4), (4, 1e4)], ids=["one mission", "continued"])
-def test_one_block_is_a_wear_history_to_the_last_bit(flown):
-    missions, cycles = flown
+@pytest.mark.parametrize("computed", [(1, 4e4), (4, 1e4)], ids=["one mission", "continued"])
+def test_one_block_is_a_wear_history_to_the_last_bit(computed):
+    missions, cycles = computed
     counts = cycles * np.arange(missions + 1.0)
     one = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, counts, settings=SETTINGS)
     begin: Begin = "up" if missions == 1 else "continue"
@@ -244,14 +244,14 @@ def exact_run(case, like=None):
 @pytest.fixture
 def exact_blocks(monkeypatch):
     """Blocks of exactly known wear; the list has an entry for each run."""
-    flown: list[int] = []
+    computed: list[int] = []
 
     def run(case, like=None):
-        flown.append(1)
+        computed.append(1)
         return exact_run(case, like)
 
     monkeypatch.setattr(solutions, "run_block", run)
-    return flown
+    return computed
 
 
 def exactly_known(missions, cycles=1.0, order=1, **more):
@@ -276,8 +276,8 @@ def test_two_thousand_missions_agree_with_missions_one_by_one(exact_blocks, cycl
     of_blocks = many.block_volume_error * many.block_volume + once.block_volume_error * once.block_volume
     assert (np.abs(many.block_volume - once.block_volume) <= of_blocks).all()
     # each mission is two blocks and their reference solution
-    flown = (len(exact_blocks) - flown_once) / 4
-    assert flown < limit
+    computed = (len(exact_blocks) - flown_once) / 4
+    assert computed < limit
     assert flown_once == 2000 * 4
     assert many.missions[-1] == many.steps.sum() == many.last_mission == 2000
 

@@ -45,10 +45,10 @@ _DEPTH = 1e-3
 
 
 class FakedBlocks:
-    """Stands for `run_block` and `run_passage`. flown: cases so far. disturb: called with the number of each."""
+    """Stands for `run_block` and `run_passage`. computed: cases so far. disturb: called with the number of each."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.flown: list[Any] = []
+        self.computed: list[Any] = []
         self.fails: dict[str, Outcome] = {}
         self.disturb: Any = lambda _: None
         for name in ("run_block", "run_passage"):
@@ -56,8 +56,8 @@ class FakedBlocks:
 
     def run(self, case: Any, like: Any = None) -> BlockRun:
         """Wear with the rate k_w P A (1 - W / _DEPTH); the reference solution wears by 0.1 % more."""
-        self.disturb(len(self.flown))
-        self.flown.append(case)
+        self.disturb(len(self.computed))
+        self.computed.append(case)
         block, contact = case.block, case.block.model.contact
         cycles = block.frequency.cycles if isinstance(block.frequency, Passage) else block.cycles
         rate = case.mission.wear_coefficient * block.excitation_amplitude * load_of(block) * block.ends[1] * 1e-5
