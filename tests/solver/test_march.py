@@ -19,10 +19,10 @@ class Line:
         self.tried.append(length)
         return here + length if length <= self.found_to else None
 
-    def judge(self, here, end, length):
+    def judge(self, _, __, length):
         return (length / self.allowed) ** self.order
 
-    def rescue(self, here, length):
+    def rescue(self, _, length):
         return Failure(Outcome.BRANCH_LOST, f"{length:g}")
 
 
