@@ -198,7 +198,7 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver, monkeypatch):
 @pytest.mark.slow
 def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
     """With the solver itself: to the numbers of a march that had the time at once."""
-    from solver.newton import solve_balance as newton
+    from solver.newton import run as newton
     from studyrunner import evaluate
 
     study = [
