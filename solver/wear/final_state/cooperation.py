@@ -35,7 +35,6 @@ from solver.wear.state import WearState
 from solver.wear.step import held_wear
 from solver.wear.wearing_joint import WearingJoint
 
-
 _RTOL = 1e-6
 """Relative residual of the steps of a derivative: with that of a Newton direction single entries are 0.6 % off."""
 
