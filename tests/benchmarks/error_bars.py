@@ -26,7 +26,7 @@ from itertools import product
 
 import numpy as np
 
-from solver.loading_history import sweep
+from solver.loading_history import path
 from solver.loading_history.start_states import follow_branch
 from solver.model import FloatArray, ReducedModel
 from solver.results.history import StartState, WearHistory
@@ -109,13 +109,13 @@ def dovetail_starts(
     model: ReducedModel, frequencies: tuple[float, ...], settings: SolverSettings, change: float | None = None
 ) -> list[StartState]:
     """Start states. change: of the vibration in a step of the sweep; None for the one that follows rtol."""
-    before = sweep.LOADING
+    before = path.LOADING
     if change is not None:
-        sweep.LOADING = replace(before, change_limits=(change, change))
+        path.LOADING = replace(before, change_limits=(change, change))
     try:
         found = dict(follow_branch(model, 0.5, 0.5, np.array(frequencies), "up", settings))
     finally:
-        sweep.LOADING = before
+        path.LOADING = before
     return [found[place] for place in range(len(frequencies))]
 
 
