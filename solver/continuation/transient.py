@@ -178,8 +178,7 @@ def relax_to_periodic(
         - UNSTABLE: the motion is an unstable periodic state and does not leave this state.
         - UNSETTLED: the motion does not settle within `CONTINUATION.search_iterations` Newton iterations.
     """
-    budget = run.budget
-    budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
+    run.budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
     transient = Transient(case, joint)
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
     predicted, period = start.predicted_h, 2.0 * np.pi / joint.omega
@@ -189,7 +188,7 @@ def relax_to_periodic(
     left = CONTINUATION.search_iterations
     # whether an unstable state has been found, which the motion leaves
     grows = False
-    while left > 0 and length >= NEWTON.shortest_step and not budget.exhausted:
+    while left > 0 and length >= NEWTON.shortest_step and not run.budget.exhausted:
         inverse = 1.0 / (length * period)
         balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
         result = run.solve(balance, predicted, CONTINUATION.near_iterations)
@@ -214,17 +213,15 @@ def relax_to_periodic(
         renewed = change < 0.5 * tried or length >= longest
         if change < CONTINUATION.relaxed_change and renewed:
             tried = change
-            begun = budget.iterations
+            begun = run.budget.iterations
             balance = Balance.frozen(joint, history, wear_depth)
             # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
             found = run.state(balance, predicted)
-            stable = found is not None and is_stable(balance, found.evaluation, run)
-            left -= budget.iterations - begun
-            grows = grows or (found is not None and not stable)
-            if found is not None and stable:
-                distance = _change(transient.periodic(found.evaluation), motion)
-                if distance < CONTINUATION.smooth_change:
-                    return found
+            left -= run.budget.iterations - begun
+            if found is not None and not is_stable(balance, found.evaluation, run):
+                grows = True
+            elif found and _change(transient.periodic(found.evaluation), motion) < CONTINUATION.smooth_change:
+                return found
         elif change > CONTINUATION.relaxed_change:
             tried = np.inf
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails

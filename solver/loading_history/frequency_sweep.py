@@ -16,7 +16,8 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.state import State
 from solver.loading_history.options import LOADING
 from solver.loading_history.path import LoadingPath
-from solver.loading_history.sweep import Step, Sweep, SweepState
+from solver.loading_history.path_of_states import Step
+from solver.loading_history.sweep import Sweep, SweepState
 from solver.loading_history.sweep_start import Direction, Origin, find_origin
 from solver.model import FloatArray, ReducedModel
 from solver.newton.options import NEWTON

@@ -20,7 +20,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
 from solver.loading_history.node_resolution import choose_resolution, resolution_holds
 from solver.loading_history.options import LOADING
-from solver.loading_history.sweep import Step
+from solver.loading_history.path_of_states import Step
 from solver.model import FloatArray
 from solver.newton.options import NEWTON
 from solver.newton.run import Run

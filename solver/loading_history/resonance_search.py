@@ -21,7 +21,8 @@ from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
 from solver.loading_history.options import LOADING
-from solver.loading_history.sweep import Step, Sweep
+from solver.loading_history.path_of_states import Step
+from solver.loading_history.sweep import Sweep
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.settings import FollowedFrequency

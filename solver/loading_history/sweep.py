@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic
 
 import numpy as np
 
@@ -24,80 +24,12 @@ from solver.accuracy.harmonic_levels import fewer
 from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.options import LOADING
+from solver.loading_history.path_of_states import Path, S, Step
 from solver.march.steps import Lengths, take_step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
 from solver.settings import Resolution
-from solver.structure.joint import Case
-
-S = TypeVar("S", bound="OnPath")
-
-
-class OnPath(Protocol):
-    """A state at a value of the parameter of its path."""
-
-    @property
-    def parameter(self) -> float:
-        """Value of the parameter."""
-
-
-@dataclass(frozen=True)
-class Step(Generic[S]):
-    """End of a step.
-
-    state: the state reached.
-    folds: values of the parameter at the folds that the step has jumped over.
-    """
-
-    state: S
-    folds: tuple[float, ...] = ()
-
-
-class Path(Protocol[S]):
-    """The joint along a parameter; the harmonics and samples are those of its case."""
-
-    @property
-    def case(self) -> Case:
-        """Model and settings."""
-
-    @property
-    def steps(self) -> tuple[float, float, float]:
-        """Shortest and longest step, and the one at which a state that is not found is left to `rescue`."""
-
-    @property
-    def node_tolerance(self) -> float:
-        """Tolerance of the scaled residual of a node; reported states are solved to that of the settings."""
-
-    def ahead(self, parameter: float, length: float) -> float:
-        """The parameter a step farther; length: below 0 for a step down."""
-
-    def solve(self, states: tuple[S, ...], target: float, run: Run) -> S | None:
-        """State at a target near the last of one or two states; None where not found."""
-
-    def rescue(self, start: S, target: float, run: Run) -> Step[S] | Outcome:
-        """State at a target that `solve` does not find, or why there is none."""
-
-    def change(self, before: S, after: S, wider: float) -> float:
-        """Change over a step, over the largest change allowed, which is `wider` times larger in a reference sweep."""
-
-    def differs(self, before: S, after: S) -> float:
-        """Relative change of the vibration between two states."""
-
-    def at(self, resolution: Resolution) -> Path[S]:
-        """The path with other harmonics and samples."""
-
-    def move(self, state: S, other: Any, run: Run) -> S | None:
-        """The state with the harmonics and samples of another path; None where not found."""
-
-    def choose(self, state: S, run: Run) -> tuple[Path[S], S, bool, float]:
-        """Path and state with the harmonics that the state needs, whether they suffice, relative error."""
-
-    def suffices(self, state: S, at_limit: bool, run: Run) -> bool:
-        """Whether the state has about the harmonics that it needs."""
-
-    def describe(self, state: S) -> str:
-        """Where the path is, in words."""
 
 
 @packable
@@ -155,7 +87,7 @@ class Sweep(Generic[S]):
         self.saved = self.state = state
         self.path = self.path.at(state.resolution)
         self.run.budget.iterations = state.iterations
-        self._forget()
+        self.forget()
         if self.reference is not None and state.reference is not None:
             self.reference.load(replace(state.reference, iterations=state.iterations))
 
@@ -170,7 +102,7 @@ class Sweep(Generic[S]):
         A state that more harmonics change by more than half is rejected: one harmonic can give a joint that slips and
         opens everywhere a state that does not exist.
         """
-        self._place(path, state)
+        self.place_at(path, state)
         self._begin_reference()
         if self._choose_resolution() > SENSITIVE_ERROR:
             self.state = replace(self.state, states=(), failure=Outcome.UNSETTLED)
@@ -261,9 +193,9 @@ class Sweep(Generic[S]):
         shortest, _, rescue = self.path.steps
         return Lengths(1, LOADING.aimed_change, shortest, rescue)
 
-    def _place(self, path: Path[S], state: S) -> None:
+    def place_at(self, path: Path[S], state: S) -> None:
         """Put the sweep at a first node."""
-        self._forget()
+        self.forget()
         self.path = path
         length = path.steps[1]
         self.state = replace(self.state, states=(state,), resolution=path.case.resolution, length=length)
@@ -310,7 +242,7 @@ class Sweep(Generic[S]):
         if path.case.resolution != self.state.resolution:
             moved = self.path.move(here, path, self.run)
         reference.state = replace(reference.state, branch=0)
-        reference._place(*((self.path, here) if moved is None else (path, moved)))
+        reference.place_at(*((self.path, here) if moved is None else (path, moved)))
 
     def _choose_resolution(self) -> float:
         """Choose the harmonics and samples of the nodes for the current state, as far as they are automatic.
@@ -321,11 +253,11 @@ class Sweep(Generic[S]):
         if self.path.case.settings.automatic:
             path, here, accurate, error = self.path.choose(here, self.run)
             self.state = replace(self.state, at_limit=not accurate)
-            self._take(path, here)
+            self.take(path, here)
         self.state = replace(self.state, checked=here)
         return error
 
-    def _take(self, path: Path[S], state: S) -> None:
+    def take(self, path: Path[S], state: S) -> None:
         """Take the current node with the harmonics and samples of a path; those of the reference sweep follow."""
         if path.case.resolution == self.state.resolution:
             self.state = replace(self.state, states=(*self.state.states[:-1], state))
@@ -339,21 +271,21 @@ class Sweep(Generic[S]):
             if moved is None:
                 self._begin_reference()
             else:
-                other._forget()
-                other._take(wanted, moved)
+                other.forget()
+                other.take(wanted, moved)
 
     def _save(self) -> None:
         """Save the current node, and drop all that a resumed sweep would not have."""
         other = None if self.reference is None else self.reference.state
         self.state = in_rows(replace(self.state, iterations=self.run.budget.iterations, reference=other))
-        self._forget()
+        self.forget()
         if self.reference is not None and self.state.reference is not None:
             self.reference.state = self.state.reference
-            self.reference._forget()
+            self.reference.forget()
         self.saved = self.state
         self.save()
 
-    def _forget(self) -> None:
+    def forget(self) -> None:
         """Drop the factorisation that is kept from node to node, and the next node."""
         self.run, self.ahead = self.run.fresh(), None
 

@@ -12,7 +12,7 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.state import history_at_rest
 from solver.loading_history.node_resolution import choose_resolution
 from solver.loading_history.options import LOADING
-from solver.loading_history.sweep import Step
+from solver.loading_history.path_of_states import Step
 from solver.model import FloatArray
 from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.newton.run import Run

@@ -15,7 +15,8 @@ from solver.accuracy.harmonic_levels import shifted
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
 from solver.accuracy.refinement import refine
-from solver.loading_history.sweep import Step, Sweep
+from solver.loading_history.path_of_states import Step
+from solver.loading_history.sweep import Sweep
 from solver.model import FloatArray
 from solver.modes.modal_model import natural_frequencies
 from solver.modes.mode_balance import ModeProblem, ModeState

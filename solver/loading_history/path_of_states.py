@@ -1,0 +1,79 @@
+"""What a sweep goes along: states at the values of a parameter, and the steps from one to the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+from solver.newton.run import Run
+from solver.outcome import Outcome
+from solver.settings import Resolution
+from solver.structure.joint import Case
+
+S = TypeVar("S", bound="OnPath")
+
+
+class OnPath(Protocol):
+    """A state at a value of the parameter of its path."""
+
+    @property
+    def parameter(self) -> float:
+        """Value of the parameter."""
+
+
+@dataclass(frozen=True)
+class Step(Generic[S]):
+    """End of a step.
+
+    state: the state reached.
+    folds: values of the parameter at the folds that the step has jumped over.
+    """
+
+    state: S
+    folds: tuple[float, ...] = ()
+
+
+class Path(Protocol[S]):
+    """The joint along a parameter; the harmonics and samples are those of its case."""
+
+    @property
+    def case(self) -> Case:
+        """Model and settings."""
+
+    @property
+    def steps(self) -> tuple[float, float, float]:
+        """Shortest and longest step, and the one at which a state that is not found is left to `rescue`."""
+
+    @property
+    def node_tolerance(self) -> float:
+        """Tolerance of the scaled residual of a node; reported states are solved to that of the settings."""
+
+    def ahead(self, parameter: float, length: float) -> float:
+        """The parameter a step farther; length: below 0 for a step down."""
+
+    def solve(self, states: tuple[S, ...], target: float, run: Run) -> S | None:
+        """State at a target near the last of one or two states; None where not found."""
+
+    def rescue(self, start: S, target: float, run: Run) -> Step[S] | Outcome:
+        """State at a target that `solve` does not find, or why there is none."""
+
+    def change(self, before: S, after: S, wider: float) -> float:
+        """Change over a step, over the largest change allowed, which is `wider` times larger in a reference sweep."""
+
+    def differs(self, before: S, after: S) -> float:
+        """Relative change of the vibration between two states."""
+
+    def at(self, resolution: Resolution) -> Path[S]:
+        """The path with other harmonics and samples."""
+
+    def move(self, state: S, other: Any, run: Run) -> S | None:
+        """The state with the harmonics and samples of another path; None where not found."""
+
+    def choose(self, state: S, run: Run) -> tuple[Path[S], S, bool, float]:
+        """Path and state with the harmonics that the state needs, whether they suffice, relative error."""
+
+    def suffices(self, state: S, at_limit: bool, run: Run) -> bool:
+        """Whether the state has about the harmonics that it needs."""
+
+    def describe(self, state: S) -> str:
+        """Where the path is, in words."""
