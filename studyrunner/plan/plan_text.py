@@ -180,8 +180,8 @@ def _range(plan: TaskPlan) -> str:
     """What makes the time uncertain: how many points wear, and how often the joint jumps."""
     starts = format_seconds(sum(branch.cost for branch in plan.branches))
     return (
-        f"{starts} of it for the start states; a history in which nothing slips takes none, one in which the joint"
-        " jumps up to five times as long"
+        f"{starts} of it for the start states; points at which all pairs stick cost nothing, a point whose vibration"
+        " jumps up to five times as much"
     )
 
 
@@ -193,14 +193,14 @@ def _about(plan: TaskPlan, prepared_in: float) -> str:
 
 def _ranks(plan: TaskPlan, n_tasks: int) -> str:
     """What limits the use of many ranks."""
-    least = f"no number takes less than {format_seconds(plan.longest)}"
+    least = f"at least {format_seconds(plan.longest)}"
     if plan.marches[0][0].blocks:
         return (
             f"{count(n_tasks, 'rank has', 'ranks have')} work at most, one for each history; {least}, the longest one"
         )
     busy = n_tasks // _TASKS_A_RANK
-    many = f"up to about {busy} stay" if busy > 1 else "one stays"
-    return f"{many} busy to the end, with {_TASKS_A_RANK} tasks each; {least}, as a history follows its start state"
+    many = f"up to about {busy} ranks are" if busy > 1 else "one rank is"
+    return f"{many} efficient, with {_TASKS_A_RANK} tasks each; {least}, as a history follows its start state"
 
 
 def _result_values(study: Study, facts: SceneFacts, n_points: int) -> int:

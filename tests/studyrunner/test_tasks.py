@@ -110,9 +110,7 @@ def test_plan_is_printed(capsys):
     assert lines["unknowns"].startswith("22 ")
     assert lines["left out"].startswith("72 points: wear_coefficient = 0")
     assert lines["time"].endswith("on two, to a factor of two, if every point wears;")
-    assert lines["ranks"].startswith(
-        "up to about 4 stay busy to the end, with 32 tasks each; no number takes less than"
-    )
+    assert lines["ranks"].startswith("up to about 4 ranks are efficient, with 32 tasks each; at least")
     assert "ms or less a step" in lines["assumed"]
     assert "GB a rank" in lines["memory"]
 
@@ -121,7 +119,7 @@ def test_the_plan_of_missions_says_what_is_serial(capsys):
     lines = printed_plan([], capsys, "mission")
     assert lines["tasks"] == "1: 1 mission history"
     assert lines["serial"].startswith("one rank computes all of a history, one part after the other: its missions")
-    assert lines["ranks"].startswith("1 rank has work at most, one for each history; no number takes less than")
+    assert lines["ranks"].startswith("1 rank has work at most, one for each history; at least")
     lines = printed_plan(["axes.wear_coefficient=[1e-14, 2e-14]"], capsys, "mission")
     assert lines["tasks"] == "2: 2 mission histories, side by side on the ranks"
     assert lines["ranks"].startswith("2 ranks have work at most")
