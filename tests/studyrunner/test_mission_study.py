@@ -148,19 +148,19 @@ def test_an_interrupted_study_goes_on_to_the_last_bit(study_file, blocks, monkey
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", 0.0)
     few = {"axes.frequency": 160, "axes.sweep": "up", "axes.wear_coefficient": 1e-11}
     whole = run(study_file, "whole.nc", overrides=few)
-    n_whole = len(blocks.flown)
+    n_whole = len(blocks.computed)
 
     def interrupt(number):
         if number == n_whole // 2:
             raise KeyboardInterrupt
 
-    blocks.flown.clear()
+    blocks.computed.clear()
     blocks.disturb = interrupt
     with pytest.raises(KeyboardInterrupt):
         run(study_file, overrides=few)
     blocks.disturb = lambda _: None
     found = run(study_file, overrides=few)
-    assert len(blocks.flown) == n_whole
+    assert len(blocks.computed) == n_whole
     xr.testing.assert_identical(without_time(found), without_time(whole))
 
 
@@ -276,7 +276,7 @@ def test_samples_draw_what_all_blocks_have(study_file, blocks):
     for sample in range(3):
         load = result.sample_normal_load.values[sample]
         friction = result.sample_friction_coefficient.values[sample]
-        of_sample = [case for case in blocks.flown if case.mission.blocks[0].friction_coefficient == friction]
+        of_sample = [case for case in blocks.computed if case.mission.blocks[0].friction_coefficient == friction]
         loads = {case.block.name: load_of(case.block) for case in of_sample}
         # around the value of the scene, and around that of the block
         assert loads["cruise"] == load
@@ -292,8 +292,8 @@ def test_drawn_values_are_those_of_a_block_where_each_gives_its_own(study_file, 
     drawn = result.sample_excitation_amplitude
     for sample in range(3):
         load = drawn.values[sample]
-        assert load in [case.block.excitation_amplitude for case in blocks.flown if case.block.name == "run-up"]
-        others = [case.block.excitation_amplitude for case in blocks.flown if case.block.name == "heavy"]
+        assert load in [case.block.excitation_amplitude for case in blocks.computed if case.block.name == "run-up"]
+        others = [case.block.excitation_amplitude for case in blocks.computed if case.block.name == "heavy"]
         assert 1.4 * load == pytest.approx(min(others, key=lambda each: abs(each - 1.4 * load)))
     assert "In the block run-up" in drawn.attrs["comment"]
 
