@@ -106,13 +106,13 @@ class FrequencySweep:
     @property
     def n_iterations(self) -> int:
         """Newton iterations to the current frequency: of the sweep from its origin, and of the state."""
-        return self.run.budget.iterations + (0 if self.nodes is None else self.nodes.run.budget.iterations)
+        return self.run.budget.iterations + (0 if self.nodes is None else self.nodes.n_iterations)
 
     def set_deadline(self, deadline: float) -> None:
         """Set the CPU time of the thread, s, after which the search for the present state ends."""
         self.run.budget.deadline = deadline
         if self.nodes is not None:
-            self.nodes.run.budget.deadline = deadline
+            self.nodes.set_deadline(deadline)
 
     def state(self) -> FrequencySweepState | None:
         """What another sweep needs to go on, to be packed; None where nothing is saved yet."""

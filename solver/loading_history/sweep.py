@@ -80,7 +80,9 @@ class Sweep(Generic[S]):
         self.ahead: Step[S] | None = None
         self.last: S | None = None
         self.save: Callable[[], None] = lambda: None
-        self.reference = Sweep(path, direction, budget, wider=2.0 * wider) if with_reference else None
+        # counts of its own: when the sweep is saved must not depend on the points that are asked for
+        own = Budget(deadline=budget.deadline)
+        self.reference = Sweep(path, direction, own, wider=2.0 * wider) if with_reference else None
 
     def load(self, state: SweepState) -> None:
         """Go on from the `saved` state of another sweep."""
@@ -89,7 +91,19 @@ class Sweep(Generic[S]):
         self.run.budget.iterations = state.iterations
         self.forget()
         if self.reference is not None and state.reference is not None:
-            self.reference.load(replace(state.reference, iterations=state.iterations))
+            self.reference.load(state.reference)
+
+    @property
+    def n_iterations(self) -> int:
+        """Newton iterations so far, those of the reference sweep included."""
+        own = self.run.budget.iterations
+        return own if self.reference is None else own + self.reference.run.budget.iterations
+
+    def set_deadline(self, deadline: float) -> None:
+        """Set the CPU time of the thread, s, after which the sweep ends."""
+        self.run.budget.deadline = deadline
+        if self.reference is not None:
+            self.reference.run.budget.deadline = deadline
 
     @property
     def here(self) -> S | None:
@@ -276,7 +290,9 @@ class Sweep(Generic[S]):
 
     def _save(self) -> None:
         """Save the current node, and drop all that a resumed sweep would not have."""
-        other = None if self.reference is None else self.reference.state
+        other = None
+        if self.reference is not None:
+            other = replace(self.reference.state, iterations=self.reference.run.budget.iterations)
         self.state = in_rows(replace(self.state, iterations=self.run.budget.iterations, reference=other))
         self.forget()
         if self.reference is not None and self.state.reference is not None:

@@ -17,7 +17,7 @@ from solver.modes.mode_path import ModePath
 from solver.modes.mode_point import ModePoint, describe_loss, judge_point, problem_of, solve_point
 from solver.modes.mode_start import Rest, find_rest, first_amplitude, first_node, sliding_node
 from solver.modes.options import MODES
-from solver.newton.run import OutOfTimeError, Run
+from solver.newton.run import Budget, OutOfTimeError, Run
 from solver.outcome import Outcome, describe_error
 from solver.settings import SolverSettings
 
@@ -71,14 +71,13 @@ class _Lowered:
     """A sweep with falling amplitude.
 
     - first: where it begins, with the harmonics of `path`.
-    - raised: Newton iterations of the way to there. lowered: iterations since then.
+    - raised: Newton iterations of the way to there.
     - sweep: the sweep, from its first point on.
     """
 
     path: ModePath
     first: ModeState
     raised: int
-    lowered: int = 0
     sweep: Sweep[ModeState] | None = None
 
 
@@ -100,7 +99,7 @@ class _Way:
         self._direction = direction
         self._asked = (model, friction_coefficient, number, settings)
         self._rest: Rest | tuple[Outcome, str] | None = None
-        self._to_rest = self._raised = 0
+        self._to_rest = self._to_first = 0
         self._up: Sweep[ModeState] | None = None
         self._tops: list[float] = []
         self._down: dict[float, _Lowered] = {}
@@ -139,6 +138,7 @@ class _Way:
             return self._failed() if node is None else judge_point(self._rest.problem, node, None, self.run)
         finally:
             self.iterations += self.run.budget.iterations - before
+            self.iterations += 0 if sweep is None else sweep.n_iterations
 
     def _failed(self) -> ModePoint:
         return ModePoint(Outcome.START_FAILED, "the mode was not found at its first amplitude")
@@ -147,32 +147,33 @@ class _Way:
         """The sweep at the node before an amplitude; None where it does not begin."""
         if self._direction == "up":
             raised = self._raised_to(rest, amplitude)
-            self.iterations += self._raised
+            self.iterations += self._to_first
             return raised
         down = self._lowered(rest, top_of(amplitude))
         if down is None:
             return None
-        before = self.run.budget.iterations
         down.sweep = down.sweep or self._begun(down.path, down.first, -1.0)
+        down.sweep.set_deadline(self.run.budget.deadline)
         down.sweep.advance_to(amplitude)
-        down.lowered += self.run.budget.iterations - before
-        self.iterations += down.raised + down.lowered
+        self.iterations += down.raised
         return down.sweep
 
     def _raised_to(self, rest: Rest, amplitude: float) -> Sweep[ModeState] | None:
         """The sweep with rising amplitude at the node before an amplitude; None where it does not begin."""
-        before = self.run.budget.iterations
         if self._up is None:
+            before = self.run.budget.iterations
             node = first_node(rest, first_amplitude(rest), self.run)
+            self._to_first = self.run.budget.iterations - before
             self._up = None if node is None else self._begun(ModePath(rest.problem), node, 1.0)
         if self._up is not None:
+            self._up.set_deadline(self.run.budget.deadline)
             self._up.advance_to(amplitude)
-        self._raised += self.run.budget.iterations - before
         return self._up
 
     def _begun(self, path: ModePath, first: ModeState, direction: float) -> Sweep[ModeState]:
-        """A sweep at its first node."""
-        sweep: Sweep[ModeState] = Sweep(path, direction, self.run.budget, with_reference=True)
+        """A sweep at its first node, with counts of its own: its nodes do not depend on the points asked for."""
+        budget = Budget(deadline=self.run.budget.deadline)
+        sweep: Sweep[ModeState] = Sweep(path, direction, budget, with_reference=True)
         sweep.begin(path, first)
         return sweep
 
@@ -192,6 +193,8 @@ class _Way:
                 path = ModePath(problem_of(raised))
                 first = raised.last if raised.ahead is None else raised.ahead.state
             if first is not None:
-                spent = self._raised if rest.glued else self.run.budget.iterations - before
+                spent = self.run.budget.iterations - before
+                if self._up is not None and rest.glued:
+                    spent = self._to_first + self._up.n_iterations
                 self._down[top] = _Lowered(path, first, spent)
         return self._down.get(wanted)

@@ -39,7 +39,7 @@ name = "modes"
 [scene]
 model = "sdof_slider"
 [axes]
-modal_amplitude = {start = 2e-5, stop = 1e-3, num = 5, spacing = "log"}
+modal_amplitude = {start = 2e-5, stop = 1e-3, num = 10, spacing = "log"}
 sweep = "down"
 friction_coefficient = [0.4, 0.6]
 """
