@@ -20,4 +20,3 @@ settings.load_profile("tests")
 def pytest_xdist_auto_num_workers():
     """Of `-n auto`: one more than cores, as tests that start runs wait about as long as they compute."""
     return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else len(os.sched_getaffinity(0)) + 1
-
