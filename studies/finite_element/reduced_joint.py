@@ -27,6 +27,7 @@ from studies.finite_element.elements.assembly import (
 )
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.finite_element.joint.constraints import check_followers, free_ones_first
+from studies.finite_element.joint.cut_faces import CyclicAxis
 from studies.finite_element.joint.layers import find_couplings, find_layers
 from studies.finite_element.joint.ordering import (
     Supports,
@@ -182,7 +183,7 @@ def prepare_model(
     pairs = joint.pairs
     if pairs is None:
         contacts = joint.contacts if joint.constraints is None else free_ones_first(joint.constraints, joint.contacts)
-        pairs = build_contact_pairs(model.coordinates, model.numbers, contacts, _along(model, joint))
+        pairs = build_contact_pairs(model.coordinates, model.numbers, contacts, _along(model, joint), _axis(joint))
     supports = Supports(model.numbers, joint.held, joint.cut, n_reductions, joint.constraints)
     glued = None
     if joint.ties:
@@ -301,9 +302,14 @@ def _centrifugal_load(mass: sparse.csr_matrix, coordinates: FloatArray, rotation
 def _along(model: MeshModel | MatrixModel, joint: JointDefinition) -> FloatArray:
     if joint.along is not None:
         return joint.along
-    if joint.cut is not None:
-        return joint.cut.axis.axis
+    axis = _axis(joint)
+    if axis is not None:
+        return axis.axis
     return np.array([0.0, 0.0, 1.0]) if model.rotation is None else model.rotation.axis
+
+
+def _axis(joint: JointDefinition) -> CyclicAxis | None:
+    return None if joint.cut is None else joint.cut.axis
 
 
 def _interface(pairs: ContactPairs, joint: JointDefinition) -> ContactInterface:

@@ -24,7 +24,7 @@ from studies.fe_models.from_files.constraints import find_constraints
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.from_files.solid import build_solid_mesh
-from studies.fe_models.from_files.supports import find_clamped, find_cut, find_rotation
+from studies.fe_models.from_files.supports import find_clamped, find_cut, find_cyclic_axis, find_rotation
 from studies.fe_models.from_files.surfaces_in_contact import Surfaces, find_surfaces
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
@@ -96,8 +96,9 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
             remedy = "use solid elements, of one material in a .cdb, or give `matrices` of another program"
             raise SceneError("model", found, remedy)
     rotation = find_rotation(deck, parameters, units)
-    surfaces = find_surfaces(selections, parameters, units)
-    cut, clamped = find_cut(selections, parameters, units), find_clamped(selections, parameters)
+    axis = find_cyclic_axis(deck, parameters, units)
+    surfaces = find_surfaces(selections, parameters, units, axis)
+    cut, clamped = find_cut(selections, parameters, axis, surfaces.contacts), find_clamped(selections, parameters)
     nodal, held_speed = None, None
     if files.matrices:
         matrices = _read_matrices(files, parameters, deck, progress)

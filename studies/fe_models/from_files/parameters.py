@@ -79,6 +79,11 @@ class Parameters(Table):
         None,
         description="pairs of surfaces or sets of nodes, [[name, name]]; default: the deck's CONTACT PAIR, or its TIE",
     )
+    next_sector: bool | Names = Field(
+        False,
+        description="contacts whose second surface belongs to the neighbouring sector: true for all, or [name], a"
+        " surface of each; which side the neighbour is on is found",
+    )
     load: SetDirection = Field(description="where the harmonic load of 1 N acts: {set, direction}")
     response: dict[str, SetDirection] | None = Field(
         None, description="mean displacements by name: {name = {set, direction}}; default: that of the load"

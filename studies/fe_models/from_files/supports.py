@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from solver.model import BoolArray, FloatArray
@@ -12,6 +14,7 @@ from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.units import Units
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.finite_element.joint.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
+from studies.finite_element.joint.pairing import ContactSurfaces
 from studies.scene_error import SceneError
 
 
@@ -33,18 +36,18 @@ def find_rotation(deck: Deck, parameters: Parameters, units: Units) -> Rotation 
     return Rotation(omega_squared, *axis)
 
 
-def find_cut(selections: Selections, parameters: Parameters, units: Units) -> CutFaces | None:
-    """Cut faces that the study names, else those of the deck, else all nodes that are images; None of no sector.
+def find_cyclic_axis(deck: Deck, parameters: Parameters, units: Units) -> CyclicAxis | None:
+    """Axis and number of sectors that the study gives, else those of the deck; None of no sector.
 
-    Raises SceneError where they are not one sector apart, or have no axis.
+    Raises SceneError where there is one without the other.
     """
-    deck, mesh = selections.deck, selections.mesh
     n_sectors = parameters.n_sectors
     if n_sectors is None and deck.cyclic is not None:
         n_sectors = deck.cyclic.n_sectors
     if n_sectors is None:
-        if parameters.cut_faces is not None:
-            raise SceneError("n_sectors", "missing", "give the number of sectors with cut_faces")
+        for key in ("cut_faces", "next_sector"):
+            if getattr(parameters, key):
+                raise SceneError("n_sectors", "missing", f"give the number of sectors with {key}")
         return None
     found = _axis(deck, parameters, units)
     if found is None:
@@ -52,11 +55,26 @@ def find_cut(selections: Selections, parameters: Parameters, units: Units) -> Cu
         if rotation is None:
             raise SceneError("axis", "missing", "give {point, direction} of the axis of the cyclic structure")
         found = rotation.point, rotation.axis
-    axis = CyclicAxis(n_sectors, *found)
+    return CyclicAxis(n_sectors, *found)
+
+
+def find_cut(
+    selections: Selections, parameters: Parameters, axis: CyclicAxis | None, contacts: Sequence[ContactSurfaces]
+) -> CutFaces | None:
+    """Cut faces that the study names, else those of the deck, else all nodes that are images; None of no sector.
+
+    contacts: nodes of those with the next sector are on no cut face that is found.
+
+    Raises SceneError where they are not one sector apart.
+    """
+    if axis is None:
+        return None
+    deck, mesh = selections.deck, selections.mesh
     places = mesh.coordinates, mesh.numbers, mesh.bodies
     names = _cut_names(deck) if parameters.cut_faces is None else [parameters.cut_faces]
     if not names:
-        return find_cut_faces(*places, axis)
+        across = [surface.nodes for each in contacts if each.sector for surface in (each.first, each.second)]
+        return find_cut_faces(*places, axis, np.concatenate([np.empty(0, dtype=np.int64), *across]))
     sides = ([selections.nodes(pair[side], "cut_faces") for pair in names] for side in (0, 1))
     first, second = (np.unique(np.concatenate(each)) for each in sides)
     return match_cut_faces(*places, axis, first, second)

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from studies.fe_models.deck.mesh import ContactPair, Deck
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.units import Units
+from studies.finite_element.joint.cut_faces import CyclicAxis
 from studies.finite_element.joint.pairing import ContactSurfaces
 from studies.scene_error import SceneError
 
@@ -33,10 +36,13 @@ class Surfaces:
     ties: tuple[ContactSurfaces, ...]
 
 
-def find_surfaces(selections: Selections, parameters: Parameters, units: Units) -> Surfaces:
+def find_surfaces(
+    selections: Selections, parameters: Parameters, units: Units, axis: CyclicAxis | None
+) -> Surfaces:
     """Pairs of surfaces that the study names, else those of CONTACT PAIR, else those of TIE; other ties stay glued.
 
-    So do contact pairs that the deck glues and the study does not name.
+    So do contact pairs that the deck glues and the study does not name. axis: of the cyclic structure, for contacts
+    with the next sector.
 
     Raises
     ------
@@ -65,7 +71,11 @@ def find_surfaces(selections: Selections, parameters: Parameters, units: Units) 
     # a name that the deck does not have is said before a friction coefficient that is missing for it
     named = [_surfaces(selections, each, parameters, units, "contact") for each in chosen]
     friction = _friction(chosen, parameters, deck)
-    contacts = [replace(each, friction_coefficient=value) for each, value in zip(named, friction, strict=True)]
+    sectors = _sectors(selections, named, chosen, parameters.next_sector, axis)
+    contacts = [
+        replace(each, friction_coefficient=value, sector=sector)
+        for each, value, sector in zip(named, friction, sectors, strict=True)
+    ]
     glued = [tie for tie in (*ties, *glued_pairs) if not any(tie.joins(each.names) for each in chosen)]
     return Surfaces(tuple(contacts), tuple(_surfaces(selections, tie, parameters, units, "model") for tie in glued))
 
@@ -100,6 +110,28 @@ def _surfaces(
         raise SceneError("gaps", f"{pair.fitted}, and the study lets the surfaces touch", "give gaps = true")
     clearance = None if pair.clearance is None else pair.clearance * units.length
     return ContactSurfaces(first, second, tolerance, None, with_gaps=True, clearance=clearance)
+
+
+def _sectors(
+    selections: Selections,
+    surfaces: list[ContactSurfaces],
+    chosen: list[_Definition],
+    given: bool | tuple[str, ...],
+    axis: CyclicAxis | None,
+) -> Iterator[int]:
+    """Sector of the second surface of each contact: the neighbour, of both, to which the first one is nearer."""
+    names = () if isinstance(given, bool) else tuple(name.strip().upper() for name in given)
+    for name in names:
+        if not any(name in _labels(each) for each in chosen):
+            known = ", ".join(_labels(each)[-1] for each in chosen)
+            raise SceneError("next_sector", f'no contact has the name "{name}"', f"give one of {known}")
+    for each, definition in zip(surfaces, chosen, strict=True):
+        if axis is None or not (given is True or any(name in _labels(definition) for name in names)):
+            yield 0
+            continue
+        first, second = (selections.mesh.coordinates[side.nodes].mean(axis=0) for side in (each.first, each.second))
+        ahead, back = (float(np.linalg.norm(axis.turned(second[None], k)[0] - first)) for k in (1, -1))
+        yield 1 if ahead <= back else -1
 
 
 def _friction(chosen: list[_Definition], parameters: Parameters, deck: Deck) -> Iterator[float | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
@@ -74,7 +74,7 @@ def free_ones_first(constraints: Constraints, contacts: Sequence[ContactSurfaces
     """Contacts whose first surface, which moves where both are alike, does not follow others if the second does not."""
     follow = np.asarray(constraints.dependent.any(axis=1))
     return tuple(
-        replace(each, first=each.second, second=each.first, label=each.name)
+        each.turned_round
         if follow[each.first.nodes].any() and not follow[each.second.nodes].any()
         else each
         for each in contacts

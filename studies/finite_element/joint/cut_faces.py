@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from solver.model import FloatArray, IntArray
+from solver.model import ComplexArray, FloatArray, IntArray
 from studies.scene_error import SceneError
 
 _SAME = 1e-3  # distance of two nodes that are images, over the distance of neighbouring nodes on the face
@@ -31,6 +31,14 @@ class CyclicAxis:
         cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross))
 
+    def turned(self, points: FloatArray, sectors: int) -> FloatArray:
+        """Points (n, 3), m, turned by a number of sectors about the axis, against the clock as seen from its end."""
+        return np.asarray(self.point + (points - self.point) @ self.pitch(sectors).T)
+
+    def pitch(self, sectors: int = 1) -> FloatArray:
+        """Rotation (3, 3) by a number of sectors."""
+        return self.turn(2.0 * np.pi * sectors / self.n_sectors)
+
     def cylinder(self, coordinates: FloatArray) -> FloatArray:
         """Radius, m, angle, rad, and height, m (n, 3), of points (n, 3)."""
         start = np.eye(3)[np.argmin(np.abs(self.axis))]
@@ -46,7 +54,8 @@ class CyclicAxis:
 class CutFaces:
     """left, right (n,): nodes, each right one the image of the left one under the rotation `rotation` by one sector.
 
-    `u_right = phase * rotation @ u_left` for a wave that goes round in the sense of the axis.
+    `u_right = phase * rotation @ u_left` for a wave that goes round in the sense of the axis. There are none where
+    sectors meet in contact alone.
     """
 
     axis: CyclicAxis
@@ -56,7 +65,12 @@ class CutFaces:
     @property
     def rotation(self) -> FloatArray:
         """Rotation (3, 3) by one sector."""
-        return self.axis.turn(2.0 * np.pi / self.axis.n_sectors)
+        return self.axis.pitch()
+
+    def across(self, sectors: IntArray, nodal_diameter: int) -> FloatArray | ComplexArray:
+        """Factors (n, 3, 3) from displacements in this sector to those at the same places, sectors (n,) further on."""
+        steps = [self.phase(nodal_diameter) ** int(each) * self.axis.pitch(int(each)) for each in sectors]
+        return np.array(steps).reshape(-1, 3, 3)
 
     def images(self, nodal_diameter: int, n_nodes: int) -> sparse.csr_matrix:
         """Displacements (3 n, 3 n_nodes) of the right nodes from those of all nodes."""
@@ -112,24 +126,28 @@ def match_cut_faces(
     return CutFaces(axis, left, image)
 
 
-def find_cut_faces(coordinates: FloatArray, numbers: IntArray, bodies: IntArray, axis: CyclicAxis) -> CutFaces:
+def find_cut_faces(
+    coordinates: FloatArray, numbers: IntArray, bodies: IntArray, axis: CyclicAxis, in_contact: IntArray
+) -> CutFaces:
     """Cut faces from the mesh alone: all nodes with an image under rotation by one sector.
 
-    Arguments as in `match_cut_faces`. Raises SceneError where there is none.
+    Other arguments as in `match_cut_faces`. in_contact (m,): nodes that touch the next sector, and are on no cut face.
+
+    Raises SceneError where there is none, and no node touches the next sector.
     """
     extent = float(np.ptp(coordinates, axis=0).max())
-    everywhere = np.arange(len(coordinates))
-    image = _images(coordinates, numbers, bodies, axis, everywhere, everywhere, _EXTENT * extent)
-    left = np.flatnonzero(image >= 0)
-    if len(left) == 0:
+    elsewhere = np.setdiff1d(np.arange(len(coordinates)), in_contact)
+    found = _images(coordinates, numbers, bodies, axis, elsewhere, elsewhere, _EXTENT * extent)
+    left, image = elsewhere[found >= 0], found[found >= 0]
+    if len(left) == 0 and len(in_contact) == 0:
         raise SceneError(
             "n_sectors",
             f"no node has an image under rotation by {360.0 / axis.n_sectors:.4g} degrees, one of {axis.n_sectors}"
             " sectors",
             "give the number of sectors and the axis of the mesh, or the sets of both cut faces",
         )
-    _no_node_on_axis(left, image[left], numbers)
-    return CutFaces(axis, left, image[left])
+    _no_node_on_axis(left, image, numbers)
+    return CutFaces(axis, left, image)
 
 
 def _images(
@@ -142,7 +160,7 @@ def _images(
     tolerance: float,
 ) -> IntArray:
     """Of each left node (n,) the right one that it turns into, -1 where there is none within the tolerance, m."""
-    turned = axis.point + (coordinates[left] - axis.point) @ axis.turn(2.0 * np.pi / axis.n_sectors).T
+    turned = axis.turned(coordinates[left], 1)
     image = np.full(len(left), -1)
     for place, found in enumerate(cKDTree(coordinates[right]).query_ball_point(turned, tolerance)):
         candidates = right[found]

@@ -15,12 +15,12 @@ _SLANTED = 0.1  # sine of the angle between the normal of a pair and a plane of 
 
 
 def hold_pairs(
-    pairs: ContactPairs, numbers: IntArray, held: BoolArray, constraints: Constraints | None
+    pairs: ContactPairs, numbers: IntArray, held: BoolArray, constraints: Constraints | None, rotation: FloatArray
 ) -> ContactPairs:
     """Pairs whose frames have a tangent along each direction that is held; the pairs do not have this tangent.
 
     numbers (n_nodes,): of the nodes in the file. held (n_nodes, 3): displacements that are 0. constraints: with nodes
-    that are held along other directions.
+    that are held along other directions. rotation (3, 3): by one sector.
 
     Raises SceneError where a moving node is held along its normal, or the opposite point is not held as well.
     """
@@ -51,8 +51,10 @@ def hold_pairs(
         frames[place] = [normal, np.cross(second, normal), second]
         present[place, 3 - len(axes) :] = False
         start, end = pairs.opposite.indptr[place : place + 2]
+        turn = np.linalg.matrix_power(rotation, int(pairs.sector[place]))
         loose = [
-            np.abs(along(int(other)) - along(node)).max() > _SLANTED for other in pairs.opposite.indices[start:end]
+            np.abs(turn @ along(int(other)) @ turn.T - along(node)).max() > _SLANTED
+            for other in pairs.opposite.indices[start:end]
         ]
         if np.abs(pairs.opposite.data[start:end][loose]).sum() > _SLANTED:
             found = f"node {numbers[node]} of {name} is held in a direction in which the other surface moves{by}"

@@ -89,9 +89,16 @@ class Supports:
         master[held[master] | held] = -1
         return master
 
-    def opposite(self, pairs: ContactPairs) -> sparse.csr_matrix:
-        """Displacements (3 n_contact, 3 n_nodes) of the opposite points from those that depend on no other."""
+    def opposite(self, pairs: ContactPairs, nodal_diameter: int) -> sparse.csr_matrix:
+        """Displacements (3 n_contact, 3 n_nodes) of the opposite points from those that depend on no other.
+
+        An opposite point of the next sector moves as its image in this one, turned and with the phase of the wave.
+        """
         points = sparse.kron(pairs.opposite, np.eye(3), format="csr")
+        if self.cut is not None and pairs.sector.any():
+            each = np.arange(pairs.n_contact + 1)
+            steps = self.cut.across(pairs.sector, nodal_diameter), each[:-1], each
+            points = (sparse.bsr_matrix(steps) @ points).tocsr()
         return points if self.constraints is None else (points @ self.constraints.transformation).tocsr()
 
     def phase(self, nodal_diameter: int) -> complex | float:
@@ -128,7 +135,7 @@ def pairs_of_sector(pairs: ContactPairs, supports: Supports) -> ContactPairs:
 
     Raises SceneError where a moving node is held along its normal, or a pair on the right cut face has no image.
     """
-    pairs = hold_pairs(pairs, supports.numbers, supports.held, supports.constraints)
+    pairs = hold_pairs(pairs, supports.numbers, supports.held, supports.constraints, supports.rotation)
     if supports.cut is None:
         return pairs
     image = np.full(supports.n_nodes, -1)
@@ -233,10 +240,10 @@ class OrderedStructure:
         pairs, supports, first = self.pairs, self.supports, self.dissection.n_eliminated
         n_kept, n_contact = len(self.free) - first, pairs.n_contact
         all_nodes = self.followers(nodal_diameter)[:, 3 * first :]
-        moving, follow = [pairs.moving], [supports.opposite(pairs)]
+        moving, follow = [pairs.moving], [supports.opposite(pairs, nodal_diameter)]
         if self.ties is not None:
             moving.append(self.ties.moving)
-            follow.append(supports.opposite(self.ties))
+            follow.append(supports.opposite(self.ties, nodal_diameter))
         if supports.cut is not None and supports.keeps_cut:
             loose_cut = self.place[supports.cut.right] >= 0
             moving.append(supports.cut.right[loose_cut])
@@ -301,7 +308,7 @@ def order_structure(
     ones = np.ones(np.count_nonzero(both), dtype=np.int8)
     couplings = sparse.csr_matrix((ones, (rows[both], columns[both])), shape=(len(free), len(free)))
     bound = [pairs] if ties is None else [pairs, ties]
-    nodes = [part for each in bound for part in (each.moving, supports.opposite(each).indices // 3)]
+    nodes = [part for each in bound for part in (each.moving, supports.opposite(each, 0).indices // 3)]
     if supports.cut is not None and supports.keeps_cut:
         nodes += [supports.cut.left, supports.cut.right]
     involved = master[np.concatenate(nodes)]

@@ -10,6 +10,7 @@ from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.joint.closest_point import closest_points
+from studies.finite_element.joint.cut_faces import CyclicAxis
 from studies.finite_element.joint.surfaces import Surface
 from studies.scene_error import SceneError
 
@@ -34,6 +35,8 @@ class ContactSurfaces:
         surfaces, and the pairs touch.
     clearance: gap of all pairs in place of the distances, m, negative for an interference; None for the distances.
     label: of the pairs; the names of both surfaces if empty.
+    sector: of the second surface, counted from that of the first one: 1 where it belongs to the next sector in the
+        sense of the axis, -1 to the one before, 0 to the same.
     """
 
     first: Surface
@@ -43,11 +46,17 @@ class ContactSurfaces:
     with_gaps: bool = False
     clearance: float | None = None
     label: str = ""
+    sector: int = 0
 
     @property
     def name(self) -> str:
         """Label of the pairs."""
         return self.label or f"{self.first.name}-{self.second.name}"
+
+    @property
+    def turned_round(self) -> ContactSurfaces:
+        """The same contact with the surfaces in the other order."""
+        return replace(self, first=self.second, second=self.first, sector=-self.sector, label=self.name)
 
 
 @dataclass(frozen=True)
@@ -56,6 +65,8 @@ class ContactPairs:
 
     moving (n_contact,): nodes. The relative displacement is that of the node minus that of the opposite point.
     opposite (n_contact, n_nodes): interpolation weights of the opposite points; rows sum to 1.
+    sector (n_contact,): of the opposite point, counted from that of the moving node: 0, 1 or -1. The weights are of the
+        nodes of this sector that the point is the image of.
     frames (n_contact, 3, 3): rows are unit vectors: normal (out of the moving body, so that motion along it closes the
         pair), first tangent, second tangent.
     present (n_contact, 3): whether a relative displacement exists; the others are held.
@@ -69,6 +80,7 @@ class ContactPairs:
 
     moving: IntArray
     opposite: sparse.csr_matrix
+    sector: IntArray
     frames: FloatArray
     present: BoolArray
     area: FloatArray
@@ -86,12 +98,16 @@ class ContactPairs:
 
     def chosen(self, which: IntArray | BoolArray) -> ContactPairs:
         """Some of the pairs."""
-        parts = ("moving", "opposite", "frames", "present", "area", "position", "distance", "gap", "surface")
+        parts = ("moving", "opposite", "sector", "frames", "present", "area", "position", "distance", "gap", "surface")
         return replace(self, **{name: getattr(self, name)[which] for name in parts})
 
 
 def build_contact_pairs(
-    coordinates: FloatArray, numbers: IntArray, contacts: Sequence[ContactSurfaces], along: FloatArray
+    coordinates: FloatArray,
+    numbers: IntArray,
+    contacts: Sequence[ContactSurfaces],
+    along: FloatArray,
+    axis: CyclicAxis | None = None,
 ) -> ContactPairs:
     """Pairs of all surfaces, those of the first ones first, each by its moving nodes in ascending order.
 
@@ -106,6 +122,8 @@ def build_contact_pairs(
     along
         (3,): the first tangents are the projections of this direction where it does not stand on the surface; else
         of the axis of coordinates that lies flattest on it.
+    axis
+        Of the cyclic structure, for contacts between sectors.
 
     Raises
     ------
@@ -113,7 +131,7 @@ def build_contact_pairs(
         Where nodes find no point of the other surface, do not face it, or find it behind their own body, and where
         nodes belong to two pairs.
     """
-    parts = [_pair(coordinates, numbers, contact, place, along) for place, contact in enumerate(contacts)]
+    parts = [_pair(coordinates, numbers, contact, place, along, axis) for place, contact in enumerate(contacts)]
     joined = _joined(parts)
     unique, count = np.unique(joined.moving, return_counts=True)
     if (count > 1).any():
@@ -133,6 +151,7 @@ def _joined(parts: Sequence[ContactPairs]) -> ContactPairs:
     return ContactPairs(
         moving=np.concatenate([part.moving for part in parts]),
         opposite=sparse.vstack([part.opposite for part in parts], format="csr"),
+        sector=np.concatenate([part.sector for part in parts]),
         frames=np.concatenate([part.frames for part in parts]),
         present=np.concatenate([part.present for part in parts]),
         area=np.concatenate([part.area for part in parts]),
@@ -180,16 +199,17 @@ class _Match:
     depth: FloatArray
 
 
-def _match(coordinates: FloatArray, moving: Surface, opposite: Surface) -> _Match:
-    found = closest_points(coordinates[moving.nodes], opposite, coordinates)
+def _match(coordinates: FloatArray, moving: Surface, opposite: Surface, there: FloatArray) -> _Match:
+    """Closest points. there (n_nodes, 3): coordinates in the sector of the opposite surface, m."""
+    found = closest_points(coordinates[moving.nodes], opposite, there)
     area, normals = moving.areas_and_normals(coordinates)
     point, corner = np.nonzero(found.weights)
     entries = (found.weights[point, corner], (point, found.nodes[point, corner]))
     weights = sparse.csr_matrix(entries, shape=(len(moving.nodes), len(coordinates)))
     facing, depth = np.zeros_like(coordinates), np.zeros(len(coordinates))
-    facing[opposite.nodes] = opposite.areas_and_normals(coordinates)[1]
+    facing[opposite.nodes] = opposite.areas_and_normals(there)[1]
     depth[opposite.nodes] = opposite.depth
-    offset = weights @ coordinates - coordinates[moving.nodes]
+    offset = weights @ there - coordinates[moving.nodes]
     return _Match(
         moving=moving,
         opposite=opposite,
@@ -203,8 +223,9 @@ def _match(coordinates: FloatArray, moving: Surface, opposite: Surface) -> _Matc
     )
 
 
-def _check_match(match: _Match, numbers: IntArray, facet: float) -> None:
+def _check_match(match: _Match, numbers: IntArray, facet: float, sector: int) -> None:
     """Raises SceneError where no tolerance makes pairs of these nodes. facet: size of the larger facets, m."""
+    turned = " after a turn by one sector" if sector else ""
     names, n = (match.moving.name, match.opposite.name), len(match.apart)
     if (match.facing > 0.0).all():
         raise SceneError("contact", f"{names[0]} and {names[1]} face the same way", "give faces that touch")
@@ -215,15 +236,15 @@ def _check_match(match: _Match, numbers: IntArray, facet: float) -> None:
             "contact",
             f"between {names[0]} and {names[1]} there is material: at {inside.sum()} of {n} nodes {names[1]} is up to"
             f" {-match.distance[deepest]:.3g} m below {names[0]}, whose elements are {match.depth[deepest]:.3g} m deep",
-            "give two surfaces that face each other in the same sector",
+            "give two surfaces that face each other in the same sector, or name them in next_sector",
         )
     away = match.apart > facet
     if away.any():
         raise SceneError(
             "contact",
             f"{away.sum()} of {n} nodes of {names[0]} are farther from {names[1]} than a facet ({facet:.3g} m);"
-            f" the farthest is at {match.apart.max():.3g} m",
-            "give surfaces that touch, one of which covers the other: a larger tolerance is no remedy",
+            f" the farthest is at {match.apart.max():.3g} m{turned}",
+            f"give surfaces that touch{turned}, one of which covers the other: a larger tolerance is no remedy",
         )
     aside = np.flatnonzero(match.facing > 0.0)
     if len(aside):
@@ -239,8 +260,22 @@ def _gaps(contact: ContactSurfaces, distance: FloatArray) -> FloatArray:
     return distance if contact.with_gaps else np.zeros_like(distance)
 
 
+def _matched(coordinates: FloatArray, contact: ContactSurfaces, axis: CyclicAxis | None) -> _Match:
+    """The first surface of a contact, which moves, and the second one where its sector has it."""
+    if contact.sector == 0:
+        return _match(coordinates, contact.first, contact.second, coordinates)
+    if axis is None:
+        raise ValueError("a contact between sectors needs the axis of the cyclic structure")
+    return _match(coordinates, contact.first, contact.second, axis.turned(coordinates, contact.sector))
+
+
 def _pair(
-    coordinates: FloatArray, numbers: IntArray, contact: ContactSurfaces, place: int, along: FloatArray
+    coordinates: FloatArray,
+    numbers: IntArray,
+    contact: ContactSurfaces,
+    place: int,
+    along: FloatArray,
+    axis: CyclicAxis | None,
 ) -> ContactPairs:
     first, second = contact.first, contact.second
     shared = np.intersect1d(first.nodes, second.nodes)
@@ -251,28 +286,30 @@ def _pair(
             "give the two bodies nodes of their own where they touch",
         )
     sizes = first.facet_size(coordinates), second.facet_size(coordinates)
-    moving, opposite = (second, first) if sizes[1] < (1.0 - 1e-6) * sizes[0] else (first, second)
+    if sizes[1] < (1.0 - 1e-6) * sizes[0]:
+        contact = contact.turned_round
     tolerance = _TOLERANCE * max(sizes) if contact.tolerance is None else contact.tolerance
-    match = _match(coordinates, moving, opposite)
+    match = _matched(coordinates, contact, axis)
     far = match.apart > tolerance
     if far.any():
         # a coarse surface may lie inside a finer one that goes on
-        other = _match(coordinates, opposite, moving)
+        other = _matched(coordinates, contact.turned_round, axis)
         if (other.apart > tolerance).any():
-            _check_match(match, numbers, max(sizes))
+            _check_match(match, numbers, max(sizes), contact.sector)
             raise SceneError(
                 "contact",
-                f"{np.count_nonzero(far)} of {len(far)} nodes of {moving.name} are farther than {tolerance:g} m"
-                f" from {opposite.name}",
+                f"{np.count_nonzero(far)} of {len(far)} nodes of {match.moving.name} are farther than {tolerance:g} m"
+                f" from {match.opposite.name}",
                 f"give a larger tolerance (the farthest is at {match.apart.max():.3g} m), or surfaces of which one"
                 " covers the other",
             )
-        match = other
-    _check_match(match, numbers, max(sizes))
+        match, contact = other, contact.turned_round
+    _check_match(match, numbers, max(sizes), contact.sector)
     nodes, n = match.moving.nodes, len(match.area)
     return ContactPairs(
         moving=nodes,
         opposite=match.weights,
+        sector=np.full(n, contact.sector),
         frames=local_frames(match.normals, along),
         present=np.ones((n, 3), dtype=np.bool_),
         area=match.area,
