@@ -45,7 +45,7 @@ class Parameters(BaseModel):
     nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites the blades, -")
     loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")
     interference: float = Field(
-        10e-6, ge=0, description="overlap of neighbouring shrouds before they are put together, m"
+        5e-4, ge=0, description="overlap of neighbouring shrouds before they are put together, m"
     )
     mesh: int = Field(1, ge=1, le=8, description="mesh density m: a shroud has 4 m axial x (m + 1) contact pairs, -")
     stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")
