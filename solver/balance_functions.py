@@ -151,6 +151,6 @@ def balance_at_start(
     n_contact, state = case.model.contact.n_contact, start.state
     joint = case.joint(omega, excitation_amplitude)
     if state is None:
-        return Balance.frozen(joint, np.zeros((n_contact, 2)), np.zeros(n_contact)), None
-    balance = Balance.frozen(joint, state.start_history, state.wear_depth)
+        return Balance(joint, np.zeros((n_contact, 2)), np.zeros(n_contact)), None
+    balance = Balance(joint, state.start_history, state.wear_depth)
     return balance, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))

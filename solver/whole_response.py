@@ -130,7 +130,7 @@ def response_curve(
 
     def balance_at(value: float, history: FloatArray) -> Balance:
         joint = case.joint(value, load) if over_frequency else case.joint(float(omegas[0]), value)
-        return Balance.frozen(joint, history, balance.wear_depth)
+        return Balance(joint, history, balance.wear_depth)
 
     if at is None or not start.outcome.complete:
         return _reported(case, Branch((), ()), balance_at, over_frequency, errors, (start.outcome, start.message))

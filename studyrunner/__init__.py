@@ -9,7 +9,7 @@ For use in Python, from this package itself:
 
 The rooms, in the way of a study: `study` (its file, checked), `scene` (its reduced model), `plan` (tasks, and what they
 are known by), `mpi` (ranks, and which of them does which task), `checkpoint` (the file of what is finished),
-`summary` (the last lines of a run), `netcdf` (the result file), `report` (figures and page from result files), `system`
+`summary` (the last lines of a run), `result` (the result file), `report` (figures and page from result files), `system`
 (files, signals, streams, progress). On top: `api`, `cli`, `run`, `task_progress`, `evaluate`, `accessor`. On the
 ground: `variables`, `user_error`.
 """

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.grid import find_grid
+from studyrunner.result.grid import find_grid
 from studyrunner.statistics.study_statistics import worn_volume_statistics
 from studyrunner.study.toml_text import read_toml
 from studyrunner.summary.answer import Summary, summary

@@ -11,10 +11,10 @@ from threadpoolctl import threadpool_limits
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
 from studyrunner.mpi.launcher import launcher_size
 from studyrunner.mpi.ranks import Alone
-from studyrunner.netcdf.creation_date import check_date
-from studyrunner.netcdf.existing_result import Target, check_result
-from studyrunner.netcdf.output import check_output
-from studyrunner.report.reading.opening import open_result
+from studyrunner.result.creation_date import check_date
+from studyrunner.result.existing_result import Target, check_result
+from studyrunner.result.opening import open_result
+from studyrunner.result.paths import check_output
 from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
 from studyrunner.scene_building import build_scenes
 from studyrunner.study.study import Study

@@ -198,7 +198,7 @@ def _show_plan(study: Study) -> int:
 
 
 def _check(study: Study) -> int:
-    from studyrunner.netcdf.output import check_output
+    from studyrunner.result.paths import check_output
     from studyrunner.scene.check_command import check_study_model
 
     picture = Path(f"{study.study.name}.check.png")
@@ -209,8 +209,8 @@ def _check(study: Study) -> int:
 
 
 def _write_scene(study: Study, path: Path) -> int:
-    from studyrunner.netcdf.existing_result import check_scene_file
-    from studyrunner.netcdf.output import check_output
+    from studyrunner.result.existing_result import check_scene_file
+    from studyrunner.result.paths import check_output
     from studyrunner.scene.scene import write_study_scene
 
     target = check_output("--write-scene", path, study.files)
@@ -221,9 +221,9 @@ def _write_scene(study: Study, path: Path) -> int:
 
 
 def _compute(ranks: Ranks, study: Study, options: Options) -> int:
-    from studyrunner.netcdf.existing_result import check_result
-    from studyrunner.netcdf.output import check_output
-    from studyrunner.netcdf.provenance import compare_with_archived
+    from studyrunner.result.existing_result import check_result
+    from studyrunner.result.paths import check_output
+    from studyrunner.result.provenance import compare_with_archived
     from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
     from studyrunner.scene.scene_set import merge_facts
     from studyrunner.scene_building import build_scenes
@@ -259,7 +259,7 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
 def _answer(study: Study, path: Path) -> tuple[str, ...]:
     """What came out, in lines, read from the result."""
     # where they are used: they take a second to load
-    from studyrunner.report.reading.opening import open_result
+    from studyrunner.result.opening import open_result
     from studyrunner.study.room_for_wear import describe_room
     from studyrunner.summary.answer import summary
     from studyrunner.summary.lines import summary_lines

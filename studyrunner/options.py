@@ -9,7 +9,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import NoReturn
 
-from studyrunner.netcdf.creation_date import NOW, check_date
+from studyrunner.result.creation_date import NOW, check_date
 from studyrunner.user_error import UserError
 
 _DESCRIPTION = """\

@@ -16,17 +16,17 @@ from studyrunner.checkpoint.store import Store
 from studyrunner.coordinates import STUCK_FREQUENCY
 from studyrunner.mpi.ranks import Ranks, wait_for_message
 from studyrunner.mpi.schedule import work_on_tasks
-from studyrunner.netcdf.attributes import SmallArray, coordinates, scene_arrays
-from studyrunner.netcdf.creation_date import describe_date
-from studyrunner.netcdf.existing_result import Label, Target
-from studyrunner.netcdf.output import older_folder, progress_file, remove_leftovers
-from studyrunner.netcdf.provenance import PACKAGES, describe_run
-from studyrunner.netcdf.sample_coordinates import sample_coordinates, worn_coordinate
-from studyrunner.netcdf.software import describe_software
 from studyrunner.plan.identity import Identities, hash_of_kind
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.plausibility import doubts_of_study
 from studyrunner.plan.tasks import TaskPlan
+from studyrunner.result.arrays import SmallArray, coordinates, scene_arrays
+from studyrunner.result.creation_date import describe_date
+from studyrunner.result.existing_result import Label, Target
+from studyrunner.result.paths import older_folder, progress_file, remove_leftovers
+from studyrunner.result.provenance import PACKAGES, describe_run
+from studyrunner.result.sample_coordinates import sample_coordinates, worn_coordinate
+from studyrunner.result.software import describe_software
 from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.model_remarks import remarks_of_study
 from studyrunner.scene.scene import SceneFacts
@@ -107,7 +107,7 @@ class _ResultWriter:
     def write(self, completion: CompletionIndex, n_found: int) -> RunSummary:
         """Writes the file. n_found: number of points that an earlier run has left."""
         # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
-        from studyrunner.netcdf.write import write_result
+        from studyrunner.result.write import write_result
 
         completion.store.flush()
         kept = self.scenes.kept

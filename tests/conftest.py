@@ -4,7 +4,6 @@ as on every rank: processes that share cores wait for the threads of each other.
 
 import os
 
-import pytest
 from hypothesis import HealthCheck, settings
 
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -21,14 +20,3 @@ settings.load_profile("tests")
 def pytest_xdist_auto_num_workers():
     """Of `-n auto`: one more than cores, as tests that start runs wait about as long as they compute."""
     return None if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else len(os.sched_getaffinity(0)) + 1
-
-
-_WITH_OTHERS = ("mpi", "processes", "browser")
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items):
-    """What waits for other processes is tried once more when it fails; the summary names what was (R)."""
-    for item in items:
-        if any(item.get_closest_marker(name) for name in _WITH_OTHERS):
-            item.add_marker(pytest.mark.flaky(reruns=1))

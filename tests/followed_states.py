@@ -91,7 +91,7 @@ def responses_around(work: WearingJoint, state: WearState, width: float, n: int)
         while place + step <= width * (1.0 + 1e-9):
             frequency = state.omega / (2.0 * np.pi) + sign * (place + step)
             joint = work.joint(state.resolution, state.hold, 2.0 * np.pi * frequency)
-            balance = Balance.frozen(joint, history, state.depth)
+            balance = Balance(joint, history, state.depth)
             end = Run(work.case.settings.tolerance).solve(balance, predicted)
             if not end.converged:
                 step *= 0.5

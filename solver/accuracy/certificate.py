@@ -44,8 +44,8 @@ from solver.accuracy.options import ACCURACY
 from solver.contact.coulomb import friction_limit
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray
-from solver.options import COMMON
 from solver.packing import packable
+from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Joint
 
@@ -78,7 +78,7 @@ class Certificate:
     def failures(self, tolerance: float) -> dict[str, tuple[float, float]]:
         """Value and limit of each violation above its limit; NaN counts as such. tolerance: of the scaled residual."""
         # twice the tolerance: a state evaluated again from its harmonics has lost some digits to round-off
-        limits = {"residual": 2.0 * max(tolerance, COMMON.round_off)} | ACCURACY.violation_limits
+        limits = {"residual": 2.0 * max(tolerance, ROUND_OFF)} | ACCURACY.violation_limits
         return {
             name: (getattr(self, name), limit) for name, limit in limits.items() if not getattr(self, name) <= limit
         }
@@ -186,7 +186,7 @@ def _penetration(joint: Joint, evaluation: Evaluation) -> float:
     moved = np.linalg.norm(_series(joint, _vibrating(evaluation.displacement_h)), axis=1)
     flexed = _flexed(joint, evaluation.force_h)
     elastic = np.linalg.norm(_series(joint, _vibrating(flexed)), axis=1)
-    still = COMMON.negligible * np.abs(flexed[..., 0])  # as in `_amplitude`
+    still = NEGLIGIBLE * np.abs(flexed[..., 0])  # as in `_amplitude`
     size = max(float(part.max(initial=0.0)) for part in (moved, elastic, still))
     return _relative(float(depth.max(initial=0.0)), size)
 
@@ -199,7 +199,7 @@ def _work(joint: Joint, force: FloatArray, motion: FloatArray) -> float:
 
 def _amplitude(values_h: FloatArray) -> FloatArray:
     """Size (...) of the vibration in a series (..., m), at least a small fraction of its mean."""
-    round_off = COMMON.negligible * np.abs(values_h[..., 0])
+    round_off = NEGLIGIBLE * np.abs(values_h[..., 0])
     return np.asarray(np.maximum(np.linalg.norm(values_h[..., 1:], axis=-1), round_off))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import FloatArray, IntArray
-from solver.options import COMMON
+from solver.settings import NEGLIGIBLE, ROUND_OFF
 
 
 def nothing_happens(evaluation: Evaluation) -> bool:
@@ -16,7 +16,7 @@ def nothing_happens(evaluation: Evaluation) -> bool:
     A pair that reaches its friction limit without slip counts as stuck.
     """
     separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
-    rests = np.ptp(state_t, axis=2) <= COMMON.round_off * np.abs(state_t).max(axis=2)
+    rests = np.ptp(state_t, axis=2) <= ROUND_OFF * np.abs(state_t).max(axis=2)
     still = rests.all(axis=1) & ~separated.any(axis=1)
     sticks = (evaluation.status_t == STICK).all(axis=1)
     return bool((sticks | still | separated.all(axis=1)).all())
@@ -24,7 +24,7 @@ def nothing_happens(evaluation: Evaluation) -> bool:
 
 def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
     """Whether a state has odd harmonics only although its contact forces have even ones: its symmetry is lost."""
-    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, COMMON.negligible)
+    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, NEGLIGIBLE)
 
 
 def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:

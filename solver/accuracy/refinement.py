@@ -25,7 +25,7 @@ from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
 from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.state import State
-from solver.newton.options import NEWTON
+from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, SMALL_JOINT
 from solver.newton.run import Run
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import Case, Joint
@@ -154,7 +154,7 @@ class _Search:
         """Error by missing harmonics, and the state with more harmonics that gave it."""
         error, richer = here.harmonics_error(self.run, known)
         above = shifted(here.case.resolution, 1)
-        cheap = here.unknowns(above) <= NEWTON.dear_unknowns and self._allowed(here, above)
+        cheap = here.unknowns(above) <= EXPENSIVE_UNKNOWNS and self._allowed(here, above)
         if richer is None and self.settings.harmonics == "auto" and cheap:
             # impacts: Newton's method diverges from a warm start with more harmonics, although the state exists
             richer = here.by_homotopy(above, self.run)
@@ -202,13 +202,13 @@ class _Search:
         room = ACCURACY.samples_of_unknowns * room_for(self.most, n_rel)
         if here.unknowns(resolution) * resolution.samples > room:
             return False
-        small = n_rel <= NEWTON.small_joint_displacements
+        small = n_rel <= SMALL_JOINT
         most = room_for(min(self.most, ACCURACY.node_unknowns) if small else self.most, n_rel)
         if resolution.highest > ACCURACY.most_mixed_harmonics:
             # more harmonics for friction without impacts only, whose harmonics are odd
             if not all(order % 2 for order in resolution.orders):
                 return False
-            most = min(most, NEWTON.dear_unknowns)
+            most = min(most, EXPENSIVE_UNKNOWNS)
         # the two highest resolutions serve for a comparison only
         in_levels = resolution.highest <= ACCURACY.harmonic_levels[-3]
         return resolution.samples <= ACCURACY.most_samples and in_levels and here.unknowns(resolution) <= most

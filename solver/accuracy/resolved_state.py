@@ -22,10 +22,9 @@ from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.harmonic_balance.state import State
 from solver.model import ComplexArray, FloatArray
-from solver.newton.options import NEWTON
+from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS
 from solver.newton.run import Run
-from solver.options import COMMON
-from solver.settings import FINE_SAMPLES, Resolution, all_orders
+from solver.settings import FINE_SAMPLES, NEGLIGIBLE, ROUND_OFF, Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
@@ -116,7 +115,7 @@ class ResolvedState:
         """The state solved with odd harmonics only; None where it needs even harmonics or holds none already."""
         orders = self.case.resolution.orders
         odd = tuple(order for order in orders if order % 2)
-        if odd == orders or not half_wave_symmetric(self.point.evaluation, COMMON.round_off):
+        if odd == orders or not half_wave_symmetric(self.point.evaluation, ROUND_OFF):
             return None
         return self.solve_at(Resolution(odd, self.case.resolution.samples), run)
 
@@ -153,7 +152,7 @@ class ResolvedState:
           as large.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
-        few = self.unknowns(self.case.resolution) <= NEWTON.dear_unknowns
+        few = self.unknowns(self.case.resolution) <= EXPENSIVE_UNKNOWNS
         finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), run)
         if finer is not None:
             safety = ACCURACY.triple_samples_safety if few else ACCURACY.two_levels_safety
@@ -255,7 +254,7 @@ class ResolvedState:
         structure = self.joint.structure
         moved = structure.harmonic_force / self.joint.relative_penalty
         response = np.abs(structure.dynamic_response[0]) @ np.abs(moved) + np.abs(structure.harmonic_offset)
-        return max(COMMON.negligible * float(np.linalg.norm(response)), 1e-300)
+        return max(NEGLIGIBLE * float(np.linalg.norm(response)), 1e-300)
 
     def holds(self) -> bool:
         """Whether all violations of the certificate are below their limits."""

@@ -21,7 +21,7 @@ from solver.contact.period_march import MOST_PERIODS, integrate_slip_work, march
 from solver.contact.rigid_slider import Masses, march_masses
 from solver.contact.tangent import march_tangent, mass_tangent
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
-from solver.options import COMMON
+from solver.settings import ROUND_OFF
 
 if TYPE_CHECKING:
     from solver.structure.fourier import FourierBasis
@@ -126,7 +126,7 @@ class ContactLaw:
         friction, stiffness = self.friction_coefficient, self.penalty.tangential[pairs]
         limit = friction_limit(friction, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
         # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
-        periodicity = 0.1 * COMMON.round_off * float(limit.max(initial=0.0))
+        periodicity = 0.1 * ROUND_OFF * float(limit.max(initial=0.0))
         start = history[pairs] * stiffness[:, None]
         force_t, state_t, status_t, periods, error = march_period(
             predicted_t[pairs], friction[pairs], start, periodicity, MOST_PERIODS
@@ -264,7 +264,7 @@ class ContactLaw:
         if moving.any():
             first, last = first[moving], last[moving]
             friction, stiffness = self.friction_coefficient[moving], self.penalty.tangential[moving, None]
-            periodicity = COMMON.round_off * float(friction_limit(friction, last[:, 0].max(axis=1)).max())
+            periodicity = ROUND_OFF * float(friction_limit(friction, last[:, 0].max(axis=1)).max())
             state = history[moving] * stiffness
             for part in parts:
                 between = first + part * (last - first)

@@ -15,14 +15,14 @@ from numba import njit
 from solver.contact import archard
 from solver.contact.coulomb import STICK, advance_monodromy, contact_sample
 from solver.model import FloatArray, IntArray
-from solver.options import COMMON
+from solver.settings import ROUND_OFF
 
 MOST_PERIODS = 400
 """Largest number of periods; then a state that is not periodic is accepted. Pairs with a turning slip direction need up
 to about 20 with Newton's method and above 40 without (`tests/solver/test_kernels.py`)."""
 
 PLAIN_PERIODS = 4  # periods before Newton's method is used on the periodicity; most pairs repeat within two
-SMALLEST_DETERMINANT = COMMON.round_off  # of 1 - monodromy: below it a part of the state does not fade
+SMALLEST_DETERMINANT = ROUND_OFF  # of 1 - monodromy: below it a part of the state does not fade
 
 slip_work_rate = njit()(archard.slip_work_rate)
 slip_work_slopes = njit()(archard.slip_work_slopes)

@@ -151,7 +151,7 @@ class WearingWork:
         return float(by_work @ slip_work) / worn if worn > 0.0 else 1.0
 
     def growth(
-        self, gain: FloatArray, slip_work: FloatArray, normal_force: FloatArray, before: FloatArray
+        self, gain: FloatArray | float, slip_work: FloatArray, normal_force: FloatArray, before: FloatArray
     ) -> FloatArray:
         """Growth of the depth (n_contact,), m, in a step: the least root y of `y = gain X(S, p, before + y)`.
 
@@ -182,7 +182,7 @@ class WearingWork:
 
     def growth_tangent(
         self,
-        gain: FloatArray,
+        gain: FloatArray | float,
         at: tuple[FloatArray, FloatArray, FloatArray],
         slip_work_tangent: FloatArray,
         normal_force_tangent: FloatArray,

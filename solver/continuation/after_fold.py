@@ -51,7 +51,7 @@ def states_after_fold(case: Case, joint: Joint, last: State, worn: FloatArray, r
     before = last.evaluation.wear_depth
 
     def balance_at(omega: float, history: FloatArray) -> Balance:
-        return Balance.frozen(case.joint(omega, joint.excitation_amplitude), history, before)
+        return Balance(case.joint(omega, joint.excitation_amplitude), history, before)
 
     def accepted(state: State) -> bool:
         return is_stable(balance_at(state.parameter, state.history), state.evaluation, run)

@@ -17,7 +17,7 @@ from solver.harmonic_balance.state import BalanceAt, State, vibration_change
 from solver.model import FloatArray
 from solver.newton.bordering import Bordered
 from solver.newton.run import Run
-from solver.options import COMMON
+from solver.settings import DIFFERENCE, NEGLIGIBLE
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class Arc:
 
         A finite difference is enough: the slope only gives directions to the corrector, whose residual is exact.
         """
-        step = COMMON.difference
+        step = DIFFERENCE
         ahead = self.balance_at(parameter + step * self.span, self.start.history).evaluate(evaluation.predicted_h)
         return (ahead.residual - evaluation.residual) / step
 
@@ -252,7 +252,7 @@ class Arc:
             if (found.parameter - best.parameter) * sign > 0.0:
                 best = found
             # the parameter is off by the square of the part
-            if part**2 < COMMON.negligible:
+            if part**2 < NEGLIGIBLE:
                 break
             if part * at_low > 0.0:
                 low, at_low, at_high = place, part, 0.5 * at_high

@@ -56,7 +56,7 @@ def solve_first_state(
         return static
 
     def balance_at(load_factor: float, history: FloatArray) -> Balance:
-        return Balance.frozen(case.joint(omega, load_factor * excitation_amplitude), history, wear_depth)
+        return Balance(case.joint(omega, load_factor * excitation_amplitude), history, wear_depth)
 
     why, unstable = Outcome.START_FAILED, False
     for found in _ways(case, quiet, static, balance_at, run):
@@ -87,7 +87,7 @@ def _ways(
     if slid is not None:
         yield slid
     for fraction in CONTINUATION.relief:
-        relieved = Balance.frozen(quiet, relieved_history(quiet, static, fraction), wear_depth)
+        relieved = Balance(quiet, relieved_history(quiet, static, fraction), wear_depth)
         held = run.state(relieved, start, 0.0)
         if held is not None:
             loaded, reached_load = follow_naturally(balance_at, held, 1.0, run)

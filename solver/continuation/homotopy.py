@@ -75,7 +75,7 @@ def start_with_tail(old: Case, joint: Joint, evaluation: Evaluation) -> tuple[Ba
     joint : Joint
         The joint with all harmonics.
     """
-    balance = Balance.frozen(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
+    balance = Balance(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
     orders, known = joint.basis.orders, old.resolution.orders
     force = joint.to_relative(evaluation.force_t @ build_basis(orders, evaluation.force_t.shape[2]).analysis)
     motion_h, force_h = (
@@ -129,4 +129,4 @@ class HarmonicHomotopy:
             mixed[self.new] = np.linalg.inv((1.0 - parameter) * self.penalty_compliance + parameter * self.compliance)
             structure = replace(structure, moving=DenseStiffness(mixed))
         joint = replace(self.joint, structure=structure)
-        return Balance.frozen(joint, self.history, self.wear_depth)
+        return Balance(joint, self.history, self.wear_depth)

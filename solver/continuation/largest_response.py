@@ -23,9 +23,9 @@ from solver.continuation.phase_lag import (
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.newton.bordering import Bordered
-from solver.newton.options import NEWTON
+from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
-from solver.options import COMMON
+from solver.settings import NEGLIGIBLE
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case
 
@@ -55,7 +55,7 @@ def solve_at_peak(
         # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
         slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
         largest = CONTINUATION.largest_lag_step
-        step = float(np.clip(-rise / min(slope, -COMMON.negligible), -largest, largest))
+        step = float(np.clip(-rise / min(slope, -NEGLIGIBLE), -largest, largest))
         before = lag, rise
         lag = lag + step if below < lag + step < above else 0.5 * (below + above)
         balance, start = found.balance, found.at.predicted_h
@@ -80,9 +80,9 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
         Of the lag.
     """
     joint, at = state.balance.joint, state.at
-    held = Balance.frozen(joint, at.history, at.wear_depth)
+    held = Balance(joint, at.history, at.wear_depth)
     by_frequency = frequency_derivative(held, at)
-    step = run.step(held, at, -by_frequency.residual, min(NEWTON.forcing, 0.1 * accuracy))
+    step = run.step(held, at, -by_frequency.residual, min(FORCING, 0.1 * accuracy))
     moved = held.linearise(at).transmit(step)[0]
     response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
     rise = (by_frequency.response + first_response(joint, moved)) / response

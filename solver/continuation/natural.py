@@ -13,7 +13,7 @@ from solver.contact.coulomb import STICK
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import BalanceAt, State, final_history, vibration_change
-from solver.newton.options import NEWTON
+from solver.newton.iteration import MOST_ITERATIONS, SHORTEST_STEP
 from solver.newton.run import Run
 
 
@@ -47,7 +47,7 @@ def follow_naturally(
         Step length, in the unit of the parameter. A longer step is accepted only if the vibration changes little over
         the step: where each step leaves a history to the next step, the state at the target depends on the steps.
     shortest : float, optional
-        Shortest step as a fraction of the range; by default `NEWTON.shortest_step`, or a quarter of `fine`
+        Shortest step as a fraction of the range; by default `SHORTEST_STEP`, or a quarter of `fine`
         if that is shorter.
 
     Returns
@@ -59,7 +59,7 @@ def follow_naturally(
     """
     state = start
     whole = target - start.parameter
-    shortest = NEWTON.shortest_step if shortest is None else shortest
+    shortest = SHORTEST_STEP if shortest is None else shortest
     if np.isfinite(fine) and whole != 0.0:
         shortest = min(shortest, 0.25 * fine / abs(whole))
     # fractions of two: sums of them are exact, so that the last step ends at the target
@@ -68,7 +68,7 @@ def follow_naturally(
         ahead = min(done + fraction, 1.0)
         reach = target if ahead == 1.0 else start.parameter + ahead * whole
         balance = balance_at(reach, state.history)
-        most = NEWTON.iterations if fraction <= 2.0 * shortest else CONTINUATION.near_iterations
+        most = MOST_ITERATIONS if fraction <= 2.0 * shortest else CONTINUATION.near_iterations
         result = run.solve(balance, state.evaluation.predicted_h, most)
         smooth = abs(reach - state.parameter) <= fine or _is_smooth(state.evaluation, result.evaluation)
         if result.converged and smooth:

@@ -23,7 +23,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.model import ComplexArray, FloatArray
 from solver.newton.bordering import Bordered
 from solver.newton.run import Run
-from solver.options import COMMON
+from solver.settings import DIFFERENCE
 from solver.structure.fourier import to_complex
 from solver.structure.frequency_slope import frequency_slope
 from solver.structure.joint import Case, Joint
@@ -110,7 +110,7 @@ def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencyDerivativ
     residual, product, response = slope.force, slope.product, complex(slope.response[0])
     if joint.law.rate_dependent:
         # longer than usual: the round-off of the static forces is small against the change of all others
-        length = 10.0 * COMMON.difference * joint.omega
+        length = 10.0 * DIFFERENCE * joint.omega
         ahead = replace(balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
         motion = (ahead.displacement_h - at.displacement_h) / length
         residual = residual + (ahead.residual - at.residual) / length

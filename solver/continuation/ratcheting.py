@@ -81,4 +81,4 @@ class _MeanShift:
 
     def at(self, parameter: float, _: FloatArray) -> Balance:
         """Balance at a homotopy parameter from 0 to 1, the fraction of the shift."""
-        return Balance.frozen(self.joint, self.history + parameter * self.shift, self.wear_depth)
+        return Balance(self.joint, self.history + parameter * self.shift, self.wear_depth)

@@ -25,8 +25,8 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State
 from solver.model import FloatArray
 from solver.newton.run import Run
-from solver.options import COMMON
 from solver.outcome import Outcome
+from solver.settings import NEGLIGIBLE
 from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, Joint, static_joint, viscous_joint
 
@@ -54,10 +54,10 @@ def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State 
     """
     run, n_steps = run.fresh(), CONTINUATION.load_steps
     unmoved = np.zeros((joint.contact.n_contact, 3, 1))
-    rest = Balance.frozen(static_joint(joint, 0.0), unmoved[:, 1:, 0], wear_depth)
+    rest = Balance(static_joint(joint, 0.0), unmoved[:, 1:, 0], wear_depth)
     state = State(rest.evaluate(rest.predict(unmoved, unmoved)), rest.history, 0.0)
     for step in range(1, n_steps + 1):
-        balance = Balance.frozen(static_joint(joint, step / n_steps), state.history, wear_depth)
+        balance = Balance(static_joint(joint, step / n_steps), state.history, wear_depth)
         before = state.evaluation.predicted_h
         start = balance.joint.structure.force_h() if step == 1 else before * (step / (step - 1.0))
         found = run.state(balance, start)
@@ -82,7 +82,7 @@ def predicted_at_rest(case: Case, quiet: Joint, static: State, wear_depth: Float
         change_orders(part, (), case.resolution.orders)
         for part in (static.evaluation.displacement_h, static.evaluation.force_h)
     )
-    return Balance.frozen(quiet, static.history, wear_depth).predict(displacement_h, force_h)
+    return Balance(quiet, static.history, wear_depth).predict(displacement_h, force_h)
 
 
 def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Outcome:
@@ -104,7 +104,7 @@ def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Outcome:
             # the first step is about as long as the load deforms the joint
             far = max(far, CONTINUATION.runaway * float(np.abs(before.displacement_h - begun).max()))
         moved = before.displacement_h - begun
-        if viscosity < COMMON.negligible and np.abs(moved).max() > far:
+        if viscosity < NEGLIGIBLE and np.abs(moved).max() > far:
             break
         viscosity *= CONTINUATION.viscosity_cut
     return _unheld(moved) if np.abs(moved).max() > far else Outcome.STATIC_FAILED

@@ -32,10 +32,10 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, final_history
 from solver.model import ComplexArray, FloatArray, LinearModel, Matrix
-from solver.newton.options import NEWTON
+from solver.newton.iteration import SHORTEST_STEP
 from solver.newton.run import Run
-from solver.options import COMMON
 from solver.outcome import Outcome
+from solver.settings import ROUND_OFF
 from solver.stability.hill import is_stable
 from solver.structure.condensation import CondensedStructure, condense, relative_indices, whole_motion
 from solver.structure.fourier import from_complex, to_complex
@@ -183,14 +183,14 @@ def relax_to_periodic(
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
     predicted, period = start.predicted_h, 2.0 * np.pi / joint.omega
     # the longest step, in periods, is practically infinite: the step is the harmonic balance itself
-    length, longest, tried = 1.0, 1.0 / COMMON.round_off, np.inf
+    length, longest, tried = 1.0, 1.0 / ROUND_OFF, np.inf
     size = float(np.abs(start.displacement_h).max())
     left = CONTINUATION.search_iterations
     # whether an unstable state has been found, which the motion leaves
     grows = False
-    while left > 0 and length >= NEWTON.shortest_step and not run.budget.exhausted:
+    while left > 0 and length >= SHORTEST_STEP and not run.budget.exhausted:
         inverse = 1.0 / (length * period)
-        balance = Balance.frozen(transient.step(motion, inverse), history, wear_depth)
+        balance = Balance(transient.step(motion, inverse), history, wear_depth)
         result = run.solve(balance, predicted, CONTINUATION.near_iterations)
         left -= max(result.iterations, 1)
         ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
@@ -214,7 +214,7 @@ def relax_to_periodic(
         if change < CONTINUATION.relaxed_change and renewed:
             tried = change
             begun = run.budget.iterations
-            balance = Balance.frozen(joint, history, wear_depth)
+            balance = Balance(joint, history, wear_depth)
             # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
             found = run.state(balance, predicted)
             left -= run.budget.iterations - begun

@@ -25,8 +25,8 @@ from numba import njit
 from solver.contact.law import Marched
 from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
 from solver.model import BoolArray, FloatArray, IntArray
-from solver.options import COMMON
 from solver.packing import packable
+from solver.settings import NEGLIGIBLE
 from solver.structure.joint import Joint
 from solver.structure.rough_forms import SingleArray
 
@@ -42,20 +42,15 @@ class Balance:
     - joint: the joint.
     - history (n_contact, 2): corrected slip X_T at the start of the period, m.
     - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6).
-    - wear_gain (n_contact,): `archard.wear_gain` of the step, m/J; zero where W does not grow with the motion.
+    - wear_gain (n_contact,): `archard.wear_gain` of the step, m/J; 0 where W is given.
     - wearing: wearing work of the wear law.
     """
 
     joint: Joint
     history: FloatArray
     wear_depth: FloatArray
-    wear_gain: FloatArray
+    wear_gain: FloatArray | float = 0.0
     wearing: WearingWork = ARCHARDS_WORK
-
-    @classmethod
-    def frozen(cls, joint: Joint, history: FloatArray, wear_depth: FloatArray) -> Balance:
-        """Balance at a fixed wear depth, which does not depend on the motion."""
-        return cls(joint, history, wear_depth, np.zeros_like(wear_depth))
 
     def predict(self, displacement_h: FloatArray, force_h: FloatArray) -> FloatArray:
         """Predicted force (n_rel, m), N, Eq. (10), of a motion, m, and a contact force, N, both (n_contact, 3, m)."""
@@ -142,7 +137,7 @@ def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tup
     if static == 0.0:
         return 1.0, 1.0
     # a smaller vibration is lost in the round-off of the static force
-    return static, max(moving, COMMON.negligible * static)
+    return static, max(moving, NEGLIGIBLE * static)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from solver.structure.joint import Case, Joint
 
 def transfer(old: Case, joint: Joint, evaluation: Evaluation) -> tuple[Balance, FloatArray]:
     """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old`."""
-    balance = Balance.frozen(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
+    balance = Balance(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
     motion_h, force_h = (
         change_orders(part, old.resolution.orders, joint.basis.orders)
         for part in (evaluation.displacement_h, evaluation.force_h)

@@ -20,7 +20,7 @@ from solver.loading_history.path_of_states import Step
 from solver.loading_history.sweep import Sweep, SweepState
 from solver.loading_history.sweep_start import Direction, Origin, find_origin
 from solver.model import FloatArray, ReducedModel
-from solver.newton.options import NEWTON
+from solver.newton.linear_solver import SMALL_JOINT
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import packable
@@ -168,7 +168,7 @@ class FrequencySweep:
             if refined is None:
                 refined = refine(case, omega, self.excitation_amplitude, reached.state, run)
             # with impacts a small joint has many other states
-            small = case.joint(omega, 0.0).component_index.size <= NEWTON.small_joint_displacements
+            small = case.joint(omega, 0.0).component_index.size <= SMALL_JOINT
             if not refined.accurate and small:
                 refined = self._restarted_from_static(omega) or refined
         except np.linalg.LinAlgError:

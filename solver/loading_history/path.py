@@ -22,7 +22,7 @@ from solver.loading_history.node_resolution import choose_resolution, resolution
 from solver.loading_history.options import LOADING
 from solver.loading_history.path_of_states import Step
 from solver.model import FloatArray
-from solver.newton.options import NEWTON
+from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution
@@ -52,7 +52,7 @@ class LoadingPath:
 
     def balance_at(self, parameter: float, history: FloatArray) -> Balance:
         """Unworn balance at a value of the parameter. history (n_contact, 2): m."""
-        return Balance.frozen(self.joint_at(parameter), history, np.zeros(self.case.model.contact.n_contact))
+        return Balance(self.joint_at(parameter), history, np.zeros(self.case.model.contact.n_contact))
 
     def scale(self, parameter: float) -> float:
         """Reference value for the lengths of steps."""
@@ -66,7 +66,7 @@ class LoadingPath:
     @property
     def node_tolerance(self) -> float:
         """As in Path."""
-        return max(self.case.settings.tolerance, NEWTON.forcing * self.case.settings.rtol)
+        return max(self.case.settings.tolerance, FORCING * self.case.settings.rtol)
 
     def ahead(self, parameter: float, length: float) -> float:
         """The parameter a step farther; length: over the scale, below 0 for a step down."""
@@ -84,7 +84,7 @@ class LoadingPath:
         """
         start = states[-1]
         joint, begin = self.joint_at(target), start.evaluation.predicted_h
-        balance = Balance.frozen(joint, history_at_rest(joint, start), start.evaluation.wear_depth)
+        balance = Balance(joint, history_at_rest(joint, start), start.evaluation.wear_depth)
         if len(states) > 1:
             ratio = (target - start.parameter) / (start.parameter - states[0].parameter)
             begin = begin + ratio * (begin - states[0].evaluation.predicted_h)

@@ -101,7 +101,7 @@ def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, fl
 def _peak(line: FrequencySweep, nodes: Sweep[State], omega: float, run: Run) -> float:
     """Frequency of the largest amplitude near phase resonance, rad/s. Raises _NoneFoundError."""
     at, case = _state_at(line, nodes, omega, run).evaluation, nodes.path.case
-    balance = Balance.frozen(case.joint(omega, line.excitation_amplitude), at.history, at.wear_depth)
+    balance = Balance(case.joint(omega, line.excitation_amplitude), at.history, at.wear_depth)
     found = solve_at_peak(case, balance, at.predicted_h, 0.5 * math.pi, run.fresh())
     if found is None:
         raise _NoneFoundError(f"no largest amplitude is found near phase resonance at {omega / (2.0 * math.pi):.6g} Hz")

@@ -13,7 +13,16 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from solver.harmonic_balance.state import Failure
-from solver.options import COMMON
+
+STEP_SAFETY = 0.85
+"""Length of a step over the length with the allowed error, and the largest factor on a step that was refused."""
+
+LARGEST_STEP_RATIO = 2.0
+"""Largest ratio of two successive steps of a sweep, of an amplitude and on the slow time scale; BDF2 is zero-stable
+below 1 + sqrt(2). With 1.4 the damping of a nonlinear mode of the dovetail changes by 5e-6."""
+
+SMALLEST_STEP_RATIO = 0.25
+"""Factor on a step whose end was not found, and smallest factor on a step that was refused."""
 
 HereT = TypeVar("HereT", contravariant=True)
 EndT = TypeVar("EndT")
@@ -42,15 +51,15 @@ class Lengths:
     """
 
     order: int
-    safety: float = COMMON.step_safety
+    safety: float = STEP_SAFETY
     shortest: float = 0.0
     rescue: float = 0.0
 
     def factor(self, ratio: float, *, accepted: bool) -> float:
         """Length of the next step, or of the next attempt of a refused one, over the present length."""
         wanted = self.safety * max(ratio, 1e-12) ** (-1.0 / self.order)
-        least, most = self.safety, COMMON.largest_step_ratio
-        return float(np.clip(wanted, *((least, most) if accepted else (COMMON.smallest_step_ratio, least))))
+        least, most = self.safety, LARGEST_STEP_RATIO
+        return float(np.clip(wanted, *((least, most) if accepted else (SMALLEST_STEP_RATIO, least))))
 
 
 def take_step(line: Line[HereT, EndT], here: HereT, length: float, lengths: Lengths) -> tuple[EndT, float] | Failure:

@@ -153,7 +153,7 @@ class _Continuation:
         )
         joint, state = case.joint(start.state.omega, start.state.excitation_amplitude), start.state
         unworn = np.zeros_like(state.wear_depth)
-        balance = Balance.frozen(joint, state.start_history, unworn)
+        balance = Balance(joint, state.start_history, unworn)
         first = balance.predict(state.displacement_h, state.contact_force_h)
         run = Run(self.settings.tolerance, Budget(deadline=self.deadline))
         found = run.solve(balance, first)
@@ -174,7 +174,7 @@ class _Continuation:
             self.model, self.block.friction_coefficient, start.penalty_omega, self.settings, start.resolution
         )
         joint = case.joint(before.omega, before.excitation_amplitude)
-        balance = Balance.frozen(joint, before.start_history, np.zeros_like(before.wear_depth))
+        balance = Balance(joint, before.start_history, np.zeros_like(before.wear_depth))
         at = balance.evaluate(balance.predict(before.displacement_h, before.contact_force_h))
         parameter = before.excitation_amplitude / amplitude if ramp else before.omega
         sweep: Direction = "ramp" if ramp else "up" if omega > before.omega else "down"

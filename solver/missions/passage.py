@@ -39,10 +39,10 @@ from solver.missions.blocks import Passage, worn
 from solver.missions.delay import Delay, delay_of
 from solver.missions.options import MISSIONS
 from solver.model import ComplexArray, FloatArray
-from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.packing import in_rows
 from solver.results.history import StartState
+from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
 from solver.wear.rate_slope import rate_slope
@@ -220,7 +220,7 @@ def _negligible(case: BlockCase, passage: Passage, states: list[SweptState]) -> 
     size = max(float(np.abs(state.response).max()) for state in states)
     work = np.pi * case.block.excitation_amplitude * size * passage.cycles
     so_far = float(case.depth @ case.mission.area)
-    return max(COMMON.negligible * so_far, COMMON.round_off * case.mission.wear_coefficient * work)
+    return max(NEGLIGIBLE * so_far, ROUND_OFF * case.mission.wear_coefficient * work)
 
 
 def _needed(states: list[SweptState], errors: FloatArray, allowed: float, least: Sequence[float]) -> tuple[float, ...]:
@@ -238,7 +238,7 @@ def _needed(states: list[SweptState], errors: FloatArray, allowed: float, least:
 def _between(one: SweptState, other: SweptState, finest: float) -> list[float]:
     """Further frequencies between two, Hz: both sides of a jump, or the middle of an interval above `finest`, Hz."""
     low, high = one.frequency, other.frequency
-    near = COMMON.negligible * low
+    near = NEGLIGIBLE * low
     folds = {
         state.start.fold_frequency for state in (one, other) if low + near < state.start.fold_frequency < high - near
     }

@@ -12,6 +12,7 @@ import numpy as np
 from solver.accuracy.reference import RTOL_RATIO
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure
+from solver.march.steps import SMALLEST_STEP_RATIO
 from solver.missions.block_run import BlockCase, BlockRun, not_computed, run_block
 from solver.missions.blocks import Mission, Passage
 from solver.missions.course import MissionCourse, MissionNode, growth_within
@@ -19,7 +20,6 @@ from solver.missions.options import MISSIONS
 from solver.missions.passage import run_passage
 from solver.missions.step import RunBlock, Step, take_step
 from solver.model import FloatArray
-from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable
 from solver.results.history import StartState
@@ -111,7 +111,7 @@ class MissionSolutions:
         if isinstance(step, Failure):
             if length == 1 or step.outcome is Outcome.TIME_LIMIT:
                 return replace(progress, course=replace(course, failure=step))
-            return replace(progress, length=max(int(COMMON.smallest_step_ratio * length), 1))
+            return replace(progress, length=max(int(SMALLEST_STEP_RATIO * length), 1))
         volumes = [float(of.depth @ self.mission.area) for of in (node, step.node)]
         error = step.error / allowed(*volumes, node.mission, length)
         if error > 1.0 and length > 1:

@@ -25,7 +25,7 @@ import numpy as np
 import scipy.linalg
 
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
-from solver.options import COMMON
+from solver.settings import NEGLIGIBLE
 from solver.structure.condensation import relative_indices, whole_motion
 
 
@@ -53,13 +53,13 @@ def natural_frequencies(linear: LinearModel, held: IntArray) -> tuple[FloatArray
         return np.zeros(0), np.zeros((len(linear.mass), 0))
     mass, stiffness = (part[np.ix_(free, free)] for part in (linear.mass, linear.stiffness))
     # shift and limit of a rigid motion: 1e-12 of the ratio of the traces is of the order of round-off
-    shift = COMMON.negligible * float(np.real(np.trace(stiffness)) / max(np.real(np.trace(mass)), 1e-300))
+    shift = NEGLIGIBLE * float(np.real(np.trace(stiffness)) / max(np.real(np.trace(mass)), 1e-300))
     # eigenvalues 1 / (omega^2 + shift), largest first: a mass matrix may be singular, a stiffness as well
     values, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass)
     values, vectors = values[::-1], vectors[:, ::-1]
     with np.errstate(divide="ignore"):
         square = 1.0 / np.maximum(values, 0.0) - shift
-    elastic = (square > COMMON.negligible * shift) & (values > 1e-12 * values[0])
+    elastic = (square > NEGLIGIBLE * shift) & (values > 1e-12 * values[0])
     shapes = np.zeros((len(linear.mass), int(elastic.sum())), vectors.dtype)
     shapes[free] = vectors[:, elastic] / np.sqrt(values[elastic])
     return np.sqrt(square[elastic]), cast("Matrix", shapes)

@@ -23,9 +23,8 @@ from solver.modes.modal_model import FirstHarmonic, LinearMode, first_harmonic, 
 from solver.modes.options import MODES
 from solver.newton.bordering import Bordered
 from solver.newton.run import Run
-from solver.options import COMMON
 from solver.packing import packable
-from solver.settings import Resolution
+from solver.settings import DIFFERENCE, Resolution
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
@@ -140,7 +139,7 @@ class _AtAmplitude:
         omega, damping_ratio, drive = map(float, values)
         case = self.problem.case_at(omega, damping_ratio)
         joint = case.joint(omega, drive)
-        balance = Balance.frozen(joint, self.history, np.zeros(self.problem.model.contact.n_contact))
+        balance = Balance(joint, self.history, np.zeros(self.problem.model.contact.n_contact))
         at = balance.evaluate(predicted_h)
         first = first_harmonic(case.model, self.problem.mode, omega, drive)
         shape = first.shape(to_complex(joint.to_relative(at.displacement_h))[:, 0])
@@ -152,7 +151,7 @@ class _AtAmplitude:
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
         """As in BorderedProblem, by differences."""
         slopes, errors = [], []
-        lengths = COMMON.difference * np.array([here.values[0], 1.0, self.amplitude])
+        lengths = DIFFERENCE * np.array([here.values[0], 1.0, self.amplitude])
         for step, length in zip(np.diag(lengths), lengths, strict=True):
             ahead = self.evaluate(here.at.predicted_h, here.values + step)
             slopes.append((ahead.at.residual - here.at.residual) / length)

@@ -13,10 +13,10 @@ from solver.harmonic_balance.state import history_at_rest
 from solver.loading_history.node_resolution import choose_resolution
 from solver.loading_history.options import LOADING
 from solver.loading_history.path_of_states import Step
+from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import FloatArray
 from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.newton.run import Run
-from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.settings import Resolution
 from solver.structure.joint import Case
@@ -37,7 +37,7 @@ class ModePath:
     def steps(self) -> tuple[float, float, float]:
         """As in Path: where a smaller ratio is needed the mode is lost; with a tenth of the step modes are equal."""
         shortest = math.log1p(LOADING.free_step)
-        return shortest, math.log(COMMON.largest_step_ratio), shortest
+        return shortest, math.log(LARGEST_STEP_RATIO), shortest
 
     @property
     def node_tolerance(self) -> float:

@@ -23,9 +23,8 @@ from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.modes.mode_path import ModePath
 from solver.modes.options import MODES
 from solver.newton.run import Run
-from solver.options import COMMON
 from solver.outcome import Outcome, known_to
-from solver.settings import Resolution
+from solver.settings import ROUND_OFF, Resolution
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,7 @@ def judge_point(
     by_friction = float(joint.law.friction_work(found.state.evaluation).sum()) / (
         2.0 * np.pi * (found.omega * found.parameter) ** 2
     )
-    damping = max(by_friction, abs(found.damping_ratio), COMMON.round_off)
+    damping = max(by_friction, abs(found.damping_ratio), ROUND_OFF)
     known = [float(errors[0]) / found.omega, float(errors[1]) / damping]
     if accurate and max(known) <= rtol:
         return ModePoint(Outcome.CONVERGED, "", problem, found, errors)

@@ -77,7 +77,7 @@ def _at_rest(case: Case, mode: LinearMode, run: Run) -> State | Outcome:
     static = solve_static_state(quiet, idle, run)
     if isinstance(static, Outcome):
         return static
-    still, start = Balance.frozen(quiet, static.history, idle), predicted_at_rest(case, quiet, static, idle)
+    still, start = Balance(quiet, static.history, idle), predicted_at_rest(case, quiet, static, idle)
     return run.fresh().state(still, start, 0.0) or Outcome.STATIC_FAILED
 
 

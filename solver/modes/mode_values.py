@@ -8,8 +8,8 @@ from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import BoolArray, ReducedModel
 from solver.modes.mode_point import ModePoint
-from solver.options import COMMON
 from solver.results.mode_values import ModeValues, without_state
+from solver.settings import ROUND_OFF
 from solver.structure.fourier import to_complex
 
 
@@ -43,5 +43,5 @@ def values_of(model: ReducedModel, point: ModePoint) -> ModeValues:
 def _slips(at: Evaluation) -> BoolArray:
     """Samples (n_contact, N) in which a pair slips; a pair at its friction limit that does not move sticks."""
     moved = np.abs(np.diff(at.state_t, axis=2)).max(axis=1)
-    least = COMMON.round_off * np.abs(at.state_t).max(axis=(1, 2))
+    least = ROUND_OFF * np.abs(at.state_t).max(axis=(1, 2))
     return np.asarray((at.status_t == SLIP) & (moved > least[:, None]))

@@ -9,7 +9,18 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from solver.model import FloatArray
-from solver.newton.options import NEWTON
+
+MOST_ITERATIONS = 30
+"""Most iterations of one solve. Prototypes took 2 to 5 from a warm start, up to 40 from a cold one near a resonance."""
+
+FULL_STEPS = 6
+"""Full steps in a row without a new lowest residual before steps are halved. Twice as many find equal states; with
+three, too, the static states of the dovetail are equal."""
+
+SHORTEST_STEP = 1.0 / 128.0
+"""Shortest step as a fraction of the full step: seven halvings. With six a random scene (`THROWN_OFF` in
+`tests/solver/test_homotopy.py`) gets no accurate state. Also the shortest natural step over the range to the target
+(where a shorter one is needed, the branch is assumed to fold), and the shortest relaxation step in periods."""
 
 
 class HasResidual(Protocol):
@@ -52,7 +63,7 @@ def solve_newton(
 
     The residual is piecewise smooth. A full step that raises the residual often ends in the piece with the solution,
     while a line search takes very short steps at every kink. So full steps come first, as long as the lowest norm is
-    improved once in `NEWTON.full_steps` iterations. Then the iteration returns to the best point and halves its steps
+    improved once in `FULL_STEPS` iterations. Then the iteration returns to the best point and halves its steps
     until the norm decreases.
 
     Parameters
@@ -66,17 +77,17 @@ def solve_newton(
     tolerance : float
         Tolerance of the scaled residual, dimensionless.
     most_iterations : int, optional
-        `NEWTON.iterations` by default.
+        `MOST_ITERATIONS` by default.
 
     Returns
     -------
     NewtonResult
         Where the tolerance is not met, the point of the lowest norm.
     """
-    most = NEWTON.iterations if most_iterations is None else most_iterations
+    most = MOST_ITERATIONS if most_iterations is None else most_iterations
     unknown, current = start, evaluate(start)
     best, best_norm, since_best = (unknown, current), np.inf, 0
-    cutting, shortest = False, NEWTON.shortest_step
+    cutting, shortest = False, SHORTEST_STEP
     for iteration in range(most + 1):
         norm = current.scaled_residual()
         if norm <= tolerance:
@@ -87,7 +98,7 @@ def solve_newton(
             since_best += 1
         if iteration == most:
             break
-        if not cutting and (not np.isfinite(norm) or since_best > NEWTON.full_steps):
+        if not cutting and (not np.isfinite(norm) or since_best > FULL_STEPS):
             cutting = True
             unknown, current = best
         step = direction(current)

@@ -14,10 +14,51 @@ import numpy as np
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
-from solver.newton.krylov import ritz_values, solve_gmres
-from solver.newton.options import NEWTON
-from solver.newton.preconditioner import Factor, build_factor
-from solver.newton.slip_preconditioner import build_slip_factor, largest_directions
+from solver.newton.krylov import MOST_PRODUCTS, ritz_values, solve_gmres
+from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
+from solver.newton.slip_preconditioner import SlipFactor, build_slip_factor, largest_directions
+
+FORCING = 1e-3
+"""Relative residual of a Newton direction: an iteration gains up to three digits. With half and twice this value the
+states of the dovetail are equal to 1e-6. Also the residual of a node of a sweep as a fraction of rtol: with a tenth and
+with ten times this value the motion of the dovetail is equal to 1e-4; with the tolerance of a result, nodes take 1.4
+times the iterations."""
+
+KEPT_PRODUCTS = 25
+"""Most products of a solve with a kept factorisation, before a new one is built, which takes as long as 20 products
+with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 12 to 80."""
+
+SETTLED = 0.1
+"""Residual over modulus of an eigenvalue below which its sign is known, and real part above which an eigenvalue is
+certainly positive (all are 1 for an exact factorisation). With 0.15 for the real part the same cases are equal."""
+
+DENSE_UNKNOWNS = 200
+"""Unknowns up to which a Jacobian is factorised as it is. With 100 and 400, sweeps and histories of 16 and 48 pairs
+take equal times."""
+
+EXPENSIVE_UNKNOWNS = 1000
+"""Unknowns of an expensive dense solve: above, no odd harmonics above 79, no homotopy in the harmonics, no 3 N + 2
+samples to compare, and no eigenvalues of Hill's matrix (255 unknowns take 0.15 s, 800 take 3 s)."""
+
+SMALL_JOINT = 40
+"""Relative displacements up to which a joint is small and its slip space is factorised: impacts couple most harmonics
+and directions, and products with any other factorisation are in vain (three pairs with 115 harmonics,
+`tests/solver/test_refinement.py`)."""
+
+MOST_DIRECTIONS = 2500
+"""Most directions of a factorisation in the slip space, 0.4 s. For the sign of a determinant that is not certain
+otherwise, and for sliding masses, to which the march does not apply."""
+
+
+Factor = SlipFactor | PeriodFactor
+"""A factorisation of a Jacobian or of a matrix near the Jacobian; each gives the sign of its determinant."""
+
+
+def build_factor(tangent: Linearisation) -> Factor:
+    """A march through the period, or the slip space for small joints, masses, and where a sample is singular."""
+    small = tangent.joint.component_index.size <= SMALL_JOINT
+    march = None if small else build_period_factor(tangent)
+    return march or build_slip_factor(tangent, largest_directions(tangent, MOST_DIRECTIONS))
 
 
 @dataclass
@@ -26,14 +67,14 @@ class JacobianSolver:
 
     _factor: Factor | None = field(default=None, repr=False)
 
-    def solve(self, tangent: Linearisation, right: FloatArray, rtol: float = NEWTON.forcing) -> FloatArray:
+    def solve(self, tangent: Linearisation, right: FloatArray, rtol: float = FORCING) -> FloatArray:
         """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
         m = right.shape[1]
         pairs = tangent.active()
         rows = tangent.joint.rows_of(pairs)
         step = np.zeros_like(right)
         if rows.size:
-            if rows.size * m <= NEWTON.dense_unknowns:
+            if rows.size * m <= DENSE_UNKNOWNS:
                 step[rows] = _solve_dense(tangent.dense(pairs), right[rows].ravel()).reshape(rows.size, m)
             else:
                 step[rows] = self._solve_kept(tangent, right, rtol)[rows]
@@ -44,7 +85,7 @@ class JacobianSolver:
         return step
 
     def solve_all(
-        self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = NEWTON.forcing
+        self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
     ) -> list[FloatArray]:
         """Steps (n_rel, m) for several right-hand sides; a small system is factorised once."""
         if not _is_dense(tangent, rights[0].shape[1]):
@@ -80,7 +121,7 @@ class JacobianSolver:
             return factor.sign
         sign, settled = self._judge(factor, tangent)
         if not settled:
-            whole = largest_directions(tangent, NEWTON.most_directions)
+            whole = largest_directions(tangent, MOST_DIRECTIONS)
             sign = build_slip_factor(tangent, whole).sign if whole.exact else sign
         return sign
 
@@ -93,7 +134,7 @@ class JacobianSolver:
 
         # a fixed start: the result must not depend on earlier computations
         start = np.random.default_rng(0).normal(size=shape[0] * shape[1])
-        values, residuals = ritz_values(product, start, NEWTON.products, _settled)
+        values, residuals = ritz_values(product, start, MOST_PRODUCTS, _settled)
         # complex eigenvalues come in conjugate pairs and do not change the sign
         negative = np.count_nonzero((values.real < 0.0) & (values.imag == 0.0))
         return factor.sign * float((-1) ** negative), _settled(values, residuals)
@@ -101,14 +142,14 @@ class JacobianSolver:
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
         """Solution (n_rel, m) in the rows of the active pairs, with the kept factorisation while products are few."""
         if self._factor is not None:
-            solution, found = self._iterate(self._factor, tangent, right, rtol, NEWTON.kept_products, 1)
+            solution, found = self._iterate(self._factor, tangent, right, rtol, KEPT_PRODUCTS, 1)
             if found:
                 return solution
         self._factor = factor = build_factor(tangent)
         if factor.exact:
             return self._solve_exactly(factor, tangent, right)
         # convergence is not required: Newton's method judges by the true residual
-        return self._iterate(factor, tangent, right, rtol, NEWTON.products, np.inf)[0]
+        return self._iterate(factor, tangent, right, rtol, MOST_PRODUCTS, np.inf)[0]
 
     def _solve_exactly(self, factor: Factor, tangent: Linearisation, right: FloatArray) -> FloatArray:
         """Solution by a factorisation of this Jacobian; a second solve corrects for the shift of neutral directions."""
@@ -160,14 +201,14 @@ def _passive_rows(tangent: Linearisation) -> IntArray:
 
 def _settled(values: ComplexArray, residuals: FloatArray) -> bool:
     """Whether it is certain which eigenvalues are negative, from Ritz values and their residuals."""
-    doubtful = ~(values.real >= NEWTON.settled)
-    return bool(np.all((residuals < NEWTON.settled * np.abs(values))[doubtful]))
+    doubtful = ~(values.real >= SETTLED)
+    return bool(np.all((residuals < SETTLED * np.abs(values))[doubtful]))
 
 
 def _is_dense(tangent: Linearisation, m: int) -> bool:
     """Whether the rows of the active pairs, times m unknowns, are few enough for a dense factorisation."""
     rows = tangent.joint.rows_of(tangent.active()).size
-    return 0 < rows * m <= NEWTON.dense_unknowns
+    return 0 < rows * m <= DENSE_UNKNOWNS
 
 
 def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:

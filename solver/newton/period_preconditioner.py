@@ -34,12 +34,14 @@ from numba import njit
 from solver.contact.coulomb import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
-from solver.newton.options import NEWTON
 from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.identity import Identity
 from solver.structure.joint import Joint
 from solver.structure.rough_forms import SingleArray
+
+MARCH_PERIODS = 2
+"""Periods of the march: slip removes the influence of the start."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ class PeriodFactor:
         state_t = march_samples(
             np.ascontiguousarray(right_t),
             *(self.own, self.carried, self.row, self.first, self.swept, self.inverse, self.inverse_first),
-            NEWTON.march_periods,
+            MARCH_PERIODS,
         )
         return right - self.coupling @ (state_t.T @ self.basis.analysis)
 

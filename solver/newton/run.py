@@ -14,8 +14,7 @@ from solver.harmonic_balance.state import State, final_history
 from solver.model import FloatArray
 from solver.newton.bordering import Bordered, BorderedProblem, bordered_step
 from solver.newton.iteration import NewtonResult, solve_newton
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
+from solver.newton.linear_solver import FORCING, JacobianSolver
 from solver.structure.joint import Case, Joint
 
 
@@ -84,7 +83,7 @@ class Run:
         start : array (n_rel, 2H+1)
             First predicted force, N.
         most : int, optional
-            Most iterations, `NEWTON.iterations` by default.
+            Most iterations, `MOST_ITERATIONS` by default.
 
         Raises
         ------
@@ -137,7 +136,7 @@ class Run:
         self.budget.iterations += end.iterations
         return replace(end.evaluation, reduced=last) if end.converged else None
 
-    def step(self, balance: Balance, at: Evaluation, right: FloatArray, rtol: float = NEWTON.forcing) -> FloatArray:
+    def step(self, balance: Balance, at: Evaluation, right: FloatArray, rtol: float = FORCING) -> FloatArray:
         """Step (n_rel, m), N, with Jacobian times step = right (n_rel, m), N, in a state, to a relative residual."""
         return self.solver.solve(balance.linearise(at), right, rtol)
 
@@ -148,4 +147,4 @@ class Run:
 
     def _forcing(self, residual: float) -> float:
         """Relative residual of a direction: no more accurate than the tolerance needs."""
-        return max(NEWTON.forcing, 0.1 * self.tolerance / max(residual, self.tolerance))
+        return max(FORCING, 0.1 * self.tolerance / max(residual, self.tolerance))

@@ -26,7 +26,7 @@ import scipy.linalg
 
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import BoolArray, FloatArray, IntArray
-from solver.newton.krylov import ROUND_OFF
+from solver.newton.krylov import NO_DIRECTION
 from solver.structure.joint import Joint
 
 # Shift of the eigenvalues, which are 1 for a pair that sticks. The position of a joint that slips as a whole is
@@ -77,7 +77,7 @@ def _held_back_rows(tangent: Linearisation) -> tuple[IntArray, FloatArray]:
     # one more row for the wear, which the static normal motion carries
     worn = joint.penalty.normal[:, None, None] * tangent.motion_tangent[:, :1]
     rows = np.concatenate([held_back, worn], axis=1) * columns[:, None, :]
-    pairs = np.flatnonzero(np.abs(rows).max(axis=(1, 2)) > ROUND_OFF)
+    pairs = np.flatnonzero(np.abs(rows).max(axis=(1, 2)) > NO_DIRECTION)
     return pairs, rows[pairs]
 
 
@@ -91,7 +91,7 @@ def _directions(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
         return np.empty((width, 0)), np.empty(0)
     factor, _, scales, _, _ = _PIVOTED_QR(rows.T)
     sizes = np.abs(np.diag(factor))
-    rank = int(np.count_nonzero(sizes > ROUND_OFF))
+    rank = int(np.count_nonzero(sizes > NO_DIRECTION))
     return np.ascontiguousarray(_ORTHOGONAL(factor[:, :width], scales)[0][:, :rank]), sizes[:rank]
 
 

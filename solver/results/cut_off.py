@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from solver.model import ContactInterface, FloatArray
-from solver.options import COMMON
+from solver.settings import NEGLIGIBLE
 
 
 def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: FloatArray, depth: FloatArray) -> float:
@@ -24,7 +24,7 @@ def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: Float
     """
     if contact.edge is None or not contact.edge.any():
         return math.nan
-    least = COMMON.negligible
+    least = NEGLIGIBLE
     reached = [values[:, contact.edge].max(axis=1) > least * values.max(axis=1) for values in (pressure, depth)]
     found = np.flatnonzero(np.logical_or(*reached))
     return float(cycles[found[0]]) if found.size else math.nan

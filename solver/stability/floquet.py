@@ -27,12 +27,11 @@ from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import State
 from solver.model import BoolArray, ComplexArray, LinearModel, Matrix
-from solver.newton.krylov import ritz_values
-from solver.newton.options import NEWTON
+from solver.newton.krylov import MOST_PRODUCTS, ritz_values
+from solver.newton.linear_solver import SMALL_JOINT
 from solver.newton.run import Run
-from solver.options import COMMON
 from solver.outcome import Outcome
-from solver.settings import Resolution, all_orders, samples_for
+from solver.settings import ROUND_OFF, Resolution, all_orders, samples_for
 from solver.stability.monodromy import Monodromy, build_monodromy, switching_pairs
 from solver.stability.options import STABILITY
 from solver.structure.identity import Identity
@@ -108,7 +107,7 @@ def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: 
     if travels or 3 * np.count_nonzero(switching) > STABILITY.most_rows:
         return None
     linear = joint.model.linear[0]
-    small = int(moving(joint, stuck).sum()) <= NEWTON.small_joint_displacements
+    small = int(moving(joint, stuck).sum()) <= SMALL_JOINT
     if not (every or (small and opens_and_closes(at))):
         return None
     if small:
@@ -178,7 +177,7 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
     def settled(values: ComplexArray, residuals: np.ndarray) -> bool:
         return bool(residuals[np.argmax(np.abs(values))] < STABILITY.smallest_growth)
 
-    values, residuals = ritz_values(product, start, NEWTON.products, settled)
+    values, residuals = ritz_values(product, start, MOST_PRODUCTS, settled)
     return values[residuals < STABILITY.smallest_growth]
 
 
@@ -219,7 +218,7 @@ def _is_passive(of: Identity) -> bool:
 def _is_semidefinite(matrix: Matrix) -> bool:
     size = float(np.abs(np.diag(matrix)).max(initial=0.0))
     try:
-        np.linalg.cholesky(matrix + COMMON.round_off * size * np.eye(len(matrix)))
+        np.linalg.cholesky(matrix + ROUND_OFF * size * np.eye(len(matrix)))
     except np.linalg.LinAlgError:
         return size == 0.0 and not matrix.any()
     return True

@@ -38,7 +38,7 @@ def hill_size(joint: Joint) -> int:
 def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     """Floquet multipliers exp(2 pi sigma / omega) of a state of a real structure without masses on rigid ground."""
     fine = replace(joint, basis=build_basis(joint.basis.orders, 8 * STABILITY.small_samples))
-    balance = Balance.frozen(fine, at.history, at.wear_depth)
+    balance = Balance(fine, at.history, at.wear_depth)
     tangent = balance.linearise(balance.evaluate(at.predicted_h))
     linear, m = joint.model.linear[0], len(fine.basis.synthesis)
     n, n_rel = len(linear.mass), joint.component_index.size

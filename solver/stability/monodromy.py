@@ -109,7 +109,7 @@ def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples
     linear: the structure in which disturbances move. Raises numpy.linalg.LinAlgError where the structure is singular.
     """
     fine = replace(joint, basis=build_basis(joint.basis.orders, n_samples))
-    state = Balance.frozen(fine, at.history, at.wear_depth).evaluate(at.predicted_h)
+    state = Balance(fine, at.history, at.wear_depth).evaluate(at.predicted_h)
     switching, stuck = switching_pairs(state)
     dofs = joint.contact.dofs
     moves = np.ones(len(linear.mass), bool)

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import ComplexArray
-from solver.newton.options import NEWTON
+from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, SMALL_JOINT
 from solver.newton.run import Run
 from solver.stability.floquet import exponents, march_samples, moving, multipliers_of, opens_and_closes, sharper
 from solver.stability.hill_exponents import hill_multipliers, hill_size
@@ -71,13 +71,13 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run) -> Mult
     if travels or 3 * np.count_nonzero(switching) > STABILITY.most_rows:
         return NOT_KNOWN
     linear = joint.model.linear[0]
-    small = int(moving(joint, stuck).sum()) <= NEWTON.small_joint_displacements
+    small = int(moving(joint, stuck).sum()) <= SMALL_JOINT
     if small:
         finer = sharper(case, joint, at, run)
         if finer is None or _first(finer[1], at) > STABILITY.other_branch:
             return NOT_KNOWN
         joint, at = finer
-        if opens_and_closes(at) and hill_size(joint) <= NEWTON.dear_unknowns and not joint.law.rate_dependent:
+        if opens_and_closes(at) and hill_size(joint) <= EXPENSIVE_UNKNOWNS and not joint.law.rate_dependent:
             return Multipliers(_sorted(hill_multipliers(joint, at)), 0.0)
     n_samples = march_samples(joint, linear, (stuck, stuck | switching), small) // 2
     found = _sorted(multipliers_of(build_monodromy(joint, linear, at, n_samples), small))

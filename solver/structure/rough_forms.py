@@ -24,7 +24,12 @@ from numpy.typing import NDArray
 
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
 from solver.structure.identity import Identity
-from solver.structure.options import STRUCTURE
+
+ROUGH_DIRECTIONS = 48
+"""Largest number of motions that carry mass, and damping not proportional to stiffness, in rough products."""
+
+ROUGH = 1e-3
+"""Part of the stiffness that a rough product may leave out. Does not change results."""
 
 SingleArray = NDArray[np.float32]
 SingleComplex = NDArray[np.complex64]
@@ -71,7 +76,7 @@ def rough_of_shared(
     common = _common_form(Identity(linear), tuple(relative.tolist()))
     highest = float(rates.max(initial=0.0))
     left_out = highest**2 * common.mass_left_out + highest * common.drag_left_out
-    if left_out > STRUCTURE.rough * common.size:
+    if left_out > ROUGH * common.size:
         return None
     rate = rates[:, None, None]
     behind = [
@@ -122,7 +127,7 @@ def _common_form(structure: Identity, relative: tuple[int, ...]) -> _CommonForm:
     norm = float(np.linalg.norm(stiffness))
     slope = float(np.vdot(stiffness, damping)) / norm**2 if norm > 0.0 else 0.0
     drag = damping - slope * stiffness
-    few = STRUCTURE.rough_directions
+    few = ROUGH_DIRECTIONS
     directions = [
         _leading(mass, few),
         _leading(drag, few) if np.linalg.norm(drag) > 1e-6 * slope * norm else mass[:, :0],

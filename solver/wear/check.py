@@ -13,10 +13,9 @@ from solver.accuracy.period_events import lacks_even, left_out
 from solver.accuracy.refinement import refine
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
-from solver.options import COMMON
 from solver.outcome import Outcome
 from solver.results.state_report import StateReport, report_state
-from solver.settings import Resolution
+from solver.settings import NEGLIGIBLE, Resolution
 from solver.stability.floquet import find_instability
 from solver.wear.followed import frequency_error
 from solver.wear.jump import creeps, free_slide
@@ -133,7 +132,7 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
         return _vibrates_otherwise(state)
     if error == 0.0:
         # the last choice was for a joint without slip and separation
-        return now > COMMON.negligible
+        return now > NEGLIGIBLE
     if now > WEAR.left_out_grown * choice.left_out:
         return error * now > settings.rtol * choice.left_out
     return now < ACCURACY.kept_fraction**2 * choice.left_out

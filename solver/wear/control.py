@@ -12,8 +12,7 @@ import numpy as np
 
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.state import Failure, vibration_change
-from solver.march.steps import Lengths, take_step
-from solver.options import COMMON
+from solver.march.steps import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.outcome import Outcome
 from solver.settings import Scheme
 from solver.wear.options import WEAR
@@ -61,7 +60,7 @@ class GivenSteps:
         planned = self.length
         if self.end == np.inf:
             slower = float(state.largest_rates[-1] / state.rates[-1])
-            planned = min(COMMON.largest_step_ratio * state.length, self.length * slower)
+            planned = min(LARGEST_STEP_RATIO * state.length, self.length * slower)
         if self.largest_depth is not None and self.scheme == "explicit":
             planned = self.largest_depth / float(work.rate(state.point.evaluation).max())
         # no extra step for a remainder below the round-off of the count

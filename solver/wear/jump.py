@@ -29,9 +29,9 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
 from solver.model import FloatArray
-from solver.options import COMMON
 from solver.outcome import Outcome
-from solver.results.options import RESULTS
+from solver.results.verdict import HELD_FORCE
+from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.options import STABILITY
 from solver.structure.joint import Hold, Joint
 from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
@@ -114,10 +114,10 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
         return None
     stiffness, directions = np.linalg.eigh(joint.structure.static_stiffness)
     # spin softening may give small negative eigenvalues
-    free = np.abs(stiffness) < COMMON.round_off * stiffness[-1]
+    free = np.abs(stiffness) < ROUND_OFF * stiffness[-1]
     along = directions[:, int(np.argmin(np.abs(stiffness)))]
     closes = np.abs(along[joint.component_index % 3 == 0]).max(initial=0.0)
-    if np.count_nonzero(free) != 1 or closes > COMMON.negligible:
+    if np.count_nonzero(free) != 1 or closes > NEGLIGIBLE:
         return None
     motion = joint.to_relative(at.displacement_h)[:, 0]
     return Hold(along, MEAN_STIFFNESS_FRACTION * float(stiffness[-1]), float(along @ motion))
@@ -126,4 +126,4 @@ def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
 def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
     """Whether the force of a hold is so large that the joint would creep noticeably without it."""
     friction = float(joint.friction_coefficient @ at.force_h[:, 0, 0])
-    return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > RESULTS.held_force * friction
+    return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > HELD_FORCE * friction

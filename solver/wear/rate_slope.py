@@ -35,7 +35,7 @@ def rate_slope(
     run
         Solves with the Jacobian of the state.
     """
-    balance = Balance.frozen(joint, at.history, at.wear_depth)
+    balance = Balance(joint, at.history, at.wear_depth)
     plain = balance.linearise(at)
     growth = replace(balance, wear_gain=gain, wearing=replace(wearing, depth_held=True)).linearise(at).growth_tangent
     slope = np.diag(gain * wearing.slopes(*worn_by(at))[2] * pairs)

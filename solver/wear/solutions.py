@@ -289,7 +289,7 @@ def begin_reference(work: WearingJoint, start: StartState, step_limit: float) ->
     if reference is None:
         return begun
     history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
-    balance = Balance.frozen(work.at(begun), history, begun.depth)
+    balance = Balance(work.at(begun), history, begun.depth)
     first = begun.point.evaluation.predicted_h
     point = work.run.state(balance, first, most=CONTINUATION.near_iterations)
     return begun if point is None else work.noted(replace(begun, point=point))

@@ -29,7 +29,7 @@ from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import BalanceAt, State, final_history
 from solver.model import FloatArray
-from solver.newton.options import NEWTON
+from solver.newton.iteration import SHORTEST_STEP
 from solver.settings import Scheme
 from solver.structure.joint import Joint
 from solver.wear.options import WEAR
@@ -63,7 +63,7 @@ def held_wear(joint: Joint, before: FloatArray, after: FloatArray) -> BalanceAt:
     """Balance at given depths (n_contact,), m, linear from `before` to `after` over a fraction from 0 to 1."""
 
     def balance_at(fraction: float, history: FloatArray) -> Balance:
-        return Balance.frozen(joint, history, before + fraction * (after - before))
+        return Balance(joint, history, before + fraction * (after - before))
 
     return balance_at
 
@@ -79,7 +79,7 @@ def attempt_step(work: WearingJoint, state: WearState, length: float, scheme: Sc
         base = depth + ratio**2 / (1.0 + 2.0 * ratio) * grown
         factor = (1.0 + ratio) / (1.0 + 2.0 * ratio)
     if scheme == "explicit":
-        balance = Balance.frozen(work.at(state), state.point.history, depth + length * rate)
+        balance = Balance(work.at(state), state.point.history, depth + length * rate)
     else:
         balance = Balance(work.at(state), state.point.history, base, work.gain(factor * length), work.wearing)
     end = work.solved(state, *work.predicted(state, balance, length))
@@ -101,7 +101,7 @@ def end_of_branch(work: WearingJoint, state: WearState, length: float, scheme: S
     """
     # accuracy of the end of a branch: a fraction of the count, or of the step in the first step
     resolution = WEAR.fold_resolution * (state.cycle if state.cycle > 0.0 else length) / length
-    shortest = min(resolution, NEWTON.shortest_step)
+    shortest = min(resolution, SHORTEST_STEP)
     lost = Step(state, np.zeros_like(state.depth), length, arrived=False, end_known_to=shortest * length)
     if work.follow is not None:
         # at the frequency that is followed: halved until its end is found

@@ -25,8 +25,7 @@ from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.wear_law import WearingWork
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
-from solver.newton.krylov import ritz_values
-from solver.newton.options import NEWTON
+from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
 from solver.newton.run import Run
 from solver.structure.joint import Joint
 from solver.wear.options import WEAR
@@ -35,7 +34,7 @@ from solver.wear.options import WEAR
 def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, run: Run) -> float:
     """Largest stable explicit step of Eq. (20) at a state.
 
-    The eigenvalues come from Arnoldi's method with at most `NEWTON.sign_products` solves. A complex eigenvalue counts
+    The eigenvalues come from Arnoldi's method with at most `SIGN_PRODUCTS` solves. A complex eigenvalue counts
     where its real part is larger than its imaginary part.
 
     Parameters
@@ -57,7 +56,7 @@ def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing:
     rate = gain * wearing.work(*worn_by(at))
     if not rate.max(initial=0.0) > 0.0:
         return float("inf")
-    frozen = Balance.frozen(joint, at.history, at.wear_depth)
+    frozen = Balance(joint, at.history, at.wear_depth)
     # a step in which the fastest pair wears as much as the joint moves: both Jacobians differ in more than round-off
     step = float(np.abs(at.displacement_h).max()) / float(rate.max())
     plain = frozen.linearise(at)
@@ -72,7 +71,7 @@ def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing:
     if not np.all(np.isfinite(start)) or not start.any():
         return float("inf")
     n_wearing = int(np.count_nonzero(rate))
-    values = ritz_values(product, start, min(NEWTON.sign_products, n_wearing))[0]
+    values = ritz_values(product, start, min(SIGN_PRODUCTS, n_wearing))[0]
     falling = values.real[np.isfinite(values) & (values.real > np.abs(values.imag))]
     # a value below the round-off of the largest one is zero
     fastest = float(falling.max(initial=0.0))

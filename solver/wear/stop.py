@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.harmonic_balance.state import Failure
-from solver.options import COMMON
 from solver.outcome import Outcome
+from solver.settings import ROUND_OFF
 from solver.wear.options import WEAR
 from solver.wear.output import DenseOutput
 from solver.wear.state import WearState
@@ -71,7 +71,7 @@ class InSteadyState:
         """
         joint, at = work.at(state), state.point.evaluation
         normal = at.force_h[:, 0, 0]
-        pressed = normal > COMMON.round_off * float(normal.max(initial=0.0))
+        pressed = normal > ROUND_OFF * float(normal.max(initial=0.0))
         if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():
             return False
         course = output.taken.course

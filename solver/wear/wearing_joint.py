@@ -14,7 +14,7 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import FloatArray
-from solver.newton.options import NEWTON
+from solver.newton.iteration import MOST_ITERATIONS
 from solver.newton.run import Run
 from solver.results.history import PeriodicState
 from solver.settings import FollowedFrequency, Resolution
@@ -126,7 +126,7 @@ class WearingJoint:
         step_limit: largest stable explicit step, cycles; NaN if unknown.
         """
         joint = self.joint(resolution, None, start.omega)
-        balance = Balance.frozen(joint, start.start_history, start.wear_depth)
+        balance = Balance(joint, start.start_history, start.wear_depth)
         at = balance.evaluate(balance.predict(start.displacement_h, start.contact_force_h))
         unknown = np.full(self.area.size + 1, np.nan)
         choice = Choice(left_out(resolution.orders, at), estimate, accurate)
@@ -185,8 +185,8 @@ class WearingJoint:
         if self.follow is None:
             return state
         at = state.point.evaluation
-        balance = Balance.frozen(self.at(state), at.history, at.wear_depth)
-        found = end_at_resonance(self.case, balance, at.predicted_h, state, self.follow, self.run, NEWTON.iterations)
+        balance = Balance(self.at(state), at.history, at.wear_depth)
+        found = end_at_resonance(self.case, balance, at.predicted_h, state, self.follow, self.run, MOST_ITERATIONS)
         if found is None:
             return lost_resonance(self.follow, state)
         return replace(state, **vars(found))
@@ -213,4 +213,4 @@ class WearingJoint:
 
 def is_stable_when_held(joint: Joint, at: Evaluation, run: Run) -> bool:
     """Whether a state is stable at fixed wear depth."""
-    return is_stable(Balance.frozen(joint, at.history, at.wear_depth), at, run)
+    return is_stable(Balance(joint, at.history, at.wear_depth), at, run)

@@ -132,9 +132,9 @@ def _report(options: argparse.Namespace) -> int:
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
         from studyrunner.report.contents import draw_report
         from studyrunner.report.page.page import write_page
-        from studyrunner.report.reading.result import open_for_report
-        from studyrunner.report.reading.schema_check import check_numbers, reading_errors
         from studyrunner.report.root.vtu import find_writer
+        from studyrunner.result.schema_check import check_numbers, reading_errors
+        from studyrunner.result.view import open_for_report
         from studyrunner.system.progress import count, format_seconds
 
         result = open_for_report(options.result, options.point, options.measured)

@@ -16,9 +16,9 @@ from studyrunner.report.figures.scatter import draw_scatter
 from studyrunner.report.figures.sector import OF_SECTOR, draw_sector
 from studyrunner.report.figures.trends import draw_trends
 from studyrunner.report.figures.volume import draw_excitation, draw_volumes
-from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.scene_pairs import of_shown_scene
 from studyrunner.report.root.figures import draw_mode_fractions, draw_root
+from studyrunner.result.scene_pairs import of_shown_scene
+from studyrunner.result.view import Result
 
 Item = Drawing | Missing | Table
 _Part = Callable[[Result], Iterator[Item]]

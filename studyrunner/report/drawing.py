@@ -25,8 +25,8 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import AutoLocator, FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.units import show_power
+from studyrunner.result.units import show_power
+from studyrunner.result.view import Result
 
 WIDTH = 7.5
 """Inches of a figure across a printed page: 190 mm, both columns of a journal."""

@@ -14,12 +14,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.known_volumes import Certainty, advise_ended, certainty_of, describe_ended
-from studyrunner.report.reading.missions import as_history
-from studyrunner.report.reading.points import COMPLETE_WORDS
-from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.sample_statistics import SAMPLE
-from studyrunner.report.reading.units import show_number
+from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, describe_ended
+from studyrunner.result.missions import as_history
+from studyrunner.result.points import COMPLETE_WORDS
+from studyrunner.result.sample_statistics import SAMPLE
+from studyrunner.result.units import show_number
+from studyrunner.result.view import Result
 from studyrunner.statistics.ranking import describe_ranking
 from studyrunner.statistics.sentence import describe_volumes
 from studyrunner.summary.doubts import doubts

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.result import Result
+from studyrunner.result.view import Result
 
 SMALL = 0.1
 """Largest depth over the width of the contact that is called small: slopes and stiffness change by that order."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from studyrunner.percent import show_percent
-from studyrunner.report.reading.units import scale_for, show_cycles, show_number
+from studyrunner.result.units import scale_for, show_cycles, show_number
 from studyrunner.summary.answer import Failure, ModeRange, Samples, Summary
 from studyrunner.summary.wear import Deepest, Life, MostWear, NothingWore, Number, Vibration
 from studyrunner.system.progress import count

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studyrunner.report.reading.result import NO_VOLUME, Result
+from studyrunner.result.view import NO_VOLUME, Result
 
 _MESH = "mesh"
 _ORDERS = (0.5, 4.0)

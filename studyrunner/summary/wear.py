@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.points import WELL_ENOUGH
-from studyrunner.report.reading.result import NO_VOLUME, Result
-from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
+from studyrunner.result.points import WELL_ENOUGH
+from studyrunner.result.scene_pairs import last_depth, tells_depth
+from studyrunner.result.view import NO_VOLUME, Result
 
 _NO_SLIP = 1e-12  # m, round-off: less than the size of an atom
 

@@ -28,7 +28,7 @@ from matplotlib.container import ErrorbarContainer
 import studies
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Drawing
-from studyrunner.report.reading.result import Result, open_for_report
+from studyrunner.result.view import Result, open_for_report
 from tests.benchmarks.small_png import shrink
 
 FOLDER = Path(studies.__file__).parent / "pictures"

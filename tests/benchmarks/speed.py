@@ -67,7 +67,7 @@ def iteration_at(model: ReducedModel, start: StartState, settings: SolverSetting
     state = start.state
     case = build_case(model, FRICTION, start.penalty_omega, settings)
     joint = case.joint(state.omega, state.excitation_amplitude)
-    balance = Balance.frozen(joint, state.start_history, state.wear_depth)
+    balance = Balance(joint, state.start_history, state.wear_depth)
     predicted = balance.predict(state.displacement_h, state.contact_force_h)
     solver = JacobianSolver()
 

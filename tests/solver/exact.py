@@ -109,7 +109,7 @@ def first_found(exact: ExactState, case: Case, budget: Budget) -> State:
         return point
 
     def balance_at(omega: float, history: np.ndarray) -> Balance:
-        return Balance.frozen(case.joint(omega, exact.amplitude), history, idle)
+        return Balance(case.joint(omega, exact.amplitude), history, idle)
 
     run = Run(case.settings.tolerance, budget)
     at = State(point.evaluation, point.history, begin)

@@ -24,7 +24,7 @@ def upper_branch_size(amplitude):
     idle = np.zeros(1)
 
     def balance_at(omega, history):
-        return Balance.frozen(case.joint(omega, amplitude), history, idle)
+        return Balance(case.joint(omega, amplitude), history, idle)
 
     found = first_point(case, 0.9, amplitude, idle)
     point = State(found.evaluation, found.history, 0.9)

@@ -79,7 +79,7 @@ def test_predict_is_the_inverse_of_evaluate(kinds, wear):
     balance, predicted = case(kinds, 5, wear)
     at = balance.evaluate(predicted)
     # what a state stores is its own depth; from there no wear is left to add
-    stored = Balance.frozen(balance.joint, balance.history, at.wear_depth)
+    stored = Balance(balance.joint, balance.history, at.wear_depth)
     back = stored.predict(at.displacement_h, at.force_h)
     assert back == pytest.approx(predicted, abs=1e-11 * np.abs(predicted).max())
     assert np.abs(stored.evaluate(back).residual - at.residual).max() < 1e-10 * np.abs(at.residual).max()

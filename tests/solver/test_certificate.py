@@ -23,7 +23,7 @@ def on_branch(model, friction, amplitude, omega, settings, sweep="up"):
     """The state of a sweep, evaluated from what is stored of it."""
     (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
     joint = build_case(model, friction, start.penalty_omega, settings).joint(omega, amplitude)
-    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
+    balance = Balance(joint, start.state.start_history, start.state.wear_depth)
     predicted = balance.predict(start.state.displacement_h, start.state.contact_force_h)
     return joint, balance.evaluate(predicted)
 
@@ -50,7 +50,7 @@ def vibro_impact(omega, n_harmonics, sweep="up"):
     omegas = [*np.arange(0.9, omega, 0.1), omega]
     start = branch_states(model, 0.0, 0.02, omegas, settings)[-1]
     joint = build_case(model, 0.0, start.penalty_omega, settings).joint(omega, 0.02)
-    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
+    balance = Balance(joint, start.state.start_history, start.state.wear_depth)
     return joint, balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
 
 
@@ -96,7 +96,7 @@ def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_oversho
 
 def test_an_unconverged_force_is_caught_by_the_residual():
     for joint, evaluation in (slider(5), random_state(1)):
-        balance = Balance.frozen(joint, evaluation.history, evaluation.wear_depth)
+        balance = Balance(joint, evaluation.history, evaluation.wear_depth)
         noise = np.random.default_rng(0).normal(size=evaluation.predicted_h.shape)
         size = np.abs(evaluation.predicted_h).max()
         assert "residual" in failing(joint, balance.evaluate(evaluation.predicted_h + 1e-5 * size * noise))

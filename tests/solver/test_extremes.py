@@ -116,7 +116,7 @@ def judge_start(case, start):
     if start.state is None:
         return
     joint = build_case(case.model, case.friction, start.penalty_omega, case.settings).joint(case.omega, case.amplitude)
-    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
+    balance = Balance(joint, start.state.start_history, start.state.wear_depth)
     evaluation = balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
     certificate = certify(joint, evaluation)
     assert certificate.holds(case.settings.tolerance), certificate.sentence(case.settings.tolerance)

@@ -174,7 +174,7 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case):
         for sign in (1.0, -1.0):
             depth = at.wear_depth.copy()
             depth[pair] += sign * step
-            balance = Balance.frozen(joint, at.history, depth)
+            balance = Balance(joint, at.history, depth)
             solved = Run(1e-13).solve(balance, at.predicted_h)
             works.append(solved.evaluation.slip_work)
         wanted = (works[0] - works[1]) / (2.0 * step)

@@ -39,7 +39,7 @@ def state_at(model, friction, excitation, frequency, settings=None):
     start = start_of(model, friction, excitation, frequency, settings)
     case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
     joint = case.joint(2.0 * np.pi * frequency, excitation)
-    balance = Balance.frozen(joint, start.state.start_history, start.state.wear_depth)
+    balance = Balance(joint, start.state.start_history, start.state.wear_depth)
     return case, joint, balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
 
 

@@ -20,7 +20,7 @@ def joint_and_state(retainer, status):
     case = build_case(model, 0.3, 1332.0, SolverSettings(), Resolution((1,), 16))
     joint = case.joint(1332.0, 1.0)
     n_contact = model.contact.n_contact
-    balance = Balance.frozen(joint, np.zeros((n_contact, 2)), np.zeros(n_contact))
+    balance = Balance(joint, np.zeros((n_contact, 2)), np.zeros(n_contact))
     pressed = np.zeros((n_contact, 3, 3))
     pressed[:, 0, 0] = 100.0
     at = balance.evaluate(joint.to_relative(pressed))

@@ -11,8 +11,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
 from solver.newton.bordering import Bordered, bordered_step
 from solver.newton.krylov import ritz_values
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
+from solver.newton.linear_solver import DENSE_UNKNOWNS, JacobianSolver
 from solver.newton.run import Run
 from solver.settings import SolverSettings
 from solver.stability.hill import is_stable
@@ -25,7 +24,7 @@ CASE = build_case(scene("vibro_impact"), 0.0, 1.55, SETTINGS)
 
 
 def balance_at(omega, history):
-    return Balance.frozen(CASE.joint(omega, FORCE), history, np.zeros(1))
+    return Balance(CASE.joint(omega, FORCE), history, np.zeros(1))
 
 
 @lru_cache
@@ -71,7 +70,7 @@ def test_the_sign_with_a_kept_factorisation_is_that_of_the_dense_matrix(seed):
     settings = SolverSettings(3, 24)
     # wear in the step so large that signs of both kinds come up
     balance, predicted = random_balance(random_model(seed, ("3d",) * 14, 4), settings, seed, wear=True)
-    assert predicted.size > NEWTON.dense_unknowns
+    assert predicted.size > DENSE_UNKNOWNS
     random = np.random.default_rng(seed)
     solver = JacobianSolver()
     for _ in range(6):

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
+from solver.newton.linear_solver import DENSE_UNKNOWNS, JacobianSolver
 from solver.settings import SolverSettings
 from tests.solver.models import PRELOAD, random_balance, random_model
 
@@ -15,7 +14,7 @@ ACCURACY = 2e-3  # relative residual of a direction: Newton's method gains three
 def large(seed, wear=True):
     """13 pairs, 39 displacements, 273 unknowns: above the size that is solved directly, and a small joint."""
     balance, predicted = random_balance(random_model(seed, ("3d",) * 13, 4), SETTINGS, seed, wear=wear)
-    assert predicted.size > NEWTON.dense_unknowns
+    assert predicted.size > DENSE_UNKNOWNS
     return balance, predicted
 
 

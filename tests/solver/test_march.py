@@ -3,8 +3,7 @@
 import pytest
 
 from solver.harmonic_balance.state import Failure
-from solver.march.steps import Lengths, take_step
-from solver.options import COMMON
+from solver.march.steps import LARGEST_STEP_RATIO, STEP_SAFETY, Lengths, take_step
 from solver.outcome import Outcome
 
 
@@ -31,15 +30,15 @@ def test_the_next_step_is_as_long_as_allowed_but_for_a_safety(order):
     lengths = Lengths(order)
     end, ahead = take_step(Line(allowed=0.8, order=order), 2.0, 0.6, lengths)
     assert end == 2.6
-    assert ahead == pytest.approx(COMMON.step_safety * 0.8)
+    assert ahead == pytest.approx(STEP_SAFETY * 0.8)
     _, ahead = take_step(Line(allowed=100.0, order=order), 2.0, 0.6, lengths)
-    assert ahead == pytest.approx(COMMON.largest_step_ratio * 0.6)
+    assert ahead == pytest.approx(LARGEST_STEP_RATIO * 0.6)
 
 
 def test_a_refused_step_is_made_again_as_long_as_allowed():
     line = Line(allowed=0.5)
     end, _ = take_step(line, 0.0, 1.0, Lengths(2))
-    assert line.tried == pytest.approx([1.0, 0.5 * COMMON.step_safety])
+    assert line.tried == pytest.approx([1.0, 0.5 * STEP_SAFETY])
     assert end == line.tried[-1]
 
 

@@ -23,7 +23,7 @@ def wall(omega, n_harmonics=5):
     idle = np.zeros(1)
 
     def balance_at(amplitude, history):
-        return Balance.frozen(case.joint(omega, amplitude), history, idle)
+        return Balance(case.joint(omega, amplitude), history, idle)
 
     def first(amplitude):
         found = first_point(case, omega, amplitude, idle)
@@ -65,7 +65,7 @@ def test_history_is_handed_on_or_kept():
     idle = np.zeros(2)
 
     def balance_at(amplitude, history):
-        return Balance.frozen(case.joint(OMEGA, amplitude), history, idle)
+        return Balance(case.joint(OMEGA, amplitude), history, idle)
 
     found = first_point(case, OMEGA, 20.0, idle)
     start = State(found.evaluation, found.history, 20.0)

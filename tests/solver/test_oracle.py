@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from solver.loading_history.start_states import follow_branch
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
+from solver.newton.linear_solver import DENSE_UNKNOWNS, JacobianSolver
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from studies.scenes import build_scene, scene_parameters
@@ -28,7 +27,7 @@ def sector():
     """The dovetail sector with a coarse mesh: 264 unknowns, above the size that is always solved densely."""
     model = build_scene("dovetail_sector", scene_parameters("dovetail_sector")(mesh=1), 5)
     n_rel = 3 * model.contact.n_contact
-    assert 11 * n_rel > NEWTON.dense_unknowns
+    assert 11 * n_rel > DENSE_UNKNOWNS
     return model
 
 

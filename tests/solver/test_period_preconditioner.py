@@ -6,11 +6,10 @@ import numpy as np
 
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.newton import linear_solver, preconditioner
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
+from solver.newton import linear_solver
+from solver.newton.linear_solver import JacobianSolver, build_factor
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor, stiffness_of_most
-from solver.newton.preconditioner import SlipFactor, build_factor
+from solver.newton.slip_preconditioner import SlipFactor
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import build_case
@@ -77,7 +76,7 @@ def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch):
     omega = 2.0 * np.pi * 213.0
     joint = build_case(model, 0.5, omega, SETTINGS, Resolution(all_orders(13), 128)).joint(omega, 5.0)
     idle = np.zeros(model.contact.n_contact)
-    balance = Balance.frozen(joint, np.zeros((model.contact.n_contact, 2)), idle)
+    balance = Balance(joint, np.zeros((model.contact.n_contact, 2)), idle)
     predicted = joint.structure.force_h()
     predicted[:, 1:3] = predicted[:, :1] * np.random.default_rng(1).normal(size=(joint.component_index.size, 2))
     tangent = tangent_of(balance, predicted)
@@ -89,15 +88,15 @@ def test_a_dovetail_that_slips_and_opens_takes_few_products(monkeypatch):
     found = products(monkeypatch, tangent, right, 2e-3)
     # 25 with the resonances of the structure taken into account
     assert found <= 30
-    monkeypatch.setattr(preconditioner, "NEWTON", replace(NEWTON, most_directions=300))
-    monkeypatch.setattr(preconditioner, "build_period_factor", lambda _: None)
+    monkeypatch.setattr(linear_solver, "MOST_DIRECTIONS", 300)
+    monkeypatch.setattr(linear_solver, "build_period_factor", lambda _: None)
     assert isinstance(build_factor(tangent), SlipFactor)
     assert found < 0.75 * products(monkeypatch, tangent, right, 0.1)
 
 
 def test_a_kept_one_serves_states_nearby_and_the_sign_of_the_determinant(monkeypatch):
-    monkeypatch.setattr(linear_solver, "NEWTON", replace(NEWTON, dense_unknowns=0))
-    monkeypatch.setattr(preconditioner, "NEWTON", replace(NEWTON, small_joint_displacements=0))
+    monkeypatch.setattr(linear_solver, "DENSE_UNKNOWNS", 0)
+    monkeypatch.setattr(linear_solver, "SMALL_JOINT", 0)
     balance, predicted = case(8, highest=5, samples=64)
     solver = JacobianSolver()
     random = np.random.default_rng(9)

@@ -74,7 +74,7 @@ def test_derivatives_with_the_frequency_are_those_of_finite_differences(word):
         joint = case.joint(OMEGA, 0.5)
         predicted = np.random.default_rng(0).normal(size=(joint.component_index.size, 7)) * 10.0
         predicted[joint.component_index % 3 == 0, 0] += 100.0
-        balance = Balance.frozen(joint, np.zeros((16, 2)), np.zeros(16))
+        balance = Balance(joint, np.zeros((16, 2)), np.zeros(16))
         state = Bordered(balance, balance.evaluate(predicted), np.array([OMEGA]), np.zeros(1))
     found, length = frequency_derivative(state.balance, state.at), 1e-5 * OMEGA
     ends = []

@@ -89,7 +89,7 @@ def residual_of(model, scene, evaluation, *, load=1.0, length=1.0):
     omega = 2.0 * np.pi * scene.frequency_hz
     case = build_case(model, scene.friction, omega, SETTINGS)
     joint = case.joint(omega, load * scene.amplitude)
-    balance = Balance.frozen(joint, length * evaluation.history, length * evaluation.wear_depth)
+    balance = Balance(joint, length * evaluation.history, length * evaluation.wear_depth)
     predicted = balance.predict(length * evaluation.displacement_h, load * evaluation.force_h)
     other = balance.evaluate(predicted)
     return other.scaled_residual(), other
@@ -215,7 +215,7 @@ def test_the_tangents_may_be_turned(seed, angle):
     omega = 2.0 * np.pi * scene.frequency_hz
     case = build_case(replace(model, linear={0: turned}), scene.friction, omega, SETTINGS)
     other_joint = replace(case, penalty=joint.penalty).joint(omega, scene.amplitude)
-    balance = Balance.frozen(other_joint, history_m, at.wear_depth)
+    balance = Balance(other_joint, history_m, at.wear_depth)
     other = balance.evaluate(balance.predict(displacement_h, force_h))
     assert other.scaled_residual() <= 2.0 * SETTINGS.tolerance
     # a pair that static load alone has brought to its limit slips by round-off

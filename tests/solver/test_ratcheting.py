@@ -86,6 +86,6 @@ def test_wear_of_other_harmonics_is_not_that_of_ratcheting_to_their_mean_positio
     case = build_case(scene.model, scene.friction, start.penalty_omega, SolverSettings(), start.resolution)
     joint = case.joint(start.state.omega, scene.amplitude)
     state = start.state
-    balance = Balance.frozen(joint, state.start_history, state.wear_depth)
+    balance = Balance(joint, state.start_history, state.wear_depth)
     evaluation = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
     assert evaluation.slip_work.sum() < 1e-13

@@ -9,7 +9,7 @@ from solver.structure import condensation
 from solver.structure import rough_forms as room
 from solver.structure.condensation import build_structure
 from solver.structure.harmonic_stiffness import SharedStiffness
-from solver.structure.options import STRUCTURE
+from solver.structure.rough_forms import ROUGH
 from tests.solver.models import scene
 
 OMEGA = 2.0 * np.pi * 210.0
@@ -38,7 +38,7 @@ def error(structure):
 @pytest.mark.usefixtures("shared")
 @pytest.mark.parametrize(("directions", "least", "most"), [(6, 1e-5, 1e-3), (48, 0.0, 1e-6)])
 def test_few_motions_carry_the_mass(monkeypatch, directions, least, most):
-    monkeypatch.setattr(room, "STRUCTURE", replace(STRUCTURE, rough_directions=directions))
+    monkeypatch.setattr(room, "ROUGH_DIRECTIONS", directions)
     # one of its own: forms are kept by structure
     structure = structure_of(replace(scene("dovetail_sector", 13, mesh=1).linear[0]))
     rough = structure.moving.rough
@@ -49,12 +49,12 @@ def test_few_motions_carry_the_mass(monkeypatch, directions, least, most):
     # the cached value
     vars(moving)["rough"] = rough._replace(core=0.0 * rough.core)
     still = replace(structure, moving=moving)
-    assert error(still) > 10.0 * STRUCTURE.rough
+    assert error(still) > 10.0 * ROUGH
 
 
 @pytest.mark.usefixtures("shared")
 def test_where_many_motions_are_damped_in_their_own_way_each_harmonic_has_its_matrix(monkeypatch):
-    monkeypatch.setattr(room, "STRUCTURE", replace(STRUCTURE, rough_directions=4))
+    monkeypatch.setattr(room, "ROUGH_DIRECTIONS", 4)
     model = scene("dovetail_sector", 13, mesh=1)
     relative = model.contact.dofs.ravel()
     root = np.random.default_rng(2).normal(size=(relative.size, relative.size))

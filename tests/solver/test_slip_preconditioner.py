@@ -1,14 +1,10 @@
 """Factorisation in the slip space against a dense one of the whole Jacobian."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from solver.newton import preconditioner
-from solver.newton.linear_solver import JacobianSolver
-from solver.newton.options import NEWTON
-from solver.newton.preconditioner import build_factor
+from solver.newton import linear_solver
+from solver.newton.linear_solver import JacobianSolver, build_factor
 from solver.newton.slip_preconditioner import SlipFactor, build_slip_factor, largest_directions
 from solver.settings import SolverSettings
 from tests.solver.models import PRELOAD, random_balance, random_model
@@ -62,8 +58,8 @@ def test_the_largest_directions_steer_the_iteration(monkeypatch):
     assert part.size == most
     assert not part.exact
     assert whole.exact
-    monkeypatch.setattr(preconditioner, "NEWTON", replace(NEWTON, most_directions=most))
-    monkeypatch.setattr(preconditioner, "build_period_factor", lambda _: None)
+    monkeypatch.setattr(linear_solver, "MOST_DIRECTIONS", most)
+    monkeypatch.setattr(linear_solver, "build_period_factor", lambda _: None)
     found = build_factor(tangent)
     assert isinstance(found, SlipFactor)
     assert not found.exact

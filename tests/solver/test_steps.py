@@ -7,7 +7,7 @@ import pytest
 
 from solver.accuracy.error_estimate import Estimate, euler_error
 from solver.accuracy.period_events import left_out
-from solver.options import COMMON
+from solver.march.steps import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.packing import in_rows, pack, unpack
 from solver.settings import Scheme, SolverSettings
 from solver.wear import control
@@ -77,7 +77,7 @@ def test_without_an_end_each_step_wears_as_much_as_the_first_and_is_at_most_twic
     states, steps = steps_of(GivenSteps("implicit", 2e4, np.inf), 12)
     lengths, rate = np.array([step.length for step in steps]), rates(states)
     slower = np.maximum.accumulate(rate) / rate
-    allowed = np.concatenate([[2e4], COMMON.largest_step_ratio * lengths[:-1]])
+    allowed = np.concatenate([[2e4], LARGEST_STEP_RATIO * lengths[:-1]])
     assert lengths == pytest.approx(np.minimum(allowed, 2e4 * slower[:-1]), rel=1e-12)
     assert lengths[-1] > 2.0 * lengths[0]
 
@@ -91,7 +91,7 @@ def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
         at_mean_rate = worn[place + 1] * step.length / at[place + 1]
         allowed = OPTIONS.step_error_fraction * rtol * max(worn[place + 1] - worn[place], at_mean_rate)
         assert step.volume_error(np.array([AREA])) <= allowed
-    assert (lengths[1:] <= COMMON.largest_step_ratio * lengths[:-1] * (1.0 + 1e-12)).all()
+    assert (lengths[1:] <= LARGEST_STEP_RATIO * lengths[:-1] * (1.0 + 1e-12)).all()
     assert (steps_of(AdaptiveSteps(1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
 
 
@@ -112,7 +112,7 @@ def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monk
     with monkeypatch.context() as patch:
         tried, _ = failing(patch, lambda n, _, scheme: scheme == "adaptive" and n == 1)
         _, (shorter, *_) = steps_of(AdaptiveSteps(1e-2), 1)
-    assert tried[:2] == [first, COMMON.smallest_step_ratio * first]
+    assert tried[:2] == [first, SMALLEST_STEP_RATIO * first]
     assert shorter.length == tried[-1]
     failing(monkeypatch, lambda _, __, scheme: scheme == "adaptive")
     states, (euler, *_) = steps_of(AdaptiveSteps(1e-2), 1)

@@ -35,7 +35,7 @@ def from_rest(model, friction, amplitude, omega, settings):
     idle = np.zeros(model.contact.n_contact)
     quiet = case.joint(omega, 0.0)
     static = solve_static_state(quiet, idle, Run(settings.tolerance))
-    still = Balance.frozen(quiet, static.history, idle)
+    still = Balance(quiet, static.history, idle)
     at = static.evaluation
     orders = case.resolution.orders
     start = still.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
@@ -67,7 +67,7 @@ def upper_state(case, omega):
     """Vibro-impact on the branch with impacts."""
     state = converged_state(case.model, 0.0, FORCE, omega, case.settings)
     idle = np.zeros(1)
-    balance = Balance.frozen(case.joint(omega, FORCE), state.start_history, idle)
+    balance = Balance(case.joint(omega, FORCE), state.start_history, idle)
     at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
     assert np.abs(state.contact_force_h).max() > 1e-2
     return State(at, state.start_history, omega)
@@ -134,7 +134,7 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure():
         inverse = steps / end
         predicted = np.zeros((1, 5))
         for _ in range(steps):
-            balance = Balance.frozen(transient.step(motion, inverse), history, idle)
+            balance = Balance(transient.step(motion, inverse), history, idle)
             result = Run(1e-10).solve(balance, predicted)
             assert result.converged
             predicted = result.evaluation.predicted_h

@@ -87,7 +87,7 @@ def test_the_structure_settles_to_the_state_that_the_balance_has():
         joint.structure.response_h(joint.to_relative(at.evaluation.displacement_h))[0, 1:3] for at in (point, settled)
     )
     assert np.linalg.norm(one - other) < 0.05 * np.linalg.norm(one)
-    kept = Balance.frozen(joint, settled.evaluation.history, np.zeros(16)).evaluate(settled.evaluation.predicted_h)
+    kept = Balance(joint, settled.evaluation.history, np.zeros(16)).evaluate(settled.evaluation.predicted_h)
     assert kept.scaled_residual() < 2.0 * SETTINGS.tolerance
-    again = final_history(Balance.frozen(joint, settled.history, np.zeros(16)), settled.evaluation)
+    again = final_history(Balance(joint, settled.history, np.zeros(16)), settled.evaluation)
     assert np.abs(again - settled.history).max() <= 1e-9 * np.abs(settled.history).max()

@@ -187,7 +187,7 @@ def _mutate(kind: str, whole: Mapping[str, bytes], chance: random.Random) -> Non
 def ask(path: Path) -> int:
     """Opens a result and asks it all that there is to ask; what it does not hold it says by ValueError or KeyError."""
     from studyrunner.accessor import join_results
-    from studyrunner.report.reading.result import open_for_report
+    from studyrunner.result.view import open_for_report
 
     try:
         dataset = open_for_report(path).dataset

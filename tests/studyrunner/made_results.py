@@ -11,11 +11,11 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from studyrunner.checkpoint.records import variable_sizes
-from studyrunner.netcdf.attributes import attributes, coordinates, scene_arrays
-from studyrunner.netcdf.provenance import POINTS_LEFT, describe_run
 from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.results import MarchResult
 from studyrunner.plan.sharing import Index
+from studyrunner.result.arrays import attributes, coordinates, scene_arrays
+from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.scene.variables import SceneVariable

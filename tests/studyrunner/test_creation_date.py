@@ -7,7 +7,7 @@ import pytest
 
 from studyrunner.api import run_study
 from studyrunner.cli import main
-from studyrunner.netcdf.creation_date import check_date
+from studyrunner.result.creation_date import check_date
 from studyrunner.user_error import UserError
 from tests.studyrunner.faked_runs import SMALL
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from studyrunner import UserError, run_study
 from studyrunner.cli import main
-from studyrunner.netcdf.provenance import POINTS_LEFT
+from studyrunner.result.provenance import POINTS_LEFT
 from tests.studyrunner.faked_runs import SMALL
 
 pytestmark = pytest.mark.usefixtures("solver", "folder")

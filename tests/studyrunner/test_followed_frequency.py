@@ -9,7 +9,7 @@ import xarray as xr
 from studyrunner.cli import main
 from studyrunner.report.drawing import Drawing
 from studyrunner.report.figures.volume import draw_excitation
-from studyrunner.report.reading.result import Result
+from studyrunner.result.view import Result
 from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.test_scene_axes import arguments, compute
 

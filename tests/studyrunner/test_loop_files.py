@@ -8,9 +8,9 @@ import pytest
 
 from solver.results.loops import LOOP_PHASES
 from studyrunner import variables
-from studyrunner.netcdf.attributes import coordinates
-from studyrunner.netcdf.write import write_result
 from studyrunner.plan.planning import build_tasks
+from studyrunner.result.arrays import coordinates
+from studyrunner.result.write import write_result
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, changed, fake_march, fake_starts, open_completion, without_values

@@ -10,7 +10,7 @@ from studyrunner.api import run_study
 from studyrunner.plan.planning import build_tasks
 from studyrunner.report.contents import draw_report
 from studyrunner.report.page.page import write_page
-from studyrunner.report.reading.result import open_for_report
+from studyrunner.result.view import open_for_report
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study, read_study
 

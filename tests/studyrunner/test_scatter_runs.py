@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.netcdf.sample_coordinates import sample_coordinates
 from studyrunner.plan.planning import build_tasks
+from studyrunner.result.sample_coordinates import sample_coordinates
 from studyrunner.scene import drawn_contacts
 from studyrunner.scene.drawn_contacts import contact_changes, pair_values
 from studyrunner.scene.scene import build_study_scene, describe_scene

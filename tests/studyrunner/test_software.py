@@ -8,8 +8,8 @@ import netCDF4
 import pytest
 
 from studyrunner.cli import main
-from studyrunner.netcdf import software
-from studyrunner.netcdf.software import CHANGED, commit_of, describe_software
+from studyrunner.result import software
+from studyrunner.result.software import CHANGED, commit_of, describe_software
 from tests.studyrunner.faked_runs import SMALL
 
 WHO = ("-c", "user.name=a", "-c", "user.email=b")

@@ -11,7 +11,7 @@ import xarray as xr
 
 from studies.scene_file import read_mesh, read_scene
 from studyrunner.cli import main
-from studyrunner.netcdf import provenance
+from studyrunner.result import provenance
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.study.study_file import read_study
 from tests.mpi.launching import results

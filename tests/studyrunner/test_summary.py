@@ -11,9 +11,9 @@ from solver.outcome import Outcome
 from studyrunner.advice import Used, advise, advise_error, advise_steps
 from studyrunner.percent import show_percent, show_rtol
 from studyrunner.report.figures.outcome import list_certificates
-from studyrunner.report.reading.known_volumes import settings_of
-from studyrunner.report.reading.missions import as_history
-from studyrunner.report.reading.result import Result
+from studyrunner.result.certainty import settings_of
+from studyrunner.result.missions import as_history
+from studyrunner.result.view import Result
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import ModeRange, Samples, summary
 from studyrunner.summary.doubts import SMALL, contact_width
@@ -260,7 +260,7 @@ def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
     made = wearing(*GRID, volume=lambda p: 1e-9 * (3 * p[0] + p[4]), slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
     whole = summary(made)
     for n_values in (1, 7, 50, 100):
-        monkeypatch.setattr("studyrunner.report.reading.points._AT_ONCE", n_values)
+        monkeypatch.setattr("studyrunner.result.points._AT_ONCE", n_values)
         assert str(summary(made)) == str(whole)
         largest = []
         result_of(made).over_points(

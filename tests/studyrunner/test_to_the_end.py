@@ -9,8 +9,8 @@ import xarray as xr
 from studyrunner import open_result, run_study
 from studyrunner.accessor import join_results
 from studyrunner.plan.planning import build_tasks
-from studyrunner.report.reading.result import open_for_report
-from studyrunner.report.reading.schema_check import check_numbers
+from studyrunner.result.schema_check import check_numbers
+from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 
 END = (
@@ -71,7 +71,7 @@ def test_the_report_shows_a_final_state_as_one(tmp_path):
     from studyrunner.report.figures.courses import find_course
     from studyrunner.report.figures.volume import draw_history, draw_map, draw_volumes
     from studyrunner.report.page.data import build_page_data
-    from studyrunner.report.reading.units import scale_for
+    from studyrunner.result.units import scale_for
 
     two = study_with('axes.scheme=["adaptive", "final"]', "axes.frequency=[155, 160]")
     with run_study(two, tmp_path / "both.nc"):

@@ -10,11 +10,11 @@ import pytest
 import xarray as xr
 
 from studyrunner.accessor import FretwearAccessor
-from studyrunner.netcdf import write as writing
-from studyrunner.netcdf.attributes import coordinates, scene_arrays
-from studyrunner.netcdf.output import progress_file
-from studyrunner.netcdf.provenance import describe_run
 from studyrunner.plan.planning import build_tasks
+from studyrunner.result import write as writing
+from studyrunner.result.arrays import coordinates, scene_arrays
+from studyrunner.result.paths import progress_file
+from studyrunner.result.provenance import describe_run
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
 from studyrunner.system import files

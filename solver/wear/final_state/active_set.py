@@ -25,8 +25,8 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, final_history
 from solver.model import BoolArray, FloatArray
-from solver.newton.options import NEWTON
-from solver.options import COMMON
+from solver.newton.linear_solver import FORCING
+from solver.settings import NEGLIGIBLE
 from solver.structure.joint import Joint
 from solver.wear.state import Reached, WearState
 from solver.wear.step import held_wear
@@ -87,7 +87,7 @@ def wear_off(work: WearingJoint, state: WearState, unworn: FloatArray, off: Bool
         off, n_rounds = off | begin, n_rounds + 1
         point = without(work, state, unworn, off)
         depth = grazing_depth(joint, point.evaluation, unworn, off)
-        held = Balance.frozen(joint, point.evaluation.history, depth)
+        held = Balance(joint, point.evaluation.history, depth)
         grazing = held.evaluate(held.predict(point.evaluation.displacement_h, point.evaluation.force_h))
         grazes = State(grazing, final_history(held, grazing))
         state = replace(
@@ -118,13 +118,13 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
     overlap = np.divide(forces, stiffness, out=np.zeros_like(forces), where=stiffness > 0.0)
     grazing = np.maximum(closing(joint, last.evaluation), unworn)
     # a pair that grazes without force has no overlap
-    least = COMMON.negligible * float(np.abs(grazing[off]).max(initial=0.0))
+    least = NEGLIGIBLE * float(np.abs(grazing[off]).max(initial=0.0))
     # the pair has to remain open while others are opened: the result does not depend on the distance
     margin = 10.0 * max(unworn.size * float(overlap.max()), least)
     force_h = np.where(off[:, None, None], 0.0, last.evaluation.force_h)
     for _ in range(CONTINUATION.attempts):
         depth = np.where(off, np.maximum(closing(joint, last.evaluation), unworn) + margin, unworn)
-        balance = Balance.frozen(joint, last.history, depth)
+        balance = Balance(joint, last.history, depth)
         start = balance.predict(last.evaluation.displacement_h, force_h)
         found = work.run.solve(balance, start)
         point = State(found.evaluation, last.history)
@@ -138,7 +138,7 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
             continue
         if (point.evaluation.status_t[off] == SEPARATED).all():
             # one more iteration: without it the depths of a sphere are 3e-6 off
-            finer = work.run.to(NEWTON.forcing * work.run.tolerance)
+            finer = work.run.to(FORCING * work.run.tolerance)
             exact = finer.solve(balance, found.evaluation.predicted_h)
             return State(exact.evaluation, last.history) if exact.converged else point
         margin *= 10.0

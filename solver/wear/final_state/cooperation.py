@@ -45,7 +45,7 @@ def work_slopes(joint: Joint, at: Evaluation, wearing: WearingWork, run: Run, pa
     From the balance `R(p, W) = 0`, the predicted force follows a depth as `dp = -J^-1 Z E dW`, with E the static normal
     displacements. The dependence of a tabulated wear law itself on the depth is neglected.
     """
-    tangent = Balance.frozen(joint, at.history, at.wear_depth).linearise(at)
+    tangent = Balance(joint, at.history, at.wear_depth).linearise(at)
     force_tangent, slip_work_tangent = joint.law.tangent(at)
     by_work, by_force, _ = wearing.slopes(*worn_by(at))
     row = by_work[:, None] * slip_work_tangent + by_force[:, None] * force_tangent[:, 0, :]

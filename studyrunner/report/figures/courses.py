@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import line_style, set_log
-from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.units import scale_for, units_of
+from studyrunner.result.units import scale_for, units_of
+from studyrunner.result.view import Result
 
 _DECADES = 30.0
 _MANY = 60

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.grid import Grid, find_grid
-from studyrunner.report.reading.result import Result
+from studyrunner.result.grid import Grid, find_grid
+from studyrunner.result.view import Result
 
 JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
 """The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
 from studyrunner.report.drawing import Drawing, Missing, add_legend, line_style, new_panels, title_at
 from studyrunner.report.figures.flanks import JOINT_WORDS
-from studyrunner.report.reading.result import Result, as_sentences
-from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
-from studyrunner.report.reading.units import scale_for
+from studyrunner.result.scene_pairs import last_depth, tells_depth
+from studyrunner.result.units import scale_for
+from studyrunner.result.view import Result, as_sentences
 
 _MOST_PAIRS = 3
 _TITLE = "Fretting loops"

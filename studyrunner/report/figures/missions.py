@@ -21,8 +21,8 @@ from studyrunner.report.drawing import (
     set_from_zero,
     title_at,
 )
-from studyrunner.report.reading.result import NO_VOLUME, Result, as_sentences
-from studyrunner.report.reading.units import scale_for, show_number
+from studyrunner.result.units import scale_for, show_number
+from studyrunner.result.view import NO_VOLUME, Result, as_sentences
 
 _MOST_BLOCKS = 12
 _TO_ASK = ("block_worn_volume", "block_share", "response_amplitude")

@@ -8,8 +8,8 @@ import numpy as np
 
 from studyrunner.report.drawing import Drawing, Missing, add_legend, mark_failed, new_panels, set_log
 from studyrunner.report.figures.courses import Course, find_course
-from studyrunner.report.reading.choice import choose
-from studyrunner.report.reading.result import Result, as_sentences
+from studyrunner.result.choice import choose
+from studyrunner.result.view import Result, as_sentences
 from studyrunner.system.progress import count
 
 _MOST_LINES = 6

@@ -11,9 +11,9 @@ from matplotlib.colors import ListedColormap
 
 from studyrunner.report.drawing import Drawing, Table, add_legend, new_figure
 from studyrunner.report.figures.courses import find_course
-from studyrunner.report.reading.choice import choose
-from studyrunner.report.reading.result import CONVERGED, Result, as_sentences
-from studyrunner.report.reading.units import show_cycles
+from studyrunner.result.choice import choose
+from studyrunner.result.units import show_cycles
+from studyrunner.result.view import CONVERGED, Result, as_sentences
 from studyrunner.variables import CERTIFICATE
 
 _MOST_ROWS, _MOST_CELLS = 24, 400

@@ -26,11 +26,11 @@ from studyrunner.report.drawing import (
 )
 from studyrunner.report.figures.flanks import Flank, find_flanks
 from studyrunner.report.figures.scar import draw_scar_depth, draw_scar_pressure
-from studyrunner.report.reading.choice import choose
-from studyrunner.report.reading.result import Result, as_sentences
-from studyrunner.report.reading.scars import find_scar
-from studyrunner.report.reading.scene_pairs import last_depth, tells_depth
-from studyrunner.report.reading.units import Scale, scale_for
+from studyrunner.result.choice import choose
+from studyrunner.result.scars import find_scar
+from studyrunner.result.scene_pairs import last_depth, tells_depth
+from studyrunner.result.units import Scale, scale_for
+from studyrunner.result.view import Result, as_sentences
 from studyrunner.system.progress import count
 
 FloatArray = NDArray[np.float64]

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from studyrunner.percent import show_percent
 from studyrunner.report.drawing import Drawing, Missing, Table, add_legend, line_style, new_panels, set_log
 from studyrunner.report.figures.settings import KEYS, QUANTITIES, RESOLVED, ComparedPoint, Setting, compare_settings
-from studyrunner.report.reading.result import Result, as_sentences
+from studyrunner.result.view import Result, as_sentences
 from studyrunner.system.progress import count
 
 _MOST_POINTS = 3

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS, Drawing, Missing, add_legend, mark_failed, new_panels, set_from_zero
 from studyrunner.report.figures.courses import Course, find_course
-from studyrunner.report.reading.choice import choose
-from studyrunner.report.reading.result import NO_VOLUME, Point, Result, as_sentences
-from studyrunner.report.reading.units import Scale, scale_for
+from studyrunner.result.choice import choose
+from studyrunner.result.units import Scale, scale_for
+from studyrunner.result.view import NO_VOLUME, Point, Result, as_sentences
 from studyrunner.system.progress import count
 
 _MOST_LINES, _MOST_RESPONSES, _MOST_FOLDS = 3, 3, 12

@@ -17,10 +17,10 @@ from studyrunner.report.drawing import (
     set_from_zero,
     title_at,
 )
-from studyrunner.report.reading.result import Result, as_sentences
-from studyrunner.report.reading.scars import Scar
-from studyrunner.report.reading.scene_pairs import depths, last_depth
-from studyrunner.report.reading.units import scale_for
+from studyrunner.result.scars import Scar
+from studyrunner.result.scene_pairs import depths, last_depth
+from studyrunner.result.units import scale_for
+from studyrunner.result.view import Result, as_sentences
 
 _NO_DEPTH = 1e-15
 """m. A depth below this is round-off: it is far less than an atom."""

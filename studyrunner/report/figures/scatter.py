@@ -24,10 +24,10 @@ from studyrunner.report.drawing import (
 )
 from studyrunner.report.figures.courses import Course, find_course
 from studyrunner.report.figures.volume import slow_time
-from studyrunner.report.reading.choice import choose
-from studyrunner.report.reading.result import NO_VOLUME, Point, Result, as_sentences
-from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
-from studyrunner.report.reading.units import Scale, scale_for
+from studyrunner.result.choice import choose
+from studyrunner.result.sample_statistics import DRAWN, SAMPLE
+from studyrunner.result.units import Scale, scale_for
+from studyrunner.result.view import NO_VOLUME, Point, Result, as_sentences
 from studyrunner.statistics.ranking import deciding_input, describe_ranking, leading_input, measure_of
 from studyrunner.system.progress import count
 

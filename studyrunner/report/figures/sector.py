@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from studyrunner.report.drawing import COLOURS, Drawing, Missing, line_style, new_figure, set_from_zero
-from studyrunner.report.reading.result import Result, as_sentences
 from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint_faces, rgb
 from studyrunner.report.root.surface import MESH
 from studyrunner.report.root.views import from_aslant
+from studyrunner.result.view import Result, as_sentences
 
 OF_SECTOR = (*MESH, "mesh_part", "natural_frequency")
 """Variables that the figure shows."""

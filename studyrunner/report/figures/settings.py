@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.result import NO_VOLUME, Result
-from studyrunner.report.reading.units import show_number
+from studyrunner.result.units import show_number
+from studyrunner.result.view import NO_VOLUME, Result
 
 FloatArray = NDArray[np.float64]
 

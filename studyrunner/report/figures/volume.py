@@ -26,10 +26,10 @@ from studyrunner.report.drawing import (
     set_from_zero,
 )
 from studyrunner.report.figures.courses import Course, cell_edges, find_course
-from studyrunner.report.reading.choice import Choice, choose
-from studyrunner.report.reading.known_volumes import show_error
-from studyrunner.report.reading.result import NO_VOLUME, Result, as_sentences
-from studyrunner.report.reading.units import Scale, scale_for, show_cycles, show_number
+from studyrunner.result.certainty import show_error
+from studyrunner.result.choice import Choice, choose
+from studyrunner.result.units import Scale, scale_for, show_cycles, show_number
+from studyrunner.result.view import NO_VOLUME, Result, as_sentences
 from studyrunner.system.progress import count
 
 _MOST_LINES, _MOST_MAPS = 6, 4

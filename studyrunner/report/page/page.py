@@ -23,7 +23,7 @@ from studyrunner.report.drawing import Drawing, Missing, Table
 from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.root import build_root_numbers
 from studyrunner.report.page.study import describe_study
-from studyrunner.report.reading.result import Result
+from studyrunner.result.view import Result
 from studyrunner.user_error import show_text
 
 DATA_LIMIT = 5e6

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from studyrunner.report.page.data import encode_floats
-from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.scene_pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
 from studyrunner.report.root.painting import body_colours
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.views import find_views
+from studyrunner.result.scene_pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
+from studyrunner.result.view import Result
 
 _MOST_FACES, _MOST_PAIRS = 15_000, 10_000
 """Faces, and contact pairs, that the page draws in three dimensions."""

@@ -9,11 +9,11 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.coordinates import COORDINATES
-from studyrunner.report.reading.endings import Ending
-from studyrunner.report.reading.known_volumes import advise_ended, describe_ended, tell_ends
-from studyrunner.report.reading.result import CONVERGED, Point, Result
-from studyrunner.report.reading.sample_statistics import DRAWN, SAMPLE
-from studyrunner.report.reading.units import scale_for, show_cycles, show_number, units_of
+from studyrunner.result.certainty import advise_ended, describe_ended, tell_ends
+from studyrunner.result.endings import Ending
+from studyrunner.result.sample_statistics import DRAWN, SAMPLE
+from studyrunner.result.units import scale_for, show_cycles, show_number, units_of
+from studyrunner.result.view import CONVERGED, Point, Result
 from studyrunner.statistics.sentence import sentence, sentences
 from studyrunner.summary.answer import summarise
 from studyrunner.summary.lines import summary_rows

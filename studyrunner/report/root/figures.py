@@ -14,14 +14,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import MAP, Drawing, Missing, new_figure, title_at
-from studyrunner.report.reading.result import Result, as_sentences
-from studyrunner.report.reading.scars import find_scar
-from studyrunner.report.reading.scene_pairs import depths, tells_depth
-from studyrunner.report.reading.units import Scale, scale_for, show_number
 from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint_edges, paint_faces, rgb
 from studyrunner.report.root.surface import RootSurface, read_root
 from studyrunner.report.root.views import View, find_views
+from studyrunner.result.scars import find_scar
+from studyrunner.result.scene_pairs import depths, tells_depth
+from studyrunner.result.units import Scale, scale_for, show_number
+from studyrunner.result.view import Result, as_sentences
 
 _MOST_CLOSE_UPS = 2
 _MOST_NUMBERS = 120

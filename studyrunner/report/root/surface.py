@@ -12,8 +12,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from studyrunner.report.reading.result import Result
 from studyrunner.report.root.contact_faces import ContactFaces, face_normals, find_contact_faces
+from studyrunner.result.view import Result
 
 MESH = ("mesh_x", "mesh_y", "mesh_z", "mesh_quad")
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.result import Result
 from studyrunner.report.root.surface import RootSurface, mean_normal
+from studyrunner.result.view import Result
 
 MOST_VIEWS = 8
 

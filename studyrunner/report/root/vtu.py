@@ -14,9 +14,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.scene_pairs import depths, of_shown_scene, tells_depth
 from studyrunner.report.root.surface import RootSurface, read_root
+from studyrunner.result.scene_pairs import depths, of_shown_scene, tells_depth
+from studyrunner.result.view import Result
 from studyrunner.user_error import UserError, Verbatim
 
 FIELDS = ("wear_depth", "mean_pressure", "slip_range", "open_fraction")

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.coordinates import COORDINATES
-from studyrunner.report.reading.result import Result
+from studyrunner.result.view import Result
 from studyrunner.variables import ASKED, KEPT
 
 AXES = ("frequency", "wear_coefficient", "excitation_amplitude", "step", "scheme", "sweep")

@@ -14,8 +14,8 @@ from studyrunner.report.figures.scatter import draw_scatter
 from studyrunner.report.figures.sector import draw_sector
 from studyrunner.report.figures.trends import draw_trends
 from studyrunner.report.figures.volume import draw_volumes
-from studyrunner.report.reading.result import Result
 from studyrunner.report.root.figures import draw_root
+from studyrunner.result.view import Result
 
 OWNERS = {
     draw_outcomes: ("outcome_map",),

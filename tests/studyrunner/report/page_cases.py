@@ -8,7 +8,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.coordinates import COORDINATES
-from studyrunner.report.reading.result import Result, open_for_report
+from studyrunner.result.view import Result, open_for_report
 from studyrunner.variables import ASKED, KEPT, USUAL
 
 FAILED = 4

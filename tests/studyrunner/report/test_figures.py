@@ -16,7 +16,7 @@ from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, set_in_column, style
 from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.report.figures.trends import find_peak, find_quantities
-from studyrunner.report.reading.result import Result
+from studyrunner.result.view import Result
 from tests.studyrunner.report.figure_cases import (
     make_result,
     with_endings,

@@ -3,8 +3,8 @@
 import numpy as np
 
 from studyrunner.report.page.page import write_page
-from studyrunner.report.reading.known_volumes import certainty_of, describe_ended, tell_ends
-from studyrunner.report.reading.result import Result
+from studyrunner.result.certainty import certainty_of, describe_ended, tell_ends
+from studyrunner.result.view import Result
 from tests.studyrunner.report.figure_cases import make_result, with_endings
 from tests.studyrunner.report.figure_numbers import draw_figure
 

@@ -14,7 +14,7 @@ from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Drawing, Missing, Table
 from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.page import write_page
-from studyrunner.report.reading.result import Result, open_for_report
+from studyrunner.result.view import Result, open_for_report
 from tests.studyrunner.faked_blocks import STUDY, FakedBlocks
 from tests.studyrunner.report.browsing import CHROMIUM, DRIVER, load
 

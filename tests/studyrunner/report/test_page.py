@@ -14,7 +14,7 @@ from studyrunner.report.drawing import Drawing, Missing, Table, new_figure
 from studyrunner.report.page import page
 from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.page import inline_svg, write_page
-from studyrunner.report.reading.result import Result
+from studyrunner.result.view import Result
 from tests.studyrunner.report.page_cases import AXES, as_result, build_file
 from tests.studyrunner.report.root_cases import dovetail_file
 

@@ -5,9 +5,9 @@ import pytest
 import xarray as xr
 
 from studyrunner.api import open_result
-from studyrunner.report.reading.choice import choose
-from studyrunner.report.reading.result import open_for_report
-from studyrunner.report.reading.units import scale_for, show_cycles, show_number, show_power
+from studyrunner.result.choice import choose
+from studyrunner.result.units import scale_for, show_cycles, show_number, show_power
+from studyrunner.result.view import open_for_report
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.figure_cases import make_result
 

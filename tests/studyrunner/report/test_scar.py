@@ -8,9 +8,9 @@ import xarray as xr
 
 from studyrunner.report.figures.loops import draw_loops
 from studyrunner.report.figures.pairs import draw_pairs
-from studyrunner.report.reading.measured import read_profile
-from studyrunner.report.reading.result import Result, open_for_report
-from studyrunner.report.reading.scars import find_scar
+from studyrunner.result.measured import read_profile
+from studyrunner.result.scars import find_scar
+from studyrunner.result.view import Result, open_for_report
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.figure_cases import make_result
 from tests.studyrunner.report.page_cases import build_file

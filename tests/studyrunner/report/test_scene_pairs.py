@@ -12,12 +12,12 @@ from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.report.figures.pairs import draw_pairs
 from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.root import build_root_numbers
-from studyrunner.report.reading.choice import choose
-from studyrunner.report.reading.result import Result
-from studyrunner.report.reading.scene_pairs import last_depth, of_scene, of_shown_scene
-from studyrunner.report.reading.schema_check import check_dataset
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.vtu import find_writer
+from studyrunner.result.choice import choose
+from studyrunner.result.scene_pairs import last_depth, of_scene, of_shown_scene
+from studyrunner.result.schema_check import check_dataset
+from studyrunner.result.view import Result
 from tests.studyrunner.report.scatter_cases import mesh_file, sample_file
 from tests.studyrunner.report.test_page import decode
 

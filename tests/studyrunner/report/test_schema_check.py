@@ -12,9 +12,9 @@ import pytest
 import xarray as xr
 
 from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
-from studyrunner.report.reading import schema_check
-from studyrunner.report.reading.result import open_for_report
-from studyrunner.report.reading.schema_check import check_dataset, check_numbers
+from studyrunner.result import schema_check
+from studyrunner.result.schema_check import check_dataset, check_numbers
+from studyrunner.result.view import open_for_report
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.page_cases import build_file
 from tests.studyrunner.report.scatter_cases import sample_file

@@ -10,7 +10,7 @@ import pytest
 from studyrunner.report.drawing import Missing, Table
 from studyrunner.report.figures.precision import draw_precision
 from studyrunner.report.figures.settings import Setting, compare_settings
-from studyrunner.report.reading.result import Result
+from studyrunner.result.view import Result
 from tests.studyrunner.report.page_cases import build_file
 
 AXES = {

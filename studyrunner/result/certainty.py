@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from studyrunner.advice import Used, advise, advise_error
 from studyrunner.percent import show_percent, show_rtol
-from studyrunner.report.reading.points import WELL_ENOUGH
-from studyrunner.report.reading.result import Point, Result
-from studyrunner.report.reading.units import show_cycles
+from studyrunner.result.points import WELL_ENOUGH
+from studyrunner.result.units import show_cycles
+from studyrunner.result.view import Point, Result
 from studyrunner.system.progress import count
 
 _MOST_NAMED = 10

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import variable_sizes
-from studyrunner.netcdf.attributes import SmallArray, attributes
-from studyrunner.netcdf.provenance import POINTS_LEFT
-from studyrunner.netcdf.scene_group import write_scene_group
+from studyrunner.result.arrays import SmallArray, attributes
+from studyrunner.result.provenance import POINTS_LEFT
+from studyrunner.result.scene_group import write_scene_group
 from studyrunner.scene.scene import KeptScene, SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.system.files import find_fault, replacing

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from studyrunner.report.reading.endings import Ending
+from studyrunner.result.endings import Ending
 from studyrunner.scatter.design import SaltelliLayout
 from studyrunner.scatter.section import ScatterSection
 from studyrunner.statistics.study_statistics import worn_volume_statistics

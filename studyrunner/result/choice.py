@@ -7,11 +7,11 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from studyrunner.report.reading.sample_statistics import SAMPLE
+from studyrunner.result.sample_statistics import SAMPLE
 from studyrunner.system.progress import count
 
 if TYPE_CHECKING:
-    from studyrunner.report.reading.result import Result
+    from studyrunner.result.view import Result
 
 
 @dataclass(frozen=True)

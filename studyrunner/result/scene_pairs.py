@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.report.reading.result import Point, Result
+from studyrunner.result.view import Point, Result
 
 EXISTS = "contact_exists"
 OF_PAIRS = (*(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)), *SCENE["mesh"])

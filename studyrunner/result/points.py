@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.endings import Ending, read_endings
-from studyrunner.report.reading.schema_check import study_tables
+from studyrunner.result.endings import Ending, read_endings
+from studyrunner.result.schema_check import study_tables
 from studyrunner.user_error import UserError
 
 CONVERGED = 0

@@ -12,13 +12,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.chosen import find_values
-from studyrunner.report.reading.measured import Profile, read_profile
-from studyrunner.report.reading.missions import as_history
-from studyrunner.report.reading.opening import open_known
-from studyrunner.report.reading.points import CONVERGED, Points
-from studyrunner.report.reading.sample_statistics import SAMPLE, statistics_of
-from studyrunner.report.reading.units import show_cycles, show_value
+from studyrunner.result.chosen import find_values
+from studyrunner.result.measured import Profile, read_profile
+from studyrunner.result.missions import as_history
+from studyrunner.result.opening import open_known
+from studyrunner.result.points import CONVERGED, Points
+from studyrunner.result.sample_statistics import SAMPLE, statistics_of
+from studyrunner.result.units import show_cycles, show_value
 from studyrunner.user_error import show_text
 
 __all__ = ["CONVERGED", "NO_VOLUME", "Point", "Result", "as_sentences", "open_for_report"]

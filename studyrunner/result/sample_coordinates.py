@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studyrunner.coordinates import COORDINATES
-from studyrunner.netcdf.attributes import SmallArray
+from studyrunner.result.arrays import SmallArray
 from studyrunner.scene.drawn_contacts import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import SceneSet

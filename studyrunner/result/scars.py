@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.report.reading.result import Result
+from studyrunner.result.view import Result
 
 _MIRRORED = {"cylinder_on_flat": 1, "sphere_on_flat": 2}
 """Of bundled scenes with pairs of one half or one quarter of the contact: how many planes mirror them, x = 0 first."""

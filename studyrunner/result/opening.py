@@ -7,7 +7,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from studyrunner.report.reading.schema_check import check_dataset, reading_errors
+from studyrunner.result.schema_check import check_dataset, reading_errors
 from studyrunner.study.study_of_result import check_result_file
 
 

@@ -1,1 +1,0 @@
-"""Reading of a result file: schema check, choice of points, units."""
