@@ -30,7 +30,15 @@ if TYPE_CHECKING:
     from studies.scene_answers import ExactAnswer, KeepFrequencies, NaturalFrequencies, SurfaceMesh, WearQuestion
     from studies.scenes.half_space.room_for_wear import ExpectedWear
 
-BUNDLED = ("cylinder_on_flat", "dovetail_sector", "sdof_slider", "sphere_on_flat", "two_masses", "vibro_impact")
+BUNDLED = (
+    "cylinder_on_flat",
+    "dovetail_sector",
+    "sdof_slider",
+    "shrouded_sector",
+    "sphere_on_flat",
+    "two_masses",
+    "vibro_impact",
+)
 
 AUTOMATIC_HARMONICS_OF_A_WAVE = 13
 """Harmonics whose nodal diameters a cyclic scene is built with where their number is automatic."""

@@ -1,14 +1,13 @@
 """One sector of a bladed disk whose tip shrouds touch, from finite elements.
 
-Disk, blade and shroud are one body. Each shroud touches that of the next sector, on faces at `shroud_angle` to the axis.
-An interference presses them together, as a pre-twist of the blades does; under rotation the blades untwist as well. The
-blade is excited and observed at the middle of its shroud, perpendicular to the contact faces.
+Disk, blade and shroud are one body. Each shroud touches that of the next sector, on faces at `shroud_angle` to the
+axis. An interference presses them together, as a pre-twist of the blades does; under rotation the blades untwist as
+well. The blade is excited and observed at the middle of its shroud, perpendicular to the contact faces.
 
-Displacements of the reduced model: first the relative displacements of this sector's leading face and the next sector's
-trailing face, `u - exp(2 pi i k / N) R u_that` at nodal diameter k, where R turns by one sector; then modal coordinates of
-the glued sector. Each pair has normal (positive when the pair closes), first tangent (near the axis) and second tangent.
-Pairs are numbered from the inner to the outer end, then from the front to the back. A mesh of density m has
-4 m axial x (m + 1) pairs.
+Displacements of the reduced model: first the relative displacements of the leading face of this sector and the trailing
+face of the next one, `u - exp(2 pi i k / N) R u_that` at nodal diameter k, where R turns by one sector; then modal
+coordinates of the glued sector. Each pair has normal (positive when the pair closes), first tangent (near the axis) and
+second tangent. A mesh of density m has 4 m axial x (m + 1) pairs.
 """
 
 from __future__ import annotations

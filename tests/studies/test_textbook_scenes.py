@@ -36,7 +36,7 @@ WRONG = {
         ("cylinder_on_flat", "sphere_on_flat"),
         ({"R": 0.0}, {"P": -1.0}, {"nu": 0.5}, {"E": "2e11"}, {"Q": float("inf")}),
     ),
-    "dovetail_sector": ({"rotation_speed": float("nan")}, {"mesh": 0}),
+    **dict.fromkeys(("dovetail_sector", "shrouded_sector"), ({"rotation_speed": float("nan")}, {"mesh": 0})),
 }
 
 

@@ -36,9 +36,7 @@ class Surfaces:
     ties: tuple[ContactSurfaces, ...]
 
 
-def find_surfaces(
-    selections: Selections, parameters: Parameters, units: Units, axis: CyclicAxis | None
-) -> Surfaces:
+def find_surfaces(selections: Selections, parameters: Parameters, units: Units, axis: CyclicAxis | None) -> Surfaces:
     """Pairs of surfaces that the study names, else those of CONTACT PAIR, else those of TIE; other ties stay glued.
 
     So do contact pairs that the deck glues and the study does not name. axis: of the cyclic structure, for contacts

@@ -74,9 +74,7 @@ def free_ones_first(constraints: Constraints, contacts: Sequence[ContactSurfaces
     """Contacts whose first surface, which moves where both are alike, does not follow others if the second does not."""
     follow = np.asarray(constraints.dependent.any(axis=1))
     return tuple(
-        each.turned_round
-        if follow[each.first.nodes].any() and not follow[each.second.nodes].any()
-        else each
+        each.turned_round if follow[each.first.nodes].any() and not follow[each.second.nodes].any() else each
         for each in contacts
     )
 

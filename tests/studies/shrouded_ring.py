@@ -1,0 +1,51 @@
+"""All sectors of a ring with all their contacts, without cyclic symmetry. A helper of the tests."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from studies.finite_element.elements.solid_mesh import ElementGroup, SolidMesh
+from studies.finite_element.joint import surfaces
+from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
+from studies.finite_element.reduced_joint import build_fe_scene
+
+
+def whole_ring(model: MeshModel, joint: JointDefinition) -> tuple[MeshModel, JointDefinition]:
+    """The ring of a sector: nodes of the cut faces are common, contacts join neighbours; responses tip0, tip1, ..."""
+    mesh, axis = model.mesh, joint.cut.axis
+    n, size = axis.n_sectors, mesh.n_nodes
+    node = np.arange(n * size).reshape(n, size)
+    for j in range(n):
+        node[j][joint.cut.right] = node[(j + 1) % n][joint.cut.left]
+    used, own = np.unique(node, return_inverse=True)
+    own = own.reshape(n, size)
+    coordinates = np.concatenate([axis.turned(mesh.coordinates, j) for j in range(n)])[used]
+    groups = tuple(
+        ElementGroup(each.kind, own[j][each.nodes], each.numbers + 10000 * j, each.material, f"{each.part}{j}")
+        for j in range(n)
+        for each in mesh.groups
+    )
+    ring = SolidMesh(coordinates, np.arange(len(used)) + 1, groups)
+    held = np.zeros((len(used), 3), dtype=bool)
+    for j in range(n):
+        held[own[j]] |= joint.held
+    contacts = []
+    for each in joint.contacts:
+        for j in range(n):
+            first = surfaces.surface_of_nodes(ring, f"first {j}", own[j][each.first.nodes])
+            second = surfaces.surface_of_nodes(ring, f"second {j}", own[(j + each.sector) % n][each.second.nodes])
+            contacts.append(replace(each, first=first, second=second, sector=0, label=f"{each.name}{j}"))
+    tips = {f"tip{j}": SetMotion(own[j][joint.load.nodes], axis.pitch(j) @ joint.load.direction) for j in range(n)}
+    return MeshModel(ring), JointDefinition(tuple(contacts), held, tips["tip0"], tips, along=axis.axis)
+
+
+def reduced_ring(model: MeshModel, joint: JointDefinition, nodal_diameter: int, n_modes: int, damping: float):
+    """Reduced model of the ring under a travelling wave of unit forces. damping: over the stiffness, s."""
+    n = joint.cut.axis.n_sectors
+    whole = build_fe_scene(*whole_ring(model, joint), ReductionOptions(0, n_modes), 1).model
+    linear = whole.linear[0]
+    phases = np.exp(2j * np.pi * nodal_diameter * np.arange(n) / n)
+    return replace(
+        whole,
+        linear={0: replace(linear, load_harmonic=phases @ linear.response, damping=damping * linear.stiffness)},
+    )
