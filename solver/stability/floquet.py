@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import cast
 
 import numpy as np
 from scipy.linalg import eigvals
@@ -34,7 +33,6 @@ from solver.outcome import Outcome
 from solver.settings import ROUND_OFF, Resolution, all_orders, samples_for
 from solver.stability.monodromy import Monodromy, build_monodromy, switching_pairs
 from solver.stability.options import STABILITY
-from solver.structure.identity import Identity
 from solver.structure.joint import Case, Joint
 
 _EPS = float(np.finfo(np.float64).eps)
@@ -204,14 +202,13 @@ def growing_exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:
     moves (n,): False for displacements that are held. The result is empty where mass, damping and stiffness are all
     positive semidefinite: such a structure only loses energy.
     """
-    if _is_passive(Identity(linear)):
+    if _is_passive(linear):
         return np.empty(0, complex)
-    return _growing(Identity(linear), moves.tobytes())
+    return _growing(linear, moves.tobytes())
 
 
 @lru_cache(maxsize=4)
-def _is_passive(of: Identity) -> bool:
-    linear = cast("LinearModel", of.objects[0])
+def _is_passive(linear: LinearModel) -> bool:
     return all(_is_semidefinite(part) for part in (linear.mass, linear.damping, linear.stiffness))
 
 
@@ -225,8 +222,8 @@ def _is_semidefinite(matrix: Matrix) -> bool:
 
 
 @lru_cache(maxsize=4)
-def _growing(of: Identity, moves: bytes) -> ComplexArray:
-    found = exponents(cast("LinearModel", of.objects[0]), np.frombuffer(moves, bool))
+def _growing(linear: LinearModel, moves: bytes) -> ComplexArray:
+    found = exponents(linear, np.frombuffer(moves, bool))
     # round-off of a fast vibration is no growth
     growing: ComplexArray = found[found.real > found.size * _EPS * np.abs(found).max(initial=0.0)]
     return growing
