@@ -75,8 +75,8 @@ def _cycle(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Products, k of them and at most `most`, until the norm of the residual is `wanted`.
 
-    The norms are appended to `norms`. Returns an orthonormal basis (k, n), the triangular factor (k, k) of the Hessenberg matrix, and the first residual
-    (k,) on the basis after the Givens rotations to this factor.
+    The norms are appended to `norms`. Returns an orthonormal basis (k, n), the triangular factor (k, k) of the
+    Hessenberg matrix, and the first residual (k,) on the basis after the Givens rotations to this factor.
     """
     basis = np.empty((most + 1, residual.size))
     triangle, rotations, projected = np.zeros((most, most)), np.zeros((most, 2)), np.zeros(most + 1)
