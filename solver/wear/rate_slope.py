@@ -27,7 +27,7 @@ def rate_slope(
     joint, at
         The joint and its converged state.
     gain
-        (n_contact,), `archard.wear_gain` of one cycle, m/J.
+        (n_contact,), growth of the depth per wearing work in one cycle, m/J.
     wearing
         Part of the slip work that wears.
     pairs

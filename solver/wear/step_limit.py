@@ -42,7 +42,7 @@ def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing:
     joint, at
         The joint and its converged state.
     gain
-        (n_contact,), `archard.wear_gain` of one cycle, m/J.
+        (n_contact,), growth of the depth per wearing work in one cycle, m/J.
     wearing
         Part of the slip work that wears. Its own dependence on the depth is neglected.
     run
