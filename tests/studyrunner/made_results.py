@@ -11,9 +11,8 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from studyrunner.checkpoint.records import variable_sizes
-from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.results import MarchResult
-from studyrunner.plan.sharing import Index
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates, scene_arrays
 from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.scene.scene import SceneFacts
@@ -50,7 +49,7 @@ def made_result(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Inde
     return dataset
 
 
-def march_results(study: Study, **given: Callable[[Index], object]) -> list[MarchResult]:
+def march_results(study: Study, **given: Callable[[Index], object]) -> list[PointResult]:
     """A result for each history of a study; those named are what the functions say of its first point."""
     plan = build_tasks(study, FACTS.n_displacements)
     histories = (result for _, result in fake_histories(plan))
@@ -58,7 +57,7 @@ def march_results(study: Study, **given: Callable[[Index], object]) -> list[Marc
 
 
 def build_dataset(
-    study: Study, facts: SceneFacts, results: Sequence[MarchResult], of_scene: Sequence[SceneVariable] = ()
+    study: Study, facts: SceneFacts, results: Sequence[PointResult], of_scene: Sequence[SceneVariable] = ()
 ) -> xr.Dataset:
     """The result of a study: axes in the order of the study, then cycle, then contact or response."""
     dataset = _empty(study, facts, of_scene)

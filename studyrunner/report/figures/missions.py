@@ -99,7 +99,7 @@ def _draw_shares(result: Result, blocks: xr.Dataset) -> Drawing:
     scale = scale_for("m3", blocks["block_worn_volume"].values)
     _draw_lines(below, missions, scale(blocks["block_worn_volume"].values), errors, names)
     below.set_ylabel(scale.label("worn volume"))
-    below.set_xlabel("flown missions")
+    below.set_xlabel("missions")
     add_legend(figure, below.get_lines())
     known = np.flatnonzero(np.isfinite(shares).all(axis=1))
     said = [
@@ -143,7 +143,7 @@ def _draw_responses(result: Result, blocks: xr.Dataset) -> Drawing:
     for panel, amplitude, end in zip(panels[0], amplitudes, ends, strict=True):
         _draw_lines(panel, missions, scale(amplitude), errors, names)
         panel.set_xlim(0.0, missions[-1])
-        panel.set_xlabel("flown missions")
+        panel.set_xlabel("missions")
         panel.set_title(f"at the {_ENDS[end]} of the block")
     set_from_zero(panels[0, 0], max(float(np.nanmax(scale(each), initial=0.0)) for each in amplitudes))
     panels[0, 0].set_ylabel(scale.label(f"amplitude of {result.responses[0]}" if result.responses else "amplitude"))

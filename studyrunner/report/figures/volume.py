@@ -64,7 +64,7 @@ def draw_volumes(result: Result) -> Iterator[Drawing | Missing]:
 
 def slow_time(result: Result) -> str:
     """Label of an axis of slow time, without its unit."""
-    return "vibration cycles" if result.blocks is None else "flown missions"
+    return "vibration cycles" if result.blocks is None else "missions"
 
 
 def draw_history(result: Result, scale: Scale, largest: float) -> Drawing:
