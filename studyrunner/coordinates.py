@@ -92,7 +92,7 @@ COORDINATES = {
     "sample": Variable((), "1", "number of the sample", comment="What it draws is in the coordinates sample_..."),
     "cycle": Variable((), "1", "number of vibration cycles", comment="Slow time."),
     "mission": Variable((), "1", "number of missions", comment="Slow time."),
-    "block": Variable((), "1", "name of the block of the mission", comment="In the order in which they follow each other."),
+    "block": Variable((), "1", "name of the block of the mission", comment="In their order in a mission."),
     "contact": Variable((), "1", "index of the contact pair"),
     "response": Variable((), "1", "name of the response"),
     "phase": Variable(
