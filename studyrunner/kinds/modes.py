@@ -80,8 +80,7 @@ class Mode(PointTask):
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """Points of the mode."""
         del keep
-        from solver.modes.mode_values import values_of
-        from solver.modes.points import follow_mode
+        from solver.modes.points import follow_mode, values_of
 
         model, wanted = self.joint.model(models), sorted(self.places)
         amplitudes = np.array([self.amplitudes[place] for place in wanted])
