@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.kinds.task import Result, StartResult, Task
 from studyrunner.mpi.cost_model import CostModel
+from studyrunner.mpi.schedule import Office
 from studyrunner.system.progress import Standing
 
 _TRIES_AGAIN = 1
@@ -19,7 +20,7 @@ uncertainty factor of two the mean further time is this fraction.
 """
 
 
-class TaskProgress:
+class TaskProgress(Office[Task, Result]):
     """State of the tasks of a study, and the tasks that results make possible.
 
     A wear history becomes possible with its start state, while the sweep goes on. Results of a task do not depend on

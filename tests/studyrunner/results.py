@@ -18,8 +18,7 @@ from scipy.stats import norm, qmc
 from solver.outcome import Outcome
 from studyrunner.checkpoint.records import variable_sizes
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.kinds.task import PointResult
-from studyrunner.kinds.task import Index
+from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates, scene_arrays
 from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.result.view import Result, open_for_report
