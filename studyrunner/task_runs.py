@@ -108,5 +108,4 @@ def run_tasks(ranks: Ranks, study: Study, run: StudyRun, display: ProgressDispla
     """Rank 0: has the remaining tasks done and their results saved."""
     if run.tasks:
         display.say(f"computing {kind_of(study).describe_tasks(run.tasks)}")
-    display.begin_tasks()
     serve_tasks(ranks, run, evaluator(), run.costs)

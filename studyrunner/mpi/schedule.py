@@ -62,7 +62,7 @@ class _Delivery(Generic[Result]):
 
 @dataclass(frozen=True)
 class _Progress:
-    """Progress of a task: data to continue from, or words."""
+    """Progress of a task: data to continue from, words, or the share that is done."""
 
     number: int
     progress: object
@@ -88,7 +88,7 @@ def _work(
 
     def keep(progress: object) -> None:
         check()
-        in_words, now = isinstance(progress, str), time.perf_counter()
+        in_words, now = isinstance(progress, str | float), time.perf_counter()
         # a task that has given all its results has no progress
         if n_given < task.n_results and now > sent[in_words] + (SECONDS_TO_WORDS if in_words else seconds_to_progress):
             send(_Progress(assignment.number, progress))

@@ -47,11 +47,10 @@ def test_a_line_every_half_minute_at_least(clock, capsys):
 
     def look():
         looks.append(clock.now)
-        return Standing(5, 20, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
+        return Standing(5, 20, 0.25, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
 
     with ProgressDisplay() as shown:
         shown.say("computing")
-        shown.begin_tasks()
         for tenth in range(36_000):
             clock.now = 1000.0 + 0.1 * tenth
             shown.tick(look)
@@ -81,11 +80,10 @@ def test_a_bar_on_a_terminal(clock, monkeypatch):
 
     def look():
         looks.append(clock.now)
-        return Standing(5, 20, 30.0, ("210 Hz implicit",))
+        return Standing(5, 20, 0.25, 30.0, ("210 Hz implicit",))
 
     with ProgressDisplay() as shown:
         shown.say("computing")
-        shown.begin_tasks()
         for _ in range(1000):
             clock.now += 0.01
             shown.tick(look)
