@@ -111,7 +111,7 @@ COORDINATES = {
     "contact_area": Variable(
         ("contact",), "m2", "area of the contact pair", comment="Weight alpha of the pair, Eq. (7) of the reference."
     ),
-    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair"),
+    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair", "str"),
     "contact_edge": Variable(
         ("contact",),
         "1",
