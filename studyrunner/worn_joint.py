@@ -14,9 +14,9 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.api import run_study
-from studyrunner.result.sample_statistics import DRAWN
 from studyrunner.result.scene_pairs import depths, pairs_of_scene, tells_depth
 from studyrunner.result.view import Result, open_for_report
+from studyrunner.statistics.samples import DRAWN
 from studyrunner.study.sections import AxesSection, WearSection
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError, Verbatim

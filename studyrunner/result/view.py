@@ -17,14 +17,18 @@ from studyrunner.result.measured import Profile, read_profile
 from studyrunner.result.missions import as_history
 from studyrunner.result.opening import open_known
 from studyrunner.result.points import CONVERGED, Points
-from studyrunner.result.sample_statistics import SAMPLE, statistics_of
 from studyrunner.result.units import show_cycles, show_value
+from studyrunner.statistics.samples import SAMPLE
+from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.user_error import show_text
 
 __all__ = ["CONVERGED", "NO_VOLUME", "Point", "Result", "as_sentences", "open_for_report"]
 
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Probabilities of the bands that figures show."""
 
 Point = Mapping[str, int]
 """Index along each axis. A missing axis stands for all its values."""
@@ -132,8 +136,8 @@ class Result(Points):
 
     @cached_property
     def statistics(self) -> xr.Dataset | None:
-        """What the samples of the file say, see `statistics_of`; None where it has none."""
-        return statistics_of(self.dataset, self.study, self.endings)
+        """What the samples of the file say, see `statistics_of_file`; None where it has none."""
+        return statistics_of_file(self.dataset, QUANTILES)
 
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show.

@@ -25,10 +25,10 @@ from studyrunner.report.drawing import (
 )
 from studyrunner.report.figures.courses import find_course, slow_time
 from studyrunner.result.choice import choose
-from studyrunner.result.sample_statistics import DRAWN, SAMPLE
 from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import NO_VOLUME, Point, Result, as_sentences
-from studyrunner.statistics.ranking import deciding_input, describe_ranking, leading_input, measure_of
+from studyrunner.statistics.samples import DRAWN, SAMPLE
+from studyrunner.statistics.sentence import deciding_input, describe_ranking, leading_input, measure_of
 from studyrunner.system.progress import count
 
 _Shown = list[tuple[Point, str, xr.Dataset]]

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from studyrunner.report.drawing import COLOURS, Drawing, FloatArray, add_line, new_panels, set_log
-from studyrunner.result.sample_statistics import SAMPLE
 from studyrunner.result.units import scale_for, show_number, units_of
 from studyrunner.result.view import Result, as_sentences
+from studyrunner.statistics.samples import SAMPLE
 
 _PLAIN = ("frequency", "scheme", SAMPLE)
 _MOST_AXES, _DECADES, _SMALL = 6, 30.0, 7.5

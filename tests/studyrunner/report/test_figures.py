@@ -17,18 +17,19 @@ from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, se
 from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.report.figures.trends import find_peak, find_quantities
 from studyrunner.result.view import Result
-from tests.studyrunner.report.figure_cases import (
+from tests.studyrunner.report.figure_numbers import cells_of, draw_figure, lines_of, values_of
+from tests.studyrunner.report.root_cases import dovetail_file
+from tests.studyrunner.report.test_settings import finest_file
+from tests.studyrunner.results import (
+    N_SAMPLES,
     make_result,
+    sample_file,
     with_endings,
     with_loops,
     with_sector,
     with_two_responses,
     with_variables,
 )
-from tests.studyrunner.report.figure_numbers import cells_of, draw_figure, lines_of, values_of
-from tests.studyrunner.report.root_cases import dovetail_file
-from tests.studyrunner.report.scatter_cases import N_SAMPLES, sample_file
-from tests.studyrunner.report.test_settings import finest_file
 
 ALL_DRAWINGS = (
     "final_worn_volume worn_volume worn_volume_map wear_rate_map frequency_response worn_root wear_depth worn_profile"

@@ -15,8 +15,8 @@ from studyrunner.report.page import page
 from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.page import inline_svg, write_page
 from studyrunner.result.view import Result
-from tests.studyrunner.report.page_cases import AXES, as_result, build_file
 from tests.studyrunner.report.root_cases import dovetail_file
+from tests.studyrunner.results import AXES, as_result, build_file
 
 EVIL = "</script></title><img src=x onerror=alert(1)><script>alert(2)</script>&amp;\"'{{ 7 * 7 }}{% endif %}"
 

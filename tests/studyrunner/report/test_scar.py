@@ -10,9 +10,8 @@ from studyrunner.result.measured import read_profile
 from studyrunner.result.scars import find_scar
 from studyrunner.result.view import Result, open_for_report
 from studyrunner.user_error import UserError
-from tests.studyrunner.report.figure_cases import make_result
 from tests.studyrunner.report.figure_numbers import draw_figure
-from tests.studyrunner.report.page_cases import build_file
+from tests.studyrunner.results import build_file, make_result
 
 X = 1e-5 * np.array([1.0, 1.0, 1.0, 3.0, 3.0, 5.0, 5.0, 5.0, 7.0, 7.0, 9.0, 9.0])
 Y = 1e-5 * np.array([1.0, 3.0, 5.0, 1.0, 3.0, 1.0, 3.0, 5.0, 1.0, 3.0, 1.0, 3.0])
