@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from solver.forced_response import check_friction, check_numbers, check_settings, check_word, worn_model
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
-from solver.modes.mode_values import values_of
-from solver.modes.points import Direction, follow_mode
+from solver.modes.points import Direction, follow_mode, values_of
 from solver.outcome import Outcome
 from solver.presentation import PresentedMode
 from solver.results.mode_values import OF_A_POINT
