@@ -59,11 +59,11 @@ def read_archived(path: Path, name: str) -> Archived:
     """Reads the attributes of a result file that the user calls `name`. Raises UserError."""
     with _user_errors(name, "the attribute "), open_hdf5(path) as file:
         names = ("study", "scene_sha256", "solver_digest", "versions")
-        found = [read_text_attribute(file, attribute) for attribute in names]
-        if not found[0]:
+        study, scene, solver, versions = (read_text_attribute(file, name) for name in names)
+        if not study:
             remedy = "missing: give a study file (TOML) or a result file of run-study"
             raise UserError(name, "the attribute study", None, remedy)
-        return Archived(*found, holds_scene=SCENE_GROUP in file)
+        return Archived(study, scene, solver, versions, SCENE_GROUP in file)
 
 
 def check_result_file(path: Path, name: str) -> None:
