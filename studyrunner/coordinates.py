@@ -62,6 +62,12 @@ COORDINATES = {
         comment="Where the frequency follows the resonance: the middle of loading.between, which stands for the range;"
         " excitation_frequency holds the frequency at each count.",
     ),
+    "frequency_ratio": Variable(
+        (),
+        "1",
+        "excitation frequency over the first natural frequency with the joint stuck",
+        comment="Of the same scene; the coordinate frequency is in Hz.",
+    ),
     "wear_coefficient": Variable(
         (),
         "1/Pa",

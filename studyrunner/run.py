@@ -13,7 +13,7 @@ from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.database import NoLocksError, StoreInUseError
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
-from studyrunner.coordinates import STUCK_FREQUENCY
+from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
 from studyrunner.mpi.ranks import Ranks, wait_for_message
 from studyrunner.mpi.schedule import work_on_tasks
 from studyrunner.plan.identity import Identities, hash_of_kind
@@ -30,7 +30,7 @@ from studyrunner.result.software import describe_software
 from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.model_remarks import remarks_of_study
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import merge_facts, pair_arrays, stuck_frequencies_of
+from studyrunner.scene.scene_set import frequencies_of_ratios, merge_facts, pair_arrays, stuck_frequencies_of
 from studyrunner.scene_building import Scenes
 from studyrunner.study.study import Study
 from studyrunner.system.endings import begin_ending, is_ending
@@ -125,7 +125,9 @@ class _ResultWriter:
         """Coordinates of the file, and its variables that no task computes."""
         study, scenes, facts = self.study, self.scenes, self.scenes.facts
         stuck = SmallArray("stuck_frequency", *stuck_frequencies_of(study, facts, scenes.scenes), STUCK_FREQUENCY)
+        hertz = frequencies_of_ratios(study, facts, scenes.scenes)
         return [
+            *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
             *coordinates(study, self.facts, pair_arrays(study, facts, scenes.scenes)),
             stuck,
             *worn_coordinate(study, facts),

@@ -28,7 +28,7 @@ from studyrunner.scene.scene import (
     harmonics_to_build,
     scene_to_keep,
 )
-from studyrunner.scene.scene_set import SceneSet, find_scenes
+from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
 from studyrunner.scene.scene_variables import exact_answers, join_scene_variables
 from studyrunner.scene.variables import SceneVariable, build_scene_variables
 from studyrunner.scene_models import SceneModels
@@ -146,7 +146,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
         facts = describe_scene(model)
         kept = scene_to_keep(one, model)
         handed, seeing = hand_out(ranks, model, new_partial(store.path))
-        return Scenes(scenes, (facts,), variables, kept, (), handed, seeing, store)
+        return Scenes(at_ratios(scenes, {0: facts}), (facts,), variables, kept, (), handed, seeing, store)
     _, seeing = hand_out(ranks, SeveralScenes(), new_partial(store.path))
     built = _build_all(ranks, scenes, store, say)
     with keys_as_given(study.scene_axes):
@@ -155,6 +155,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
                 raise each.error
     facts_of_all = tuple(each.facts for each in built if each.facts is not None)
     variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
+    scenes = at_ratios(scenes, dict(enumerate(facts_of_all)))
     return Scenes(scenes, facts_of_all, (*variables, *exact_answers(study)), None, notes, None, seeing, store)
 
 
