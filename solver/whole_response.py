@@ -22,8 +22,8 @@ from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
-from solver.stability.hill import is_stable
 from solver.stability.floquet import Multipliers, Stability, find_multipliers
+from solver.stability.hill import is_stable
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
