@@ -145,7 +145,7 @@ def draw_responses(result: Result) -> Drawing | Missing | None:
         panel.set_title(f"at the {_ENDS[end]} of the block")
     set_from_zero(panels[0, 0], max(float(np.nanmax(scale(each), initial=0.0)) for each in amplitudes))
     panels[0, 0].set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
-    add_legend(figure, below.get_lines())
+    add_legend(figure)
     caption = as_sentences(
         "Amplitude of the first harmonic in the mission that ends at the number",
         "Bands: estimated errors" if errors is not None else "",
