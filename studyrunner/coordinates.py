@@ -62,6 +62,12 @@ COORDINATES = {
         comment="Where the frequency follows the resonance: the middle of loading.between, which stands for the range;"
         " excitation_frequency holds the frequency at each count.",
     ),
+    "frequency_ratio": Variable(
+        (),
+        "1",
+        "excitation frequency over the first natural frequency with the joint stuck",
+        comment="Of the same scene; the coordinate frequency is in Hz.",
+    ),
     "wear_coefficient": Variable(
         (),
         "1/Pa",
@@ -111,7 +117,7 @@ COORDINATES = {
     "contact_area": Variable(
         ("contact",), "m2", "area of the contact pair", comment="Weight alpha of the pair, Eq. (7) of the reference."
     ),
-    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair"),
+    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair", "str"),
     "contact_edge": Variable(
         ("contact",),
         "1",

@@ -11,7 +11,7 @@ from solver.outcome import COMPLETE, Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store, StoreInUseError
-from studyrunner.coordinates import STUCK_FREQUENCY
+from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import Identity, TaskPlan, digest
 from studyrunner.mpi.ranks import Ranks
@@ -26,7 +26,7 @@ from studyrunner.result.software import describe_software
 from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.model_remarks import remarks_of_study
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import merge_facts, pair_arrays, stuck_frequencies_of
+from studyrunner.scene.scene_set import frequencies_of_ratios, merge_facts, pair_arrays, stuck_frequencies_of
 from studyrunner.scene_building import Scenes
 from studyrunner.study.study import Study
 from studyrunner.system.endings import begin_ending, is_ending
@@ -115,7 +115,9 @@ class _ResultWriter:
         """Coordinates of the file, and its variables that no task computes."""
         study, scenes, facts = self.study, self.scenes, self.scenes.facts
         stuck = SmallArray("stuck_frequency", *stuck_frequencies_of(study, facts, scenes.scenes), STUCK_FREQUENCY)
+        hertz = frequencies_of_ratios(study, facts, scenes.scenes)
         return [
+            *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
             *coordinates(study, self.facts, pair_arrays(study, facts, scenes.scenes)),
             stuck,
             *worn_coordinate(study, facts),

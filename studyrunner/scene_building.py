@@ -25,7 +25,7 @@ from studyrunner.scene.scene import (
     harmonics_to_build,
     scene_to_keep,
 )
-from studyrunner.scene.scene_set import SceneSet, find_scenes
+from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
 from studyrunner.scene.scene_variables import exact_answers, join_scene_variables
 from studyrunner.scene.variables import SceneVariable, build_scene_variables
 from studyrunner.scene_models import SceneModels
@@ -110,15 +110,18 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
         facts = tuple(each.facts for each in built if each.facts is not None)
         variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
         models = SceneModels(lambda number: _read(scenes.studies[number], store), seeing, store.path)
+        scenes = at_ratios(scenes, dict(enumerate(facts)))
         return Scenes(scenes, facts, (*variables, *exact_answers(study)), None, notes, models)
     one = scenes.studies[0] if study.mission else study
     with keys_as_given(study.scene_axes):
         model = build_study_scene(one, say, store)
     if "natural_frequency" in study.scene_variables:
         say("finding the natural frequencies of the scene")
-    variables = (*build_scene_variables(one, model, store), *exact_answers(study))
+    variables, facts_of_one = (*build_scene_variables(one, model, store), *exact_answers(study)), describe_scene(model)
     models = SceneModels(lambda _: model, seeing, store.path)
-    return Scenes(scenes, (describe_scene(model),), variables, scene_to_keep(one, model), (), models)
+    return Scenes(
+        at_ratios(scenes, {0: facts_of_one}), (facts_of_one,), variables, scene_to_keep(one, model), (), models
+    )
 
 
 def _read(study: Study, store: Store) -> ReducedModel:

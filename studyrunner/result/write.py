@@ -143,6 +143,7 @@ def _create_all(
         file.createDimension(name, size)
     on_contact = sorted(each.name for each in arrays if each.name.startswith("contact_"))
     drawn = [each for each in arrays if each.name.startswith(("sample_", "worn_depth"))]
+    drawn += [each for each in arrays if each.name == "frequency" and "frequency_ratio" in each.dimensions]
     for name, entry in variables.items():
         dimensions = (*study.dimensions, *entry.dimensions)
         if entry.is_text:

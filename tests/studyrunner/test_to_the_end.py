@@ -9,7 +9,7 @@ import xarray as xr
 from studyrunner import open_result, run_study
 from studyrunner.accessor import join_results
 from studyrunner.kinds.kind import build_tasks
-from studyrunner.result.schema_check import check_numbers
+from studyrunner.result.opening import check_numbers
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 
