@@ -32,7 +32,7 @@ from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.results.verdict import HELD_FORCE
 from solver.settings import NEGLIGIBLE, ROUND_OFF
-from solver.stability.options import STABILITY
+from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
 from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
 from solver.wear.state import WearState
@@ -70,7 +70,7 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
         reached = _at_depth(work, joint, found, worn)
         if reached is None:
             continue
-        if vibration_change(state.point.evaluation, reached.evaluation) <= STABILITY.other_branch:
+        if vibration_change(state.point.evaluation, reached.evaluation) <= OTHER_BRANCH:
             # a small fold of the branch at a corner is no jump, and there may be many corners
             return replace(state, point=reached)
         first = state.cycle if np.isnan(state.jump_cycle) else state.jump_cycle
@@ -99,7 +99,7 @@ def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState |
     found = _at_depth(work, joint, state.point, worn)
     if found is None or creeps(joint, hold, found.evaluation):
         return None
-    if vibration_change(state.point.evaluation, found.evaluation) > STABILITY.other_branch:
+    if vibration_change(state.point.evaluation, found.evaluation) > OTHER_BRANCH:
         return None
     return replace(state, point=found, hold=hold, held_from=state.cycle)
 

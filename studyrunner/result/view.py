@@ -64,7 +64,8 @@ class Result:
     dataset: read lazily. A variable that was read as a whole stays in memory. fixed: axes of which this holds one value
     of several, and how many the file has. blocks: of a result of missions what belongs to single blocks; in `dataset`
     missions then have the name of the cycles that they replace. chosen: values of axes of the point that figures of a
-    single point show. measured: a worn profile to compare with.
+    single point show. measured: a worn profile to compare with. again: what was computed anew of the worn joint of the
+    shown point, see `studyrunner.worn_joint`.
     """
 
     path: Path
@@ -73,6 +74,7 @@ class Result:
     blocks: xr.Dataset | None = None
     chosen: Mapping[str, float | str] = field(default_factory=dict)
     measured: Profile | None = None
+    again: Mapping[str, xr.Dataset] = field(default_factory=dict)
 
     # --- the file ---
 
