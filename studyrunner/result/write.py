@@ -53,34 +53,10 @@ def write_result(
 ) -> Counter[int]:
     """Writes the result of a study: axes in the order of the study, then cycle or mission, then others.
 
-    Points that are not computed yet have the outcome `not_computed`.
-
-    Parameters
-    ----------
-    study, facts
-        The study, and facts of its scene.
-    completion
-        The finished histories.
-    path
-        The result file, which is replaced as a whole or not at all.
-    arrays
-        Coordinates, and variables that no task computes.
-    origin
-        Attributes of the file.
-    scene
-        Contents of the group of the scene; None for none.
-    keep_finished
-        Whether `path` holds a finished result, which is kept where points of the new result are missing.
-
-    Returns
-    -------
-    Counter[int]
-        Number of points of each outcome.
-
-    Raises
-    ------
-    StorageError
-        Where the file cannot be written, or the file of the run cannot be read.
+    Points that are not computed yet have the outcome `not_computed`. completion: the finished histories. path: is
+    replaced as a whole or not at all. arrays: coordinates, and variables that no task computes. origin: attributes of
+    the file. scene: contents of its group. keep_finished: whether `path` holds a finished result, which is kept where
+    points of the new one are missing. Returns the number of points of each outcome. Raises StorageError.
     """
     shape = tuple(len(values) for values in study.dimensions.values())
     slab = _slab_shape(shape, completion.kind.itemsize)
