@@ -124,7 +124,7 @@ def tell_ends(result: Result) -> str:
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
     n_early = int(np.count_nonzero(result.held & ~result.computed))
     text = f"{count(n_points, 'point')}, {n_computed} computed to the end"
-    text += f", {n_early} ended early, of which the values up to the end are kept" if n_early else ""
+    text += f", {n_early} ended early with values up to there" if n_early else ""
     n_without = n_points - n_computed - n_early
     return f"{text}, {n_without} without a result." if n_without else f"{text}."
 

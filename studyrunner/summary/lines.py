@@ -125,7 +125,9 @@ def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
     )
     start, end = vibration.frequency
     worn = isinstance(summary.wear, MostWear)
-    at = " in that sample" if worn and summary.samples else f" at {vibration.where}" if vibration.where else ""
+    at = f" at {vibration.where}" if vibration.where else ""
+    if worn:
+        at = " in that sample" if summary.samples else " at the same point" if summary.n_points > 1 else ""
     if vibration.followed:
         known = "" if math.isnan(end.error) else f" +- {end.error:.2g}"
         moved = f"moved from {start:.6g} to {end.value:.6g}{known} Hz" if worn else f"at {start:.6g} Hz"
