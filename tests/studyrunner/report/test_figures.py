@@ -266,7 +266,7 @@ def test_the_map_of_outcomes_speaks_words():
     result = make_result(failed=[2, 5])
     drawing = draw_figure(result, "outcome_map")
     panel = drawing.figure.axes[0]
-    np.testing.assert_array_equal(cells_of(panel), [[0, 1, 0, 0], [0, 0, 1, 0]])
+    np.testing.assert_array_equal(cells_of(panel), [[0, 3, 0, 0], [0, 0, 3, 0]])
     assert [label.get_text() for label in panel.get_xticklabels()] == ["200", "201", "202", "204"]
     assert [text.get_text() for text in drawing.figure.legends[0].get_texts()] == ["converged", "branch lost"]
 
