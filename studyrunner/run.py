@@ -14,12 +14,11 @@ from studyrunner.checkpoint.database import NoLocksError, StoreInUseError
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
 from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.task import Identity, TaskPlan, digest
 from studyrunner.mpi.ranks import Ranks, wait_for_message
 from studyrunner.mpi.schedule import work_on_tasks
-from studyrunner.plan.identity import Identities, hash_of_kind
-from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.plausibility import doubts_of_study
-from studyrunner.plan.tasks import TaskPlan
 from studyrunner.result.arrays import SmallArray, coordinates, scene_arrays
 from studyrunner.result.creation_date import describe_date
 from studyrunner.result.existing_result import Label, Target
@@ -205,7 +204,7 @@ def serve_study(
     try:
         for rank in range(1, ranks.size):
             ranks.send(_GO, rank)
-        run_tasks(ranks, completion, evaluator(scenes.model), progress, scenes)
+        run_tasks(ranks, study, completion, evaluator(scenes.model), progress, scenes)
         progress.say("writing the result")
         summary = writer.write(completion, n_found)
     except BaseException as error:
@@ -237,8 +236,8 @@ def _prepare(
     ):
         progress.note(note)
     remove_leftovers(target.path)
-    identities = Identities([each.digest for each in scenes.facts], hash_of_kind(kind.descr))
-    completion = CompletionIndex(plan, identities, store, kind)
+    identity = Identity(tuple(each.digest for each in scenes.facts), digest(repr(kind.descr)))
+    completion = CompletionIndex(plan, identity, store, kind)
     label = Label.of(study)
     store.note_study(label.name, label.model)
     return completion, _ResultWriter(study, plan, facts, scenes, target, software, options.date)

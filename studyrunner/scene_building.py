@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 from solver.packing import Packed
 from studyrunner.checkpoint.store import Store
+from studyrunner.kinds.task import Task
+from studyrunner.mpi.cost_model import CostKeys, CostModel
 from studyrunner.mpi.mapped_file import hand_out
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Handlers, serve_tasks, work_on_tasks
-from studyrunner.plan.cost_model import CostKeys, CostModel
-from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.computed import InMemory, keep_model, model_key, read_model
 from studyrunner.scene.scene import (
     KeptScene,
@@ -54,7 +54,7 @@ class SceneTask:
     known: Mapping[str, Packed]
     cost: float = 1.0
     n_results: int = 1
-    opens_others: bool = False
+    gives_starts: bool = False
 
     def cost_of(self, *, first: bool) -> float:
         """Estimated time, s; all scenes are alike."""
@@ -105,7 +105,7 @@ class Scenes:
     def _models(self) -> SceneModels:
         return SceneModels(self._read_model, self.seeing, self.store.path)
 
-    def with_model(self, rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
+    def with_model(self, rank: int, task: Task) -> Task:
         """The task as a rank gets it: with the model where the rank does not have the model."""
         return task if self.model is not None else self._models.with_model(rank, task)
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from studyrunner.cli import main
-from studyrunner.plan.planning import build_tasks
+from studyrunner.kinds.kind import build_tasks
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
@@ -106,8 +106,8 @@ def test_ratios_are_frequencies_of_each_scene():
 def test_thresholds_share_start_states():
     law = ("wear.law=threshold", "axes.threshold=[0, 5, 1e9]")
     plan = build_tasks(read_study("sdof_slider", [*CHEAP, *law]), 2)
-    assert len(plan.branches) == 1
-    assert len(plan.marches[0]) == 3
+    assert len(plan.sweeps) == 1
+    assert len(plan.results) == 3
     whole = compute("sdof_slider", "whole.nc", *CHEAP, *law)
     assert whole.threshold.attrs["units"] == "J/m2"
     volume = whole.worn_volume.isel(cycle=-1).squeeze().values
