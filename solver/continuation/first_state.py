@@ -17,6 +17,7 @@ from solver.outcome import Outcome
 from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Joint
 
+
 def solve_first_state(
     case: Case, omega: float, excitation_amplitude: float, wear_depth: FloatArray, run: Run
 ) -> State | Outcome:
@@ -87,7 +88,9 @@ def _ways(
             loaded, reached_load = follow_naturally(balance_at, relieved, 1.0, run)
             if reached_load:
                 yield loaded
-    yield relax_to_periodic(case, balance_at(1.0, rest.history).joint, wear_depth, rest.evaluation, quiet, rest.history, run)
+    yield relax_to_periodic(
+        case, balance_at(1.0, rest.history).joint, wear_depth, rest.evaluation, quiet, rest.history, run
+    )
     if not arrived:
         # the last way, within a budget of its own: where the joint has no grip arc length does not come to an end
         limit = run.budget.limit

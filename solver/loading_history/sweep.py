@@ -268,7 +268,9 @@ class Sweep(Generic[S]):
         if path.case.resolution != self.state.resolution:
             moved = self.path.move(node, path, self.run)
         reference.state = replace(reference.state, branch=0)
-        reference.place_at(*((self.path, node) if moved is None else (path, moved)), reference.wider * self.state.length)
+        reference.place_at(
+            *((self.path, node) if moved is None else (path, moved)), reference.wider * self.state.length
+        )
 
     def _choose_resolution(self) -> float:
         """Choose the harmonics and samples of the nodes for the current state, as far as they are automatic.
