@@ -15,9 +15,12 @@ from solver.packing import packable
 from solver.results.loops import LOOP_PHASES
 from solver.results.state_report import StateReport
 from solver.settings import Resolution, WearTarget
-from solver.wear.interpolation import depth_within, fraction_where
-from solver.wear.options import WEAR
-from solver.wear.target import TargetSearch
+from solver.wear.interpolation import TargetSearch, depth_within, fraction_where
+
+KEPT_STEPS = 800
+"""Most stored steps of a history to the steady state; half as many after the steps with the least progress are dropped.
+Most ends of steps at which a history is compared with its reference solution. A result has 101 outputs by default, an
+adaptive history of 1e5 cycles about 100 steps."""
 
 INTERPOLATED = (
     "wear_depth",
@@ -87,7 +90,7 @@ class Course:
 
     def after(self, cycle: float, report: StateReport, rate: float) -> Course:
         """The course with the end of another step; rate: wear rate of the joint, m3 per cycle."""
-        kept = slice(0, None, 2 if len(self.cycles) >= WEAR.kept_steps else 1)
+        kept = slice(0, None, 2 if len(self.cycles) >= KEPT_STEPS else 1)
         changed = not self.resolutions or self.resolutions[-1][1] != report.resolution
         return Course(
             ends=(*self.ends, cycle),
@@ -123,6 +126,7 @@ class OutputState:
     reached_within: float = 0.0
 
 
+@dataclass
 class DenseOutput:
     """Takes the state after every step and stores the steps that are read later.
 
@@ -139,11 +143,11 @@ class DenseOutput:
     taken: data stored so far.
     """
 
-    def __init__(
-        self, area: FloatArray, counts: FloatArray | None, *, smooth: bool, target: WearTarget | None = None
-    ) -> None:
-        self.area, self.counts, self.smooth, self.target = area, counts, smooth, target
-        self.taken = OutputState()
+    area: FloatArray
+    counts: FloatArray | None
+    smooth: bool
+    target: WearTarget | None = None
+    taken: OutputState = OutputState()
 
     @property
     def last(self) -> Node | None:
@@ -158,16 +162,8 @@ class DenseOutput:
     def add(self, cycle: float, report: StateReport, rate: FloatArray, error: float) -> None:
         """Take the state at the end of a step.
 
-        Parameters
-        ----------
-        cycle
-            Count at the end of the step, never lower than the last one.
-        report
-            Report of the state.
-        rate
-            (n_contact,), wear rates of the state, m per cycle.
-        error
-            Estimated local error of the step, as worn volume, m3.
+        cycle: count at the end of the step, never lower than the last one. report: of the state.
+        rate (n_contact,): wear rates, m per cycle. error: estimated local error of the step, as worn volume, m3.
         """
         last, nodes, reached, within = self.last, list(self.taken.nodes), self.taken.reached, self.taken.reached_within
         node = Node(cycle, report, rate, error + (0.0 if last is None else last.local))
@@ -180,7 +176,7 @@ class DenseOutput:
             if not read and not before < reached <= cycle:
                 del nodes[-1]
         nodes.append(node)
-        if self.counts is None and len(nodes) > WEAR.kept_steps:
+        if self.counts is None and len(nodes) > KEPT_STEPS:
             nodes = self._thinned(nodes)
         course = self.taken.course.after(cycle, report, float(rate @ self.area))
         self.taken = OutputState(tuple(nodes), course, reached, within)
@@ -209,11 +205,6 @@ class DenseOutput:
         by_resonance = 0.0 if self._search is None else self._search.by_resonance(self.taken.nodes, self.taken.reached)
         return self.taken.reached_within + by_resonance
 
-    def _depth(self, start: Node, end: Node, fraction: FloatArray) -> FloatArray:
-        """Depths (n, n_contact), m, at fractions (n,) of a step."""
-        ends = [(node.report.wear_depth, node.rate) for node in (start, end)]
-        return depth_within(fraction, end.cycle - start.cycle, ends[0], ends[1], self.smooth)
-
     def read(self, counts: FloatArray) -> dict[str, Any]:
         """All values at ascending counts (n,), by name; the first axis is that of the counts.
 
@@ -222,7 +213,7 @@ class DenseOutput:
         - `depth_rate` (n, n_contact): wear rate of each pair, m per cycle.
         - `local` (n,): sum of the local errors, m3.
 
-        Values beyond the last step are NaN, whole numbers 0.
+        Values beyond the last step are NaN, whole numbers 0; empty before the first state.
         """
         nodes = self.taken.nodes
         cycles = np.array([node.cycle for node in nodes])
@@ -238,7 +229,7 @@ class DenseOutput:
         """Values at a count within a step."""
         length = end.cycle - start.cycle
         fraction = (count - start.cycle) / length if length > 0.0 else 1.0
-        depth = self._depth(start, end, np.array([fraction]))[0]
+        depth = self._depth(start, end, fraction)
         if self.smooth and length > 0.0:
             whole = float((end.report.wear_depth - start.report.wear_depth) @ self.area)
             fraction = float((depth - start.report.wear_depth) @ self.area) / whole if whole > 0.0 else fraction
@@ -252,11 +243,15 @@ class DenseOutput:
         # a step may be much longer than the history to the count
         between["local"] = start.local + fraction * (end.local - start.local)
         for name in CERTIFIED:
-            # within a step, the larger violation of its two ends
             between[name] = np.fmax(getattr(one.certificate, name), getattr(other.certificate, name))
         between["harmonics_used"], between["samples_used"] = other.resolution.highest, other.resolution.samples
         between["stable"] = other.certificate.stable
         return between
+
+    def _depth(self, start: Node, end: Node, fraction: float) -> FloatArray:
+        """Depths (n_contact,), m, at a fraction of a step."""
+        ends = [(node.report.wear_depth, node.rate) for node in (start, end)]
+        return np.asarray(depth_within(np.array([fraction]), end.cycle - start.cycle, ends[0], ends[1], self.smooth)[0])
 
     def even_counts(self, n_outputs: int) -> FloatArray:
         """Counts (n_outputs,) that divide the progress of the history evenly, up to its end or its target.
@@ -268,7 +263,7 @@ class DenseOutput:
         end = self.taken.reached if self.reached_target else nodes[-1].cycle
         found = np.zeros(n_outputs)
         found[-1] = end
-        at, volumes = np.array([node.cycle for node in nodes]), self._volumes(nodes)
+        at, volumes = self._progress(nodes)
         if len(nodes) < 2 or volumes[-1] <= 0.0:
             return found
         last = int(np.clip(np.searchsorted(at, end), 1, len(nodes) - 1))
@@ -289,17 +284,19 @@ class DenseOutput:
 
     def _volume_at(self, start: Node, end: Node, count: float) -> float:
         """Worn volume at a count within a step, m3."""
-        fraction = np.array([(count - start.cycle) / (end.cycle - start.cycle)])
-        return float(self._depth(start, end, fraction)[0] @ self.area)
+        return float(self._depth(start, end, (count - start.cycle) / (end.cycle - start.cycle)) @ self.area)
 
-    def _volumes(self, nodes: Sequence[Node]) -> FloatArray:
-        return np.array([node.report.wear_depth @ self.area for node in nodes])
+    def _progress(self, nodes: Sequence[Node]) -> tuple[FloatArray, FloatArray]:
+        """Counts (n,) and worn volumes (n,), m3, of nodes."""
+        return np.array([node.cycle for node in nodes]), np.array(
+            [node.report.wear_depth @ self.area for node in nodes]
+        )
 
     def _thinned(self, nodes: list[Node]) -> list[Node]:
         """The nodes without those of little progress, see `even_counts`."""
-        at, volumes = np.array([node.cycle for node in nodes]), self._volumes(nodes)
+        at, volumes = self._progress(nodes)
         way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
-        least, kept = 2.0 * way[-1] / WEAR.kept_steps, [0]
+        least, kept = 2.0 * way[-1] / KEPT_STEPS, [0]
         for place in range(1, len(nodes) - 1):
             if way[place + 1] - way[kept[-1]] > least:
                 kept.append(place)
@@ -307,10 +304,9 @@ class DenseOutput:
 
 
 def _column(values: list[Any], reached: BoolArray) -> NDArray[np.generic]:
-    """Values of one name at all counts; NaN at counts that are not reached, or 0 for whole numbers.
+    """Values of one name at all counts: those at the counts that are reached, NaN, or 0 for whole numbers, at others.
 
-    values: values at the counts that are reached.
-    reached (n,): whether a count is reached.
+    values: at the counts that are reached. reached (n,).
     """
     found = np.array(values)
     column = np.full((reached.size, *found.shape[1:]), np.nan if found.dtype.kind in "fc" else 0, found.dtype)

@@ -1,7 +1,5 @@
 """What is kept of the steps of a wear history, and what is read between their ends."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from solver.accuracy.certificate import Certificate
 from solver.results.state_report import StateReport
 from solver.settings import Resolution, WearTarget
 from solver.wear import output as output_module
-from solver.wear.options import WEAR
 from solver.wear.output import CERTIFIED, INTERPOLATED, DenseOutput
 
 AREA = np.array([1.0, 3.0])
@@ -133,10 +130,9 @@ def test_even_counts_are_as_far_from_each_other_in_volume_and_cycles_together():
 
 
 def test_of_many_steps_those_that_go_far_are_kept(monkeypatch):
-    monkeypatch.setattr(output_module, "WEAR", replace(WEAR, kept_steps=20))
-    output = taken(None, n_steps=200)
-    monkeypatch.setattr(output_module, "WEAR", WEAR)
     whole = taken(None, n_steps=200)
+    monkeypatch.setattr(output_module, "KEPT_STEPS", 20)
+    output = taken(None, n_steps=200)
     assert len(output.taken.nodes) <= 20
     assert [output.taken.nodes[place].cycle for place in (0, -1)] == [0.0, 2000.0]
     counts = np.linspace(0.0, 2000.0, 11)
