@@ -139,8 +139,7 @@ def follow(model: ReducedModel, task: BranchTask, keep: Keep) -> Iterator[StartR
 def follow_amplitudes(model: ReducedModel, task: BranchTask, keep: Keep) -> Iterator[StartResult]:
     """Points of a nonlinear mode, but those that are known, in the order of the sweep."""
     del keep
-    from solver.modes.mode_values import values_of
-    from solver.modes.points import follow_mode
+    from solver.modes.points import follow_mode, values_of
 
     # no point depends on those that are known
     wanted = sorted(task.order_left)

@@ -19,6 +19,7 @@ Alone, under "mpiexec -n N run-study ..." or under "srun run-study ...": the res
 
 _EPILOG = """\
 examples:
+  run-study --new my_study                               writes my_study.toml, a study to start from
   run-study                                              the bundled study "dovetail" -> dovetail.nc
   run-study --plan                                       what that would compute, and how long it takes
   mpiexec -n 2 run-study my_study.toml -o worn.nc        a study of one's own on two cores
@@ -77,6 +78,17 @@ class _SceneHelp(argparse.Action):
         parser.exit()
 
 
+class _New(argparse.Action):
+    """Writes a new study file and ends, as --help does."""
+
+    def __call__(self, parser: argparse.ArgumentParser, _: object, values: object, __: str | None = None) -> NoReturn:
+        from studyrunner.study.keys import write_new_study
+
+        path = write_new_study(str(values))
+        print(f"{path}: run-study {path} computes it", flush=True)
+        parser.exit()
+
+
 def parse_options(arguments: Sequence[str]) -> Options:
     """Options from the command line. Raises UserError; SystemExit after --help, --version and --scene-help."""
     parser = _Parser(
@@ -98,6 +110,9 @@ def parse_options(arguments: Sequence[str]) -> Options:
     )
     parser.add_argument(
         "--version", action="version", version=f"fretwear {metadata.version('fretwear')}", help="print the version"
+    )
+    parser.add_argument(
+        "--new", action=_New, default=argparse.SUPPRESS, metavar="NAME", help="write NAME.toml, a study to start from"
     )
     parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
     parser.add_argument(

@@ -21,7 +21,7 @@ import numpy as np
 
 from solver.missions.blocks import Block, Passage
 from solver.model import ComplexArray, FloatArray
-from solver.modes.modal_model import nearest_mode
+from solver.modes.modal_model import linear_mode
 from solver.results.history import PeriodicState
 from solver.structure.joint import friction_of_pairs
 
@@ -66,7 +66,7 @@ def delay_of(
     friction = friction_of_pairs(block.model, block.friction_coefficient)
     closed = state.contact_force_h[:, 0, 0] > 0.0
     joints = ((closed, friction), (closed, 0.0 * friction), (np.zeros_like(closed), friction))
-    modes = (nearest_mode(block.model, state.omega, *joint) for joint in joints)
+    modes = (linear_mode(block.model, *joint, near=state.omega) for joint in joints)
     mode = next((found for found in modes if found is not None), None)
     if mode is None:
         return Delay(0.0, 0.0)

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
+from solver.presentation import PresentedHistory
 
 
-@dataclass(frozen=True)
-class MissionHistory:
+@dataclass(frozen=True, repr=False)
+class MissionHistory(PresentedHistory):
     """A joint over its missions, at `n_output` numbers of missions. Values not reached are NaN.
 
     - missions (n_output,): numbers of missions.
@@ -36,6 +37,8 @@ class MissionHistory:
     - run_time: CPU seconds of the computing thread.
     - outcome, message: how the computation ended, and additions.
     """
+
+    OVER = ("missions", "mission")
 
     outcome: Outcome
     missions: FloatArray

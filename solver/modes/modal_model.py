@@ -24,9 +24,8 @@ from typing import cast
 import numpy as np
 import scipy.linalg
 
-from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+from solver.model import BoolArray, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.settings import NEGLIGIBLE
-from solver.structure.condensation import relative_indices, whole_motion
 
 
 @dataclass(frozen=True)
@@ -65,44 +64,21 @@ def natural_frequencies(linear: LinearModel, held: IntArray) -> tuple[FloatArray
     return np.sqrt(square[elastic]), cast("Matrix", shapes)
 
 
-def linear_mode(model: ReducedModel, number: int, closed: BoolArray, friction: FloatArray) -> LinearMode | None:
+def linear_mode(
+    model: ReducedModel, closed: BoolArray, friction: FloatArray, *, number: int = 1, near: float | None = None
+) -> LinearMode | None:
     """A mode of the joint with its closed pairs held; None where the structure has fewer modes.
 
-    Parameters
-    ----------
-    model : ReducedModel
-        The model.
-    number : int
-        Number of the mode, from 1 on in ascending frequency.
-    closed : array (n_contact,)
-        Pairs that are held in the normal direction.
-    friction : array (n_contact,)
-        Friction coefficients: closed pairs with a positive one are held in the tangential directions as well.
+    closed, friction (n_contact,): pairs held in the normal direction, and in the tangential ones with friction above 0.
+    number: of the mode, from 1 on in ascending frequency. near: rad/s; the mode nearest to a frequency instead.
     """
-    omegas, shapes = _modes(model, closed, friction)
-    return None if len(omegas) < number else _mode(model, float(omegas[number - 1]), shapes[:, number - 1])
-
-
-def nearest_mode(model: ReducedModel, omega: float, closed: BoolArray, friction: FloatArray) -> LinearMode | None:
-    """As `linear_mode`, the mode nearest to a frequency, rad/s; None where the structure has no mode."""
-    omegas, shapes = _modes(model, closed, friction)
-    if not len(omegas):
-        return None
-    nearest = int(np.argmin(np.abs(omegas - omega)))
-    return _mode(model, float(omegas[nearest]), shapes[:, nearest])
-
-
-def _modes(model: ReducedModel, closed: BoolArray, friction: FloatArray) -> tuple[FloatArray, Matrix]:
-    """Natural frequencies, rad/s, and modes of harmonic 1 with closed pairs held."""
-    linear = model.harmonic_structure(1)
-    dofs = model.contact.dofs
+    linear, dofs = model.harmonic_structure(1), model.contact.dofs
     held = np.concatenate([dofs[closed, 0], dofs[closed & (friction > 0.0), 1:].ravel()])
-    return natural_frequencies(linear, held[held >= 0])
-
-
-def _mode(model: ReducedModel, omega: float, shape: Matrix) -> LinearMode:
-    """The mode with a real largest component."""
-    linear = model.harmonic_structure(1)
+    omegas, shapes = natural_frequencies(linear, held[held >= 0])
+    if len(omegas) < (number if near is None else 1):
+        return None
+    place = number - 1 if near is None else int(np.argmin(np.abs(omegas - near)))
+    omega, shape = float(omegas[place]), shapes[:, place]
     largest = shape[np.argmax(np.abs(shape))]
     shape = cast("Matrix", shape * (np.conj(largest) / np.abs(largest)))
     return LinearMode(omega, shape, float(np.real(np.vdot(shape, linear.damping @ shape))) / (2.0 * omega))
@@ -138,43 +114,5 @@ def modal_model(model: ReducedModel, mode: LinearMode, damping_rate: float) -> M
         stiffness=first.stiffness + np.outer(force, force.conj()) / mode.omega**2,
         load_harmonic=force.astype(complex),
     )
-    linear = {k: damped(each) for k, each in model.linear.items()}
     kept = {name: getattr(model, name) for name in ("contact", "response_names", "n_sectors", "nodal_diameter")}
-    return ModalModel(linear=linear, **kept, first=sprung)
-
-
-@dataclass(frozen=True)
-class FirstHarmonic:
-    """All displacements of harmonic 1 as a function of the relative ones: `x_1 = motion u_1 + offset`.
-
-    - motion (n, n_rel), offset (n,): dimensionless, and m.
-    - mass (n, n): of harmonic 1.
-    - projection (n,): `q = projection . x_1` is the modal coordinate, m sqrt(kg).
-    """
-
-    motion: Matrix
-    offset: Matrix
-    mass: Matrix
-    projection: Matrix
-
-    def shape(self, relative: ComplexArray) -> ComplexArray:
-        """x_1 (n,), m, from u_1 (n_rel,), m."""
-        return self.motion @ relative + self.offset
-
-    def coordinate(self, shape: ComplexArray) -> complex:
-        """The modal coordinate q of x_1, m sqrt(kg)."""
-        return complex(self.projection @ shape)
-
-    def amplitude(self, shape: ComplexArray) -> float:
-        """The modal amplitude `sqrt(x_1^H M x_1)`, m sqrt(kg)."""
-        return float(np.sqrt(max(np.real(np.vdot(shape, self.mass @ shape)), 0.0)))
-
-
-def first_harmonic(model: ReducedModel, mode: LinearMode, omega: float, drive: float) -> FirstHarmonic:
-    """The displacements of harmonic 1 of a modal model at a frequency, rad/s, and a drive, m sqrt(kg)."""
-    relative, _ = relative_indices(model.contact)
-    linear = model.harmonic_structure(1)
-    # a unit of each relative displacement in turn, and at last the drive alone
-    load = np.outer(drive * linear.load_harmonic, np.arange(relative.size + 1) == relative.size)
-    found = whole_motion(linear, 1j * omega, relative, load, np.eye(relative.size, relative.size + 1, dtype=complex))
-    return FirstHarmonic(found[:, :-1], found[:, -1], linear.mass, mode.shape.conj() @ linear.mass)
+    return ModalModel(linear={k: damped(each) for k, each in model.linear.items()}, **kept, first=sprung)

@@ -18,15 +18,19 @@ import numpy as np
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.state import State, final_history
-from solver.model import ComplexArray, FloatArray, ReducedModel
-from solver.modes.modal_model import FirstHarmonic, LinearMode, first_harmonic, modal_model
-from solver.modes.options import MODES
+from solver.model import ComplexArray, FloatArray, LinearModel, ReducedModel
+from solver.modes.modal_model import LinearMode, modal_model
 from solver.newton.bordering import Bordered
 from solver.newton.run import Run
 from solver.packing import packable
 from solver.settings import DIFFERENCE, Resolution
+from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
+
+LARGEST_CHANGE = 0.3
+"""Largest change of the frequency (relative) and of the damping ratio in one iteration. With 0.1 and with 1 the modes
+of dovetail and foot are equal."""
 
 
 @packable
@@ -35,22 +39,25 @@ class ModeState:
     """A point of a nonlinear mode.
 
     - parameter: amplitude a, m sqrt(kg).
-    - omega: rad/s. damping_ratio: zeta. drive: Q, m sqrt(kg).
+    - values (3,): frequency omega, rad/s, damping ratio zeta, and drive Q, m sqrt(kg).
     - state: periodic state of the modal model.
     - shape (n,): x_1 of all displacements, m.
     """
 
     parameter: float
-    omega: float
-    damping_ratio: float
-    drive: float
+    values: FloatArray
     state: State
     shape: ComplexArray
 
     @property
-    def values(self) -> FloatArray:
-        """Frequency, damping ratio and drive (3,)."""
-        return np.array([self.omega, self.damping_ratio, self.drive])
+    def omega(self) -> float:
+        """Natural frequency, rad/s."""
+        return float(self.values[0])
+
+    @property
+    def damping_ratio(self) -> float:
+        """Damping ratio zeta."""
+        return float(self.values[1])
 
 
 @dataclass(frozen=True)
@@ -66,14 +73,14 @@ class ModeProblem:
     mode: LinearMode
     case: Case
 
-    def case_at(self, omega: float, damping_ratio: float) -> Case:
-        """Case of the modal model at a frequency, rad/s, and a damping ratio."""
-        model = modal_model(self.model, self.mode, 2.0 * damping_ratio * omega)
+    def case_of(self, values: FloatArray) -> Case:
+        """Case of the modal model at a frequency, rad/s, and a damping ratio, the first two values."""
+        model = modal_model(self.model, self.mode, 2.0 * float(values[1]) * float(values[0]))
         return replace(self.case, model=model, _structures={})
 
-    def joint_of(self, at: ModeState) -> Joint:
-        """Joint of a point."""
-        return self.case_at(at.omega, at.damping_ratio).joint(at.omega, at.drive)
+    def joint_of(self, values: FloatArray) -> Joint:
+        """Joint of the modal model at some values (3,)."""
+        return self.case_of(values).joint(float(values[0]), float(values[2]))
 
     def at(self, resolution: Resolution) -> ModeProblem:
         """The problem with other harmonics and samples."""
@@ -88,40 +95,22 @@ class ModeProblem:
         run: Run,
         most: int | None = None,
     ) -> ModeState | None:
-        """The mode at an amplitude; None where Newton's method fails.
+        """The mode at an amplitude a, m sqrt(kg); None where Newton's method fails.
 
-        Parameters
-        ----------
-        amplitude : float
-            a, m sqrt(kg).
-        start, values : array (n_rel, 2H+1), array (3,)
-            First predicted force, N, and first frequency, damping ratio and drive.
-        history : array (n_contact, 2)
-            Tangential history, m.
-        run, most
-            As in `Run.solve`.
+        start (n_rel, 2H+1), N, and values (3,): first predicted force, and first frequency, damping ratio and drive.
+        history (n_contact, 2): tangential history, m. run, most: as in `Run.solve`.
         """
         found = run.solve_bordered(_AtAmplitude(self, amplitude, history), start, values, most)
         # zeta goes to infinity where friction stops a mass for good: with few harmonics there are further states
         if found is None or abs(found.values[1]) > 1.0:
             return None
-        omega, damping_ratio, drive = map(float, found.values)
         state = State(found.at, final_history(found.balance, found.at), amplitude)
-        return ModeState(amplitude, omega, damping_ratio, drive, state, found.extra.shape)
+        return ModeState(amplitude, found.values, state, found.extra)
 
     def move(self, at: ModeState, other: ModeProblem, run: Run) -> ModeState | None:
         """The mode with the harmonics and samples of another problem; None where it is not found."""
-        joint = other.case_at(at.omega, at.damping_ratio).joint(at.omega, at.drive)
-        balance, start = transfer(self.case, joint, at.state.evaluation)
+        balance, start = transfer(self.case, other.joint_of(at.values), at.state.evaluation)
         return other.solve(at.parameter, start, at.values, balance.history, run.fresh())
-
-
-@dataclass(frozen=True)
-class _First:
-    """Displacements of harmonic 1 at an evaluation. shape (n,): x_1, m."""
-
-    harmonic: FirstHarmonic
-    shape: ComplexArray
 
 
 @dataclass(frozen=True)
@@ -135,18 +124,29 @@ class _AtAmplitude:
     history: FloatArray
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        """As in BorderedProblem; values: frequency, damping ratio and drive."""
-        omega, damping_ratio, drive = map(float, values)
-        case = self.problem.case_at(omega, damping_ratio)
-        joint = case.joint(omega, drive)
+        """As in BorderedProblem; values: frequency, damping ratio and drive. extra: x_1 (n,), m."""
+        joint = self.problem.joint_of(values)
         balance = Balance(joint, self.history, np.zeros(self.problem.model.contact.n_contact))
         at = balance.evaluate(predicted_h)
-        first = first_harmonic(case.model, self.problem.mode, omega, drive)
-        shape = first.shape(to_complex(joint.to_relative(at.displacement_h))[:, 0])
-        coordinate = first.coordinate(shape) / self.amplitude
-        grown = 0.5 * ((first.amplitude(shape) / self.amplitude) ** 2 - 1.0)
-        errors = np.array([coordinate.real - drive / self.amplitude, coordinate.imag, grown])
-        return Bordered(balance, at, values, errors, extra=_First(first, shape))
+        shape = self._shape(joint, at.displacement_h, float(values[2]))
+        coordinate, drive = self._coordinate(shape), float(values[2]) / self.amplitude
+        size = float(np.real(np.vdot(shape, self._linear(joint).mass @ shape)))
+        errors = np.array([coordinate.real - drive, coordinate.imag, 0.5 * (size / self.amplitude**2 - 1.0)])
+        return Bordered(balance, at, values, errors, extra=shape)
+
+    def _linear(self, joint: Joint) -> LinearModel:
+        return joint.model.harmonic_structure(1)
+
+    def _shape(self, joint: Joint, displacement_h: FloatArray, drive: float) -> ComplexArray:
+        """x_1 (n,), m, of relative displacements and a drive, m sqrt(kg)."""
+        linear, (relative, _) = self._linear(joint), relative_indices(joint.model.contact)
+        moved = to_complex(joint.to_relative(displacement_h))[:, 0]
+        return whole_motion(linear, 1j * joint.omega, relative, drive * linear.load_harmonic, moved)
+
+    def _coordinate(self, shape: ComplexArray) -> complex:
+        """Modal coordinate q of x_1 over the amplitude."""
+        mode, linear = self.problem.mode, self.problem.model.harmonic_structure(1)
+        return complex(np.vdot(mode.shape, linear.mass @ shape)) / self.amplitude
 
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
         """As in BorderedProblem, by differences."""
@@ -160,14 +160,13 @@ class _AtAmplitude:
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         """As in BorderedProblem."""
-        first: _First = here.extra
-        motion = here.balance.joint.to_relative(tangent.transmit(step)[0])
-        turned = first.harmonic.motion @ to_complex(motion)[:, 0]
-        coordinate = first.harmonic.coordinate(turned)
-        grown = float(np.real(np.vdot(first.shape, first.harmonic.mass @ turned))) / self.amplitude
-        return np.array([coordinate.real, coordinate.imag, grown]) / self.amplitude
+        joint = here.balance.joint
+        turned = self._shape(joint, tangent.transmit(step)[0], 0.0)
+        grown = float(np.real(np.vdot(here.extra, self._linear(joint).mass @ turned))) / self.amplitude**2
+        coordinate = self._coordinate(turned)
+        return np.array([coordinate.real, coordinate.imag, grown])
 
     def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
         """Frequency and damping ratio change by a limited amount."""
         largest = max(abs(change[0]) / here.values[0], abs(change[1]))
-        return float(min(1.0, MODES.largest_change / max(largest, 1e-300)))
+        return float(min(1.0, LARGEST_CHANGE / max(largest, 1e-300)))

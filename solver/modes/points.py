@@ -1,4 +1,8 @@
-"""The points of a nonlinear mode at given amplitudes, one by one."""
+"""The points of a nonlinear mode at given amplitudes, each with its errors, or the reason where there is none.
+
+The errors of frequency and damping ratio are the changes with more harmonics and samples, times a safety factor, and
+the difference to the reference sweep, which has fewer harmonics and longer steps in amplitude.
+"""
 
 from __future__ import annotations
 
@@ -9,19 +13,54 @@ from typing import Literal
 
 import numpy as np
 
+from solver.accuracy.certificate import certify
+from solver.accuracy.harmonic_levels import shifted
+from solver.accuracy.options import ACCURACY
+from solver.accuracy.period_events import nothing_happens
+from solver.accuracy.refinement import refine
 from solver.clock import computing_time
+from solver.contact.coulomb import SEPARATED, SLIP
+from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.state import Failure
+from solver.loading_history.path_of_states import Step
 from solver.loading_history.sweep import Sweep
-from solver.model import FloatArray, ReducedModel
-from solver.modes.mode_balance import ModeState
-from solver.modes.mode_path import ModePath
-from solver.modes.mode_point import ModePoint, describe_loss, judge_point, problem_of, solve_point
-from solver.modes.mode_start import Rest, find_rest, first_amplitude, first_node, sliding_node
-from solver.modes.options import MODES
+from solver.model import BoolArray, FloatArray, ReducedModel
+from solver.modes.modal_model import natural_frequencies
+from solver.modes.mode_balance import ModeProblem, ModeState
+from solver.modes.mode_path import TOP_BASE, ModePath, Rest, find_rest
 from solver.newton.run import Budget, OutOfTimeError, Run
-from solver.outcome import Outcome, describe_error
-from solver.settings import SolverSettings
+from solver.outcome import Outcome, describe_error, known_to
+from solver.results.mode_values import ModeValues, without_state
+from solver.settings import ROUND_OFF, Resolution, SolverSettings
+from solver.structure.fourier import to_complex
 
 Direction = Literal["up", "down"]
+
+NEAR_RESONANCE = 0.02
+"""Distance of a harmonic from a natural frequency, relative, that the message of a lost mode names."""
+
+RESONANT_ORDER = 7
+"""Highest harmonic that this message names: higher ones are always near some natural frequency."""
+
+
+@dataclass(frozen=True)
+class ModePoint:
+    """A point of a nonlinear mode.
+
+    - outcome, message: how the computation of the point ended. A point without state has no further values.
+    - problem: joint with the harmonics of the state. state: the state.
+    - errors (2,): estimated errors of the frequency, rad/s, and of the damping ratio.
+    - newton_iterations: of the way from rest to the point and of the point, as for this point alone.
+    - run_time: CPU seconds of the computing thread since the point before.
+    """
+
+    outcome: Outcome
+    message: str = ""
+    problem: ModeProblem | None = None
+    state: ModeState | None = None
+    errors: FloatArray | None = None
+    newton_iterations: int = 0
+    run_time: float = 0.0
 
 
 def follow_mode(
@@ -34,23 +73,15 @@ def follow_mode(
 ) -> Iterator[tuple[int, ModePoint]]:
     """Points of a nonlinear mode: index and point, one by one, in the order of the way to them.
 
-    Parameters
-    ----------
-    model, friction_coefficient
-        The model, and the friction coefficient of all pairs or of each pair.
-    amplitudes
-        Modal amplitudes, m sqrt(kg), in any order.
-    number, direction
-        As in `solver.backbone`.
-    settings
-        Harmonics, samples, tolerances. The limit of time holds for each point with the way from the point before.
+    amplitudes: modal amplitudes, m sqrt(kg), in any order. number, direction: as in `solver.backbone`.
+    settings: the limit of time holds for each point with the way from the point before.
     """
-    way = _Way(model, friction_coefficient, number, direction, settings)
-    for index in way.order(amplitudes):
+    way = _Way((model, friction_coefficient, number, settings), direction)
+    for index in sorted(range(len(amplitudes)), key=lambda index: way.place(float(amplitudes[index]))):
         began = computing_time()
-        way.run.budget.deadline = began + settings.time_limit
+        run = Run(settings.tolerance, Budget(deadline=began + settings.time_limit))
         try:
-            point = way.point(float(amplitudes[index]))
+            point = way.point(float(amplitudes[index]), run)
         except OutOfTimeError:
             point = ModePoint(Outcome.TIME_LIMIT)
         except np.linalg.LinAlgError:
@@ -58,143 +89,235 @@ def follow_mode(
         except Exception as error:
             # an error spoils one point only
             point = ModePoint(Outcome.EXCEPTION, describe_error(error))
-        yield index, replace(point, newton_iterations=way.iterations, run_time=computing_time() - began)
+        iterations = way.spent + run.budget.iterations
+        yield index, replace(point, newton_iterations=iterations, run_time=computing_time() - began)
 
 
 def top_of(amplitude: float) -> float:
     """Amplitude, m sqrt(kg), from which the amplitude of a point is lowered."""
-    return float(MODES.top_base ** math.ceil(math.log(2.0 * amplitude, MODES.top_base)))
+    return float(TOP_BASE ** math.ceil(math.log(2.0 * amplitude, TOP_BASE)))
 
 
 @dataclass
-class _Lowered:
-    """A sweep with falling amplitude.
-
-    - first: where it begins, with the harmonics of `path`.
-    - raised: Newton iterations of the way to there.
-    - sweep: the sweep, from its first point on.
-    """
-
-    path: ModePath
-    first: ModeState
-    raised: int
-    sweep: Sweep[ModeState] | None = None
-
-
 class _Way:
     """The sweeps to the points: one with rising amplitude, and one with falling amplitude from each `top_of`.
 
-    - iterations: Newton iterations of the way to the last point and of this point, those of other points left out.
+    - asked: model, friction coefficient, number of the mode, settings.
+    - spent: Newton iterations of the way to the last point, those to other points left out.
+    - rest, up, down: what has been found so far, and the sweep from the present `top`. to_rest, to_up, to_down: Newton
+      iterations up to their begin. Sweeps count for themselves: their nodes do not depend on the points asked for.
     """
 
-    def __init__(
-        self,
-        model: ReducedModel,
-        friction_coefficient: float | FloatArray | None,
-        number: int,
-        direction: Direction,
-        settings: SolverSettings,
-    ) -> None:
-        self.run, self.iterations = Run(settings.tolerance), 0
-        self._direction = direction
-        self._asked = (model, friction_coefficient, number, settings)
-        self._rest: Rest | tuple[Outcome, str] | None = None
-        self._to_rest = self._to_first = 0
-        self._up: Sweep[ModeState] | None = None
-        self._tops: list[float] = []
-        self._down: dict[float, _Lowered] = {}
+    asked: tuple[ReducedModel, float | FloatArray | None, int, SolverSettings]
+    direction: Direction
+    spent: int = 0
+    rest: Rest | Failure | None = None
+    up: Sweep[ModeState] | None = None
+    down: Sweep[ModeState] | None = None
+    top: float = 0.0
+    to_rest: int = 0
+    to_up: int = 0
+    to_down: int = 0
 
-    def order(self, amplitudes: FloatArray) -> list[int]:
-        """Indices of the amplitudes in the order in which the sweeps pass them."""
-        values = [float(amplitude) for amplitude in amplitudes]
-        self._tops = sorted({top_of(value) for value in values})
-        return sorted(range(len(values)), key=lambda index: values[index], reverse=self._direction == "down")
+    def place(self, amplitude: float) -> tuple[float, float]:
+        """Key by which amplitudes come in the order of the way."""
+        return (0.0, amplitude) if self.direction == "up" else (top_of(amplitude), -amplitude)
 
-    def point(self, amplitude: float) -> ModePoint:
-        """The point at the next amplitude."""
-        before = self.run.budget.iterations
-        if self._rest is None:
-            self._rest = find_rest(*self._asked, self.run)
-            self._to_rest = self.run.budget.iterations - before
-        self.iterations = self._to_rest
-        if isinstance(self._rest, tuple):
-            return ModePoint(*self._rest)
-        if self._direction == "up" and not self._rest.glued:
+    def point(self, amplitude: float, run: Run) -> ModePoint:
+        """The point at the next amplitude, m sqrt(kg). run: of this point alone."""
+        deadline = run.budget.deadline
+        if self.rest is None:
+            own = Run(run.tolerance, Budget(deadline=deadline))
+            self.rest, self.to_rest = find_rest(*self.asked, own), own.budget.iterations
+        self.spent, rest = self.to_rest, self.rest
+        if isinstance(rest, Failure):
+            return ModePoint(rest.outcome, rest.message)
+        if self.direction == "up" and not rest.glued:
             said = 'the joint has no such mode while its pairs stick: give sweep = "down", from large amplitudes'
             return ModePoint(Outcome.START_FAILED, said)
-        first = self._direction == "up" and amplitude < first_amplitude(self._rest)
-        sweep = None if first else self._sweep_to(self._rest, amplitude)
-        if sweep is None and not first:
-            return self._failed()
-        if self._direction == "down" and amplitude > self._down[top_of(amplitude)].first.parameter:
+        if self.direction == "up" and amplitude < rest.first_amplitude:
+            node = rest.raised(amplitude, run)
+            return _no_first() if node is None else judge_point(rest.problem, node, None, run)
+        if self.direction == "up":
+            sweep, before = self._raised_to(rest, amplitude, deadline), self.to_up
+        else:
+            self._begin_down(rest, top_of(amplitude), deadline)
+            sweep, before = self.down, self.to_down
+        self.spent = before
+        if sweep is None:
+            return _no_first()
+        if sweep is self.down and sweep.here is not None and sweep.here.parameter < amplitude:
             # the mode could not be raised to the amplitude from which it is lowered
-            assert self._up is not None
-            return ModePoint(Outcome.BRANCH_LOST, describe_loss(self._up))
-        before = self.run.budget.iterations
-        try:
-            if sweep is not None:
-                return solve_point(sweep, amplitude, self.run)
-            node = first_node(self._rest, amplitude, self.run)
-            return self._failed() if node is None else judge_point(self._rest.problem, node, None, self.run)
-        finally:
-            self.iterations += self.run.budget.iterations - before
-            self.iterations += 0 if sweep is None else sweep.n_iterations
+            assert self.up is not None
+            return ModePoint(Outcome.BRANCH_LOST, describe_loss(self.up))
+        sweep.set_deadline(deadline)
+        sweep.advance_to(amplitude)
+        self.spent += sweep.n_iterations
+        return solve_point(sweep, amplitude, run)
 
-    def _failed(self) -> ModePoint:
-        return ModePoint(Outcome.START_FAILED, "the mode was not found at its first amplitude")
-
-    def _sweep_to(self, rest: Rest, amplitude: float) -> Sweep[ModeState] | None:
-        """The sweep at the node before an amplitude; None where it does not begin."""
-        if self._direction == "up":
-            raised = self._raised_to(rest, amplitude)
-            self.iterations += self._to_first
-            return raised
-        down = self._lowered(rest, top_of(amplitude))
-        if down is None:
-            return None
-        down.sweep = down.sweep or self._begun(down.path, down.first, -1.0)
-        down.sweep.set_deadline(self.run.budget.deadline)
-        down.sweep.advance_to(amplitude)
-        self.iterations += down.raised
-        return down.sweep
-
-    def _raised_to(self, rest: Rest, amplitude: float) -> Sweep[ModeState] | None:
+    def _raised_to(self, rest: Rest, amplitude: float, deadline: float) -> Sweep[ModeState] | None:
         """The sweep with rising amplitude at the node before an amplitude; None where it does not begin."""
-        if self._up is None:
-            before = self.run.budget.iterations
-            node = first_node(rest, first_amplitude(rest), self.run)
-            self._to_first = self.run.budget.iterations - before
-            self._up = None if node is None else self._begun(ModePath(rest.problem), node, 1.0)
-        if self._up is not None:
-            self._up.set_deadline(self.run.budget.deadline)
-            self._up.advance_to(amplitude)
-        return self._up
+        if self.up is None:
+            own = Run(rest.problem.case.settings.tolerance, Budget(deadline=deadline))
+            first = rest.raised(rest.first_amplitude, own)
+            self.to_up = self.to_rest + own.budget.iterations
+            self.up = None if first is None else _begun(ModePath(rest.problem), first, 1.0, deadline)
+        if self.up is not None:
+            self.up.set_deadline(deadline)
+            self.up.advance_to(amplitude)
+        return self.up
 
-    def _begun(self, path: ModePath, first: ModeState, direction: float) -> Sweep[ModeState]:
-        """A sweep at its first node, with counts of its own: its nodes do not depend on the points asked for."""
-        budget = Budget(deadline=self.run.budget.deadline)
-        sweep: Sweep[ModeState] = Sweep(path, direction, budget, with_reference=True)
-        sweep.begin(path, first)
-        return sweep
+    def _begin_down(self, rest: Rest, top: float, deadline: float) -> None:
+        """Begin the sweep with falling amplitude from a top, m sqrt(kg), if it is another one.
 
-    def _lowered(self, rest: Rest, wanted: float) -> _Lowered | None:
-        """The sweep with falling amplitude from a top, m sqrt(kg); None where it does not begin.
-
-        The mode is raised to all tops first, or as far as it goes. A joint that has its mode only while it slides
-        begins at the top.
+        The mode is raised to the top first, or as far as it goes. A joint that has its mode only while it slides begins
+        at the top.
         """
-        for top in self._tops:
-            if top in self._down:
-                continue
-            first, path, before = None, ModePath(rest.problem), self.run.budget.iterations
-            if not rest.glued:
-                first = sliding_node(rest, top, self.run)
-            elif (raised := self._raised_to(rest, top)) is not None:
-                path = ModePath(problem_of(raised))
-                first = raised.last if raised.ahead is None else raised.ahead.state
-            if first is not None:
-                spent = self.run.budget.iterations - before
-                if self._up is not None and rest.glued:
-                    spent = self._to_first + self._up.n_iterations
-                self._down[top] = _Lowered(path, first, spent)
-        return self._down.get(wanted)
+        if top == self.top:
+            return
+        own, first, path = Budget(deadline=deadline), None, ModePath(rest.problem)
+        if not rest.glued:
+            first = rest.sliding(top, Run(path.case.settings.tolerance, own))
+            self.to_down = self.to_rest + own.iterations
+        elif (raised := self._raised_to(rest, top, deadline)) is not None:
+            first = raised.last if raised.ahead is None else raised.ahead.state
+            path, self.to_down = ModePath(problem_of(raised)), self.to_up + raised.n_iterations
+        self.down, self.top = None if first is None else _begun(path, first, -1.0, deadline), top
+
+
+def _begun(path: ModePath, first: ModeState, direction: float, deadline: float) -> Sweep[ModeState]:
+    """A sweep at its first node."""
+    sweep: Sweep[ModeState] = Sweep(path, direction, Budget(deadline=deadline), with_reference=True)
+    sweep.begin(path, first)
+    return sweep
+
+
+def _no_first() -> ModePoint:
+    return ModePoint(Outcome.START_FAILED, "the mode was not found at its first amplitude")
+
+
+def solve_point(sweep: Sweep[ModeState], amplitude: float, run: Run) -> ModePoint:
+    """The point of a mode at an amplitude, m sqrt(kg), to which a sweep was advanced."""
+    if sweep.here is None:
+        return ModePoint(Outcome.BRANCH_LOST, describe_loss(sweep))
+    found = sweep.state_at(amplitude, run.fresh())
+    if not isinstance(found, Step):
+        ahead = sweep.here if sweep.ahead is None else sweep.ahead.state
+        ends = f"{sweep.here.parameter:.4g} and {ahead.parameter:.4g}"
+        said = f"no state was found between the amplitudes {ends} m sqrt(kg), where the mode has states"
+        return ModePoint(Outcome.BRANCH_LOST, said)
+    reference = sweep.reference_at(amplitude, run.fresh())
+    other = None if reference is None or sweep.reference is None else (problem_of(sweep.reference), reference)
+    return judge_point(problem_of(sweep), found.state, other, run)
+
+
+def problem_of(sweep: Sweep[ModeState]) -> ModeProblem:
+    """The problem of a sweep, with its present harmonics."""
+    assert isinstance(sweep.path, ModePath)
+    return sweep.path.problem
+
+
+def judge_point(
+    problem: ModeProblem, found: ModeState, reference: tuple[ModeProblem, ModeState] | None, run: Run
+) -> ModePoint:
+    """The point with the harmonics that it needs, and its errors.
+
+    problem, found: the state, with the harmonics of the problem. reference: the same from the reference sweep, if any.
+    """
+    settings = problem.case.settings
+    # half of rtol is left for the error by the steps of the sweep
+    case = replace(problem.case_of(found.values), settings=replace(settings, rtol=0.5 * settings.rtol))
+    refined = refine(case, found.omega, float(found.values[2]), found.state, run)
+    accurate = refined.accurate
+    other = problem.at(refined.case.resolution)
+    if other.case.resolution != problem.case.resolution:
+        moved = problem.move(found, other, run)
+        accurate &= moved is not None
+        problem, found = (problem, found) if moved is None else (other, moved)
+    errors = _errors_by_resolution(problem, found, run)
+    if reference is not None:
+        by_steps = reference[0].move(reference[1], problem, run) or reference[1]
+        errors = errors + np.abs(by_steps.values - found.values)[:2]
+    joint = problem.joint_of(found.values)
+    certificate = certify(joint, found.state.evaluation)
+    if not certificate.holds(settings.tolerance):
+        return ModePoint(Outcome.CERTIFICATE_FAILED, certificate.sentence(settings.tolerance))
+    # the damping ratio is the sum of parts that may cancel: its error is judged against the part of friction
+    by_friction = float(joint.law.friction_work(found.state.evaluation).sum()) / (
+        2.0 * np.pi * (found.omega * found.parameter) ** 2
+    )
+    damping = max(by_friction, abs(found.damping_ratio), ROUND_OFF)
+    known = {"natural frequency": float(errors[0]) / found.omega, "damping ratio": float(errors[1]) / damping}
+    said = [f"the {name} {known_to(error, settings.rtol)}" for name, error in known.items() if error > settings.rtol]
+    outcome = Outcome.INACCURATE if said or not accurate else Outcome.CONVERGED
+    return ModePoint(outcome, "; ".join(said), problem, found, errors)
+
+
+def _errors_by_resolution(problem: ModeProblem, state: ModeState, run: Run) -> FloatArray:
+    """Errors (2,) of frequency, rad/s, and damping ratio by harmonics and samples; inf where they are not known."""
+    if nothing_happens(state.state.evaluation):
+        return np.zeros(2)
+
+    def change(resolution: Resolution) -> FloatArray:
+        moved = problem.move(state, problem.at(resolution), run)
+        return np.full(2, np.inf) if moved is None else np.abs(moved.values - state.values)[:2]
+
+    here, errors = problem.case.resolution, np.full(2, np.inf)
+    for levels, safety in ((2, ACCURACY.two_levels_safety), (1, ACCURACY.one_level_safety), (-1, 1.0)):
+        other = shifted(here, levels)
+        if other.orders != here.orders and problem.model.holds(other.highest) and np.isinf(errors).any():
+            errors = safety * change(other)
+    # samples of their own: an event may stay next to the same sample of twice as many
+    return errors + ACCURACY.triple_samples_safety * change(Resolution(here.orders, 3 * here.samples + 2))
+
+
+def describe_loss(sweep: Sweep[ModeState]) -> str:
+    """Sentence about the end of a mode: the last amplitude, and what ends the mode there."""
+    here, problem = sweep.last, problem_of(sweep)
+    assert here is not None
+    up = sweep.direction > 0.0
+    way, beyond = ("up", "larger") if up else ("down", "smaller")
+    said = f"the mode is followed {way} to the amplitude {here.parameter:.4g} m sqrt(kg), at {_hertz(here.omega)}"
+    dofs = problem.model.contact.dofs.ravel()
+    for order in (n for n in problem.case.resolution.orders if 1 < n <= RESONANT_ORDER):
+        omegas, _ = natural_frequencies(problem.model.harmonic_structure(order), dofs[dofs >= 0])
+        near = omegas[np.abs(omegas - order * here.omega) < NEAR_RESONANCE * order * here.omega]
+        if near.size:
+            return f"{said}, where harmonic {order} meets the natural frequency {_hertz(float(near[0]))} of the joint"
+    return f"{said}; no state is found at a {beyond} amplitude: the mode turns back there (a fold), or ends"
+
+
+def _hertz(omega: float) -> str:
+    return f"{omega / (2.0 * np.pi):.6g} Hz"
+
+
+def values_of(model: ReducedModel, point: ModePoint) -> ModeValues:
+    """What is reported of a point of a mode of a model."""
+    ended, effort = (point.outcome, point.message), (point.newton_iterations, point.run_time)
+    state, problem = point.state, point.problem
+    if state is None or problem is None or point.errors is None:
+        linear = model.linear[0]
+        return without_state(*ended, (len(linear.response), len(linear.mass), model.contact.n_contact), *effort)
+    joint, at, resolution = problem.joint_of(state.values), state.state.evaluation, problem.case.resolution
+    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
+    return ModeValues(
+        *ended,
+        state.omega / (2.0 * np.pi),
+        state.damping_ratio,
+        float(point.errors[0]) / (2.0 * np.pi),
+        float(point.errors[1]),
+        response,
+        state.shape,
+        _slips(at).mean(axis=1),
+        (at.status_t == SEPARATED).mean(axis=1),
+        resolution.highest,
+        resolution.samples,
+        *effort,
+    )
+
+
+def _slips(at: Evaluation) -> BoolArray:
+    """Samples (n_contact, N) in which a pair slips; a pair at its friction limit that does not move sticks."""
+    moved = np.abs(np.diff(at.state_t, axis=2)).max(axis=1)
+    least = ROUND_OFF * np.abs(at.state_t).max(axis=(1, 2))
+    return np.asarray((at.status_t == SLIP) & (moved > least[:, None]))

@@ -10,6 +10,7 @@ import numpy as np
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
 from solver.outcome import Outcome
 from solver.packing import packable
+from solver.presentation import PresentedHistory
 from solver.settings import Resolution
 
 
@@ -67,8 +68,8 @@ class StartState:
     reference: PeriodicState | None = None
 
 
-@dataclass(frozen=True)
-class WearHistory:
+@dataclass(frozen=True, repr=False)
+class WearHistory(PresentedHistory):
     """A point of a study on the slow time scale, at `n_output` cycle counts.
 
     At output counts that were not reached, real values are NaN and whole numbers 0.
@@ -118,6 +119,8 @@ class WearHistory:
     - message: addition to the outcome: an unexpected error, the cycle from which on a condition is violated, the error
       reached; empty where there is nothing to add.
     """
+
+    OVER = ("cycles", "cycle")
 
     outcome: Outcome
     cycles: FloatArray

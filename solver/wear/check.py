@@ -176,7 +176,9 @@ def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failur
 
 
 def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
-    """Instability of the last state of a history, None if stable."""
+    """Instability of the last state of a history, None if stable. The sweep has judged the start state already."""
+    if state.cycle == 0.0 and not work.where.follows and not _vibrates_otherwise(state):
+        return None
     joint, at = work.at(state), state.point.evaluation
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
     if free_slide(joint, at) is None and not work.is_stable(joint, at):

@@ -32,7 +32,7 @@ from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.results.verdict import HELD_FORCE
 from solver.settings import NEGLIGIBLE, ROUND_OFF
-from solver.stability.options import STABILITY
+from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
 from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
 from solver.wear.rate_slope import too_long
@@ -69,7 +69,7 @@ def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState |
     found = _at_depth(work, joint, state.point, worn)
     if found is None or creeps(joint, hold, found.evaluation):
         return None
-    if vibration_change(at, found.evaluation) > STABILITY.other_branch:
+    if vibration_change(at, found.evaluation) > OTHER_BRANCH:
         return None
     return replace(state, point=found, hold=hold, held_from=state.cycle)
 
@@ -85,7 +85,7 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
         if reached is None:
             continue
         # a small fold of the branch at a corner is no jump, and there may be many corners
-        if vibration_change(state.point.evaluation, reached.evaluation) > STABILITY.other_branch:
+        if vibration_change(state.point.evaluation, reached.evaluation) > OTHER_BRANCH:
             state = replace(state, jump_cycle=float(np.fmin(state.jump_cycle, state.cycle)))
         return replace(state, point=reached)
     return Failure(Outcome.MARCH_FAILED)

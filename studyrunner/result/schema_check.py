@@ -18,7 +18,7 @@ import xarray as xr
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
 from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS
 from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
-from studyrunner.result.sample_statistics import DRAWN, SAMPLE
+from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.toml_text import NoTomlError, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, KEPT, LOOPS, Variable

@@ -17,14 +17,18 @@ from studyrunner.result.measured import Profile, read_profile
 from studyrunner.result.missions import as_history
 from studyrunner.result.opening import open_known
 from studyrunner.result.points import CONVERGED, Points
-from studyrunner.result.sample_statistics import SAMPLE, statistics_of
 from studyrunner.result.units import show_cycles, show_value
+from studyrunner.statistics.samples import SAMPLE
+from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.user_error import show_text
 
 __all__ = ["CONVERGED", "NO_VOLUME", "Point", "Result", "as_sentences", "open_for_report"]
 
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Probabilities of the bands that figures show."""
 
 Point = Mapping[str, int]
 """Index along each axis. A missing axis stands for all its values."""
@@ -37,7 +41,8 @@ class Result(Points):
     dataset: read lazily. A variable that was read as a whole stays in memory. fixed: axes of which this holds one value
     of several, and how many the file has. blocks: of a result of missions what belongs to single blocks; in `dataset`
     missions then have the name of the cycles that they replace. chosen: values of axes of the point that figures of a
-    single point show. measured: a worn profile to compare with.
+    single point show. measured: a worn profile to compare with. again: what was computed anew of the worn joint of the
+    shown point, see `studyrunner.worn_joint`.
     """
 
     path: Path
@@ -46,6 +51,7 @@ class Result(Points):
     blocks: xr.Dataset | None = None
     chosen: Mapping[str, float | str] = field(default_factory=dict)
     measured: Profile | None = None
+    again: Mapping[str, xr.Dataset] = field(default_factory=dict)
 
     @cached_property
     def cycles(self) -> NDArray[np.float64]:
@@ -130,8 +136,8 @@ class Result(Points):
 
     @cached_property
     def statistics(self) -> xr.Dataset | None:
-        """What the samples of the file say, see `statistics_of`; None where it has none."""
-        return statistics_of(self.dataset, self.study, self.endings)
+        """What the samples of the file say, see `statistics_of_file`; None where it has none."""
+        return statistics_of_file(self.dataset, QUANTILES)
 
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show.

@@ -153,12 +153,10 @@ class ScatterSection(Section):
     EXTRA: ClassVar = Scattered
 
     samples: Annotated[Whole, Field(ge=1, le=1_000_000)] = Field(
-        description="realisations of the study; with saltelli base samples, of 2 realisations and one for each input"
+        description="number; with saltelli base samples, each of 2 + number of inputs"
     )
-    method: Method = Field("sobol", description="how the samples are spread over the scatter")
-    seed: Annotated[Whole, Field(ge=0, lt=2**31)] = Field(
-        1, description="of the random numbers: the same seed draws the same values"
-    )
+    method: Method = Field("sobol", description="how the samples are chosen")
+    seed: Annotated[Whole, Field(ge=0, lt=2**31)] = Field(1, description="of the random numbers")
 
     def rules(self) -> Iterator[Wrong]:
         """Something scatters, pair by pair only what belongs to pairs, and the method has the samples it needs."""

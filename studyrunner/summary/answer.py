@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, describe_ended
 from studyrunner.result.missions import as_history
 from studyrunner.result.points import COMPLETE_WORDS
-from studyrunner.result.sample_statistics import SAMPLE
 from studyrunner.result.units import show_number
 from studyrunner.result.view import Result
-from studyrunner.statistics.ranking import describe_ranking
-from studyrunner.statistics.sentence import describe_volumes
+from studyrunner.statistics.samples import SAMPLE
+from studyrunner.statistics.sentence import describe_ranking, describe_volumes
 from studyrunner.summary.doubts import doubts
 from studyrunner.summary.mesh_change import MeshChange, compare_meshes
 from studyrunner.summary.wear import (

@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from tests.studyrunner.report.page_cases import build_file
+from tests.studyrunner.results import build_file
 
 NUMBERS = (0, 1, -1, 127, -128, 2**31 - 1, 2**62, -(2**63))
 VALUES = (0.0, -0.0, 1.0, -1.0, np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, 1e30, 1e-30, 2.0**63)

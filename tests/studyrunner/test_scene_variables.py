@@ -18,7 +18,7 @@ from studyrunner.study.sections import WearSection
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, fake_histories
-from tests.studyrunner.made_results import build_dataset, write_dataset
+from tests.studyrunner.results import build_dataset, write_dataset
 from tests.studyrunner.test_write_result import write_study
 
 SLIDER = ("axes.frequency=[160, 60, 150]", "slow_time.outputs=3", "axes.excitation_amplitude=[10, 11]")

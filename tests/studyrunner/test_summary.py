@@ -22,7 +22,7 @@ from studyrunner.summary.mesh_change import MeshChange, compare_meshes, extrapol
 from studyrunner.summary.wear import MostWear, NothingWore
 from studyrunner.variables import CERTIFICATE
 from tests.studyrunner.fakes import FACTS
-from tests.studyrunner.made_results import made_result
+from tests.studyrunner.results import made_result
 
 GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=['implicit', 'explicit', 'adaptive']")
 SENSITIVE, FAILED, INACCURATE = int(Outcome.SENSITIVE), int(Outcome.MARCH_FAILED), int(Outcome.INACCURATE)

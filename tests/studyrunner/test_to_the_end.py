@@ -68,24 +68,20 @@ def test_points_have_counts_of_their_own_in_file_report_and_archive(tmp_path):
 def test_the_report_shows_a_final_state_as_one(tmp_path):
     """It has no cycle count: a level beside a history, and alone no history at all; on the page infinite."""
     from studyrunner.report.drawing import Missing
-    from studyrunner.report.figures.courses import find_course
-    from studyrunner.report.figures.volume import draw_history, draw_map, draw_volumes
+    from studyrunner.report.figures.history import draw_history
+    from studyrunner.report.figures.volume import draw_final, draw_map
     from studyrunner.report.page.data import build_page_data
-    from studyrunner.result.units import scale_for
 
     two = study_with('axes.scheme=["adaptive", "final"]', "axes.frequency=[155, 160]")
     with run_study(two, tmp_path / "both.nc"):
         pass
     both = open_for_report(tmp_path / "both.nc")
     assert both.has_history
-    scale = scale_for("m3", 1e-8)
-    marched, level = draw_history(both, scale, 1e-8).figure.axes[0].get_lines()
+    marched, level = draw_history(both).figure.axes[0].get_lines()
     assert len(marched.get_xdata()) == 6  # type: ignore[arg-type]
     assert level.get_label() == "final scheme: final state"
     assert list(level.get_ydata()) == pytest.approx([10.0, 10.0])  # type: ignore[arg-type]
-    course = find_course(both)
-    assert course is not None
-    panels = draw_map(both, course, "worn_volume").figure.axes
+    panels = draw_map(both, "worn_volume").figure.axes
     assert [panel.get_title() for panel in panels if panel.get_title()] == ["adaptive scheme"]
     content = build_page_data(both, 1e6, [])
     (counts,) = [entry for entry in content["variables"] if entry["name"] == "cycle_count"]
@@ -98,7 +94,7 @@ def test_the_report_shows_a_final_state_as_one(tmp_path):
     alone = open_for_report(tmp_path / "final.nc")
     assert not alone.has_history
     assert (alone.cycle_label(-1), alone.when(-1)) == ("the final state", "in the final state")
-    final, history = draw_volumes(alone)
+    final, history = draw_final(alone), draw_history(alone)
     assert isinstance(history, Missing)
     assert "10 mm³ ± 1e-06 % at " in history.sentence
     assert "worn volume at the end" in final.figure.axes[0].get_ylabel()  # type: ignore[union-attr]

@@ -20,7 +20,7 @@ from studyrunner.study.study_file import read_study
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
 from tests.studyrunner.fakes import FACTS, fake_completion, fake_histories, fake_march, fake_starts, without_values
-from tests.studyrunner.made_results import build_dataset, write_dataset
+from tests.studyrunner.results import build_dataset, write_dataset
 
 OVERRIDES = (
     "axes.frequency=[160.0, 150.0]",

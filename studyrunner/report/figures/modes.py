@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from studyrunner.report.drawing import Drawing, Missing, add_legend, mark_failed, new_panels, set_log
+from studyrunner.report.drawing import Drawing, Missing, add_legend, mark_failed, new_panel, set_log
 from studyrunner.report.figures.courses import Course, find_course
 from studyrunner.result.choice import choose
 from studyrunner.result.view import Result, as_sentences
-from studyrunner.system.progress import count
 
 _MOST_LINES = 6
 _FIRST = ("cycle", "mode", "sweep")
@@ -36,8 +35,7 @@ def _draw(result: Result, course: Course, name: str) -> Drawing:
     """A variable over the amplitude with its error bars."""
     label, title = _FIGURES[name]
     choice = choose(result, ["modal_amplitude"], _MOST_LINES, first=_FIRST)
-    figure, panels = new_panels(1, 1, 3.6)
-    panel = panels[0, 0]
+    figure, panel = new_panel(3.6)
     values = np.array([course.read(result, name, point) for point in choice.points])
     for number, (point, words) in enumerate(choice):
         style, own = course.line_style(number), values[number]
@@ -55,13 +53,13 @@ def _draw(result: Result, course: Course, name: str) -> Drawing:
     # negative damping, e.g. of the air, has no logarithm
     if name == "damping_ratio" and 0.0 < low <= high:
         set_log(panel.yaxis, low, high, percent=True)
-    n_failed = mark_failed(panel, course.values, np.isnan(values))
+    crosses = mark_failed(panel, course.values, np.isnan(values))
     add_legend(figure)
     units = " Hz" if name == "natural_frequency" else ""
     caption = as_sentences(
         f"From {low:.6g}{units} to {high:.6g}{units}" if low <= high else "No point has a state",
         "Bars: estimated errors; none where they are smaller than the markers" if result.has(f"{name}_error") else "",
-        f"Crosses: at these, {count(n_failed, 'point')} in all without a result" if n_failed else "",
+        crosses,
         choice.sentence,
     )
     return Drawing(name, title, caption, figure)

@@ -6,10 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 
-from studyrunner.report.drawing import Drawing, Table, add_legend, new_figure
+from studyrunner.report.drawing import Drawing, Table, add_legend, new_panel
 from studyrunner.report.figures.courses import find_course
 from studyrunner.result.choice import choose
 from studyrunner.result.units import show_cycles
@@ -37,8 +36,7 @@ def draw_outcomes(result: Result) -> Iterator[Drawing]:
     special = [number for number in present if number != CONVERGED]
     colours = {number: _OTHER_COLOURS[i % len(_OTHER_COLOURS)] for i, number in enumerate(special)}
     colours[CONVERGED] = _CONVERGED_COLOUR
-    figure = new_figure(1.4 + 0.32 * len(field))
-    panel: Axes = figure.subplots()
+    figure, panel = new_panel(1.4 + 0.32 * len(field))
     edges = np.arange(field.shape[1] + 1) - 0.5, np.arange(field.shape[0] + 1) - 0.5
     cells = ListedColormap([colours[number] for number in present])
     lines = 0.8 if field.size <= _MOST_CELLS else 0.0

@@ -18,8 +18,9 @@ from studyrunner.report.drawing import (
     Missing,
     add_colour_bar,
     add_legend,
+    label_outer,
     line_style,
-    new_figure,
+    new_panel,
     new_panels,
     set_from_zero,
     title_at,
@@ -87,8 +88,7 @@ def draw_depths(result: Result) -> Drawing:
     series = [(last_depth(result, {**shown, **point}), label) for point, label in choice]
     series = [(depth, label) for depth, label in series if not np.isnan(depth).all()]
     scale = scale_for("m", *(depth for depth, _ in series))
-    figure = new_figure(3.4)
-    panel: Axes = figure.subplots()
+    figure, panel = new_panel(3.4)
     pairs = result.dataset["contact"].values
     _draw_stems(panel, pairs, [scale(depth) for depth, _ in series], [label for _, label in series])
     panel.set_ylabel(scale.label(f"wear depth {result.when(last)}"))
@@ -135,7 +135,7 @@ def draw_numbers(result: Result) -> Iterator[Drawing]:
         for pair, (x, y) in zip(flank.pairs, 1e3 * places, strict=True):
             panel.text(x, y, str(names[pair]), ha="center", va="center", fontsize=8, clip_on=False)
         panel.set_title(flank.surface)
-    _label_outer(panels)
+    label_outer(panels)
     text = as_sentences(f"As along the dimension contact: {len(names)} pairs", flanks[0].origin)
     yield Drawing("pair_numbers", "Numbers of the contact pairs", text, figure)
 
@@ -165,8 +165,7 @@ def draw_pressure(result: Result) -> Drawing:
     labels = [result.cycle_label(cycle) for cycle in kept]
     flanks, left_out = _choose_flanks(result, values)
     if all(flank.seen is None for flank in flanks):
-        figure = new_figure(3.2)
-        panel = figure.subplots()
+        figure, panel = new_panel(3.2)
         _draw_stems(panel, result.dataset["contact"].values, [scale(value) for value in values], labels)
         panel.set_ylabel(scale.label("mean pressure"))
         add_legend(figure)
@@ -235,17 +234,9 @@ def _draw_fields(
         for panel, flank in zip(row, flanks, strict=True):
             _draw_field(panel, flank, scale(value[flank.pairs]), norm)
             panel.set_title(f"{flank.surface}, {label}")
-    _label_outer(panels)
+    label_outer(panels)
     add_colour_bar(figure, panels, norm, scale.label(text), fraction=0.05)
     return figure
-
-
-def _label_outer(panels: NDArray[Any]) -> None:
-    """Labels of axes at the left and below only."""
-    for panel in panels[:, 1:].flat:
-        panel.set_ylabel("")
-    for panel in panels[:-1].flat:
-        panel.set_xlabel("")
 
 
 def _draw_field(panel: Axes, flank: Flank, values: FloatArray, norm: Normalize, **look: Any) -> None:
@@ -268,8 +259,7 @@ def _draw_field(panel: Axes, flank: Flank, values: FloatArray, norm: Normalize, 
 def _draw_profiles(flanks: Sequence[Flank], depth: FloatArray, scale: Scale) -> Figure:
     """A map of each flank, and under it the depth along its first direction, downwards as the surface sinks."""
     inches = _inches(flanks)
-    figure = new_figure(inches + 3.3)
-    panels = figure.subplots(2, len(flanks), squeeze=False, sharex="col", height_ratios=(inches, 2.0))
+    figure, panels = new_panels(2, len(flanks), inches + 3.3, sharex="col", height_ratios=(inches, 2.0))
     deepest = scale(float(np.nanmax(depth))).item() or 1.0
     norm = Normalize(0.0, deepest)
     rows = [flank.cells.y for flank in flanks if flank.cells is not None]
@@ -286,7 +276,7 @@ def _draw_profiles(flanks: Sequence[Flank], depth: FloatArray, scale: Scale) -> 
         panel.set_ylim(1.06 * deepest, -0.04 * deepest)
         panel.set_xlabel(f"{flank.directions[0]} (mm)")
     panels[1, 0].set_ylabel(scale.label("wear depth"))
-    _label_outer(panels)
+    label_outer(panels)
     add_colour_bar(figure, panels, norm, scale.label("wear depth"), fraction=0.05)
     add_legend(figure)
     return figure

@@ -13,7 +13,8 @@ from studyrunner.report.drawing import (
     add_colour_bar,
     add_legend,
     line_style,
-    new_figure,
+    new_panel,
+    new_panels,
     set_from_zero,
     title_at,
 )
@@ -32,8 +33,7 @@ def draw_scar_pressure(result: Result, scar: Scar) -> Drawing:
     kept = sorted({0, result.last_kept(shown)})
     values = [np.asarray(result.at("mean_pressure", shown, cycle).values, dtype=float) for cycle in kept]
     scale, along = scale_for("Pa", *values), scale_for("m", scar.x)
-    figure = new_figure(3.2)
-    panel: Axes = figure.subplots()
+    figure, panel = new_panel(3.2)
     for number, (cycle, pressure) in enumerate(zip(kept, values, strict=True)):
         at = scar.x[scar.line]
         panel.plot(
@@ -63,16 +63,16 @@ def draw_scar_depth(result: Result, scar: Scar) -> Drawing:
     measured = result.measured
     scale = scale_for("m", after, *([measured.depth] if measured else []))
     along = scale_for("m", scar.x)
-    figure = new_figure(3.4)
     if scar.width:
-        beside, panel = figure.subplots(1, 2, width_ratios=(1.0, 1.2))
+        figure, panels = new_panels(1, 2, 3.4, width_ratios=(1.0, 1.2))
+        beside, panel = panels[0]
         norm = Normalize(0.0, scale(float(np.nanmax(after))).item())
         _draw_map(beside, scar, scale(after), norm, along.factor)
         beside.set_xlabel(along.label("x"))
         beside.set_ylabel(along.label("y"))
         add_colour_bar(figure, np.array([beside]), norm, scale.label("wear depth"), fraction=0.05)
     else:
-        panel = figure.subplots()
+        figure, panel = new_panel(3.4)
     at = along(scar.x[scar.line])
     pairs = scar.pairs[scar.line]
     before = depths(result, shown)[0]

@@ -18,17 +18,15 @@ from studyrunner.report.drawing import (
     Missing,
     add_legend,
     line_style,
-    new_figure,
     new_panels,
     set_from_zero,
 )
-from studyrunner.report.figures.courses import Course, find_course
-from studyrunner.report.figures.volume import slow_time
+from studyrunner.report.figures.courses import Course, find_course, slow_time
 from studyrunner.result.choice import choose
-from studyrunner.result.sample_statistics import DRAWN, SAMPLE
 from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import NO_VOLUME, Point, Result, as_sentences
-from studyrunner.statistics.ranking import deciding_input, describe_ranking, leading_input, measure_of
+from studyrunner.statistics.samples import DRAWN, SAMPLE
+from studyrunner.statistics.sentence import deciding_input, describe_ranking, leading_input, measure_of
 from studyrunner.system.progress import count
 
 FloatArray = NDArray[np.float64]
@@ -271,8 +269,7 @@ def _draw_samples(result: Result, last: xr.Dataset) -> Drawing:
     shown, left_out = _choose(result, last)
     scale = scale_for("m3", result.worn)
     if len(shown) == 1:
-        figure = new_figure(3.6)
-        first, density = figure.subplots(1, 2, sharey=True, width_ratios=(4.0, 1.0))
+        figure, ((first, density),) = new_panels(1, 2, 3.6, sharey=True, width_ratios=(4.0, 1.0))
         panels = np.array([[first]])
         _draw_density(density, shown[0][2], scale)
     else:

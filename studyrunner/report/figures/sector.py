@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from studyrunner.report.drawing import COLOURS, Drawing, Missing, line_style, new_figure, set_from_zero
+from studyrunner.report.drawing import COLOURS, Drawing, Missing, line_style, new_panels, set_from_zero
 from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint_faces, rgb
 from studyrunner.report.root.surface import MESH
 from studyrunner.report.root.views import from_aslant
@@ -30,9 +30,8 @@ def draw_sector(result: Result) -> Iterator[Drawing | Missing]:
         yield Missing("natural_frequencies" if not frequencies else "mesh", _TITLE, sentence)
     if not mesh and not frequencies:
         return
-    figure = new_figure(4.0)
     ratios = [ratio for ratio, held in ((1.0, mesh), (1.7, frequencies)) if held]
-    panels = figure.subplots(1, len(ratios), squeeze=False, width_ratios=ratios)[0]
+    figure, (panels,) = new_panels(1, len(ratios), 4.0, width_ratios=ratios)
     text = as_sentences(
         _draw_mesh(result, panels[0]) if mesh else "",
         _draw_frequencies(result, panels[-1]) if frequencies else "",

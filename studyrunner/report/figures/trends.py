@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import COLOURS, Drawing, new_panels, set_log
-from studyrunner.result.sample_statistics import SAMPLE
 from studyrunner.result.units import scale_for, show_number, units_of
 from studyrunner.result.view import Result, as_sentences
+from studyrunner.statistics.samples import SAMPLE
 
 FloatArray = NDArray[np.float64]
 

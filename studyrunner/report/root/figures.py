@@ -13,7 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import MAP, Drawing, Missing, new_figure, title_at
+from studyrunner.report.drawing import MAP, Drawing, Missing, new_panel, new_panels, title_at
 from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint_edges, paint_faces, rgb
 from studyrunner.report.root.surface import RootSurface, read_root
@@ -121,8 +121,7 @@ def _paint_state(
     """The root and close-ups, coloured with the values of a state. factor: by which worn depths are exaggerated."""
     closer = _close_ups(views)
     drawn = [views[-1], *closer]
-    figure = new_figure(3.4)
-    panels = figure.subplots(1, len(drawn), squeeze=False, width_ratios=[1.0] + [2.0] * len(closer))[0]
+    figure, (panels,) = new_panels(1, len(drawn), 3.4, width_ratios=[1.0] + [2.0] * len(closer))
     norm = Normalize(0.0, scale(float(state.values.max())).item() or 1.0)
     for panel, view in zip(panels, drawn, strict=True):
         _paint(panel, surface, view, state, factor, scale, norm)
@@ -188,8 +187,7 @@ def _draw_disk(result: Result, surface: RootSurface) -> Drawing | None:
         colours.append(own if sector == 0 else own + (1.0 - own) * _FADED)
     all_nodes, all_faces, all_colours = np.concatenate(nodes), np.concatenate(faces), np.concatenate(colours)
     looking = face_normals(all_nodes, all_faces) @ to_eye > 0.0
-    figure = new_figure(4.6)
-    panel = figure.subplots()
+    figure, panel = new_panel(4.6)
     paint_faces(panel, all_nodes, all_faces[looking], all_colours[looking], view, lines=0.0)
     text = as_sentences(
         f"The {number} sectors of the disk, that of the mesh in full colour",

@@ -5,8 +5,8 @@ import numpy as np
 from studyrunner.report.page.page import write_page
 from studyrunner.result.certainty import certainty_of, describe_ended, tell_ends
 from studyrunner.result.view import Result
-from tests.studyrunner.report.figure_cases import make_result, with_endings
 from tests.studyrunner.report.figure_numbers import draw_figure
+from tests.studyrunner.results import make_result, with_endings
 
 # flat indices: frequency 200, 201, 202, 204 times implicit, explicit; errors 2 % at 202 Hz, 1.3 % beside it
 EARLY, ABOVE, SENSITIVE, LOST = 2, 4, 5, 7

@@ -9,7 +9,7 @@ from studyrunner.result.choice import choose
 from studyrunner.result.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.result.view import open_for_report
 from studyrunner.user_error import UserError
-from tests.studyrunner.report.figure_cases import make_result
+from tests.studyrunner.results import make_result
 
 
 def test_a_result_file_is_opened_lazily(tmp_path):

@@ -16,8 +16,8 @@ from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.views import find_views
 from tests.studies.fe_models.sectors import Sector
 from tests.studyrunner.report.figure_numbers import draw_figure
-from tests.studyrunner.report.page_cases import as_result, build_file, flank_positions
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs, volume, with_mesh
+from tests.studyrunner.results import as_result, build_file, flank_positions
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,8 @@ from studyrunner.result.choice import choose
 from studyrunner.result.scene_pairs import last_depth, of_scene, of_shown_scene
 from studyrunner.result.schema_check import check_dataset
 from studyrunner.result.view import Result
-from tests.studyrunner.report.scatter_cases import mesh_file, sample_file
 from tests.studyrunner.report.test_page import decode
+from tests.studyrunner.results import mesh_file, sample_file
 
 FEW, MANY = 12, 24
 LAST_DEPTH = "wear_depth_last"

@@ -16,9 +16,8 @@ from studyrunner.result import schema_check
 from studyrunner.result.schema_check import check_dataset, check_numbers
 from studyrunner.result.view import open_for_report
 from studyrunner.user_error import UserError
-from tests.studyrunner.report.page_cases import build_file
-from tests.studyrunner.report.scatter_cases import sample_file
 from tests.studyrunner.result_mutations import replace_variable
+from tests.studyrunner.results import build_file, sample_file
 
 MARKUP = "$\\bad{$ <b>bold</b> [red]&amp;"
 

@@ -11,7 +11,7 @@ from studyrunner.report.drawing import Missing, Table
 from studyrunner.report.figures.precision import draw_precision
 from studyrunner.report.figures.settings import Setting, compare_settings
 from studyrunner.result.view import Result
-from tests.studyrunner.report.page_cases import build_file
+from tests.studyrunner.results import build_file
 
 AXES = {
     "frequency": (100.0, 200.0),
