@@ -174,9 +174,9 @@ def _follow(ranks: Ranks) -> int:
 
 
 def _show_plan(study: Study) -> int:
-    from studyrunner.plan.estimate import largest_memory
+    from studyrunner.kinds.estimate import largest_memory
+    from studyrunner.kinds.kind import build_tasks
     from studyrunner.plan.plan_text import format_plan
-    from studyrunner.plan.planning import build_tasks
     from studyrunner.plan.plausibility import doubts_of_study
     from studyrunner.scene.drawn_contacts import contact_changes
     from studyrunner.scene.model_remarks import remarks_of_study

@@ -13,13 +13,12 @@ from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.database import NoLocksError, StoreInUseError
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
-from studyrunner.coordinates import STUCK_FREQUENCY
+from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.task import Identity, TaskPlan, digest
 from studyrunner.mpi.ranks import Ranks, wait_for_message
 from studyrunner.mpi.schedule import work_on_tasks
-from studyrunner.plan.identity import Identities, hash_of_kind
-from studyrunner.plan.planning import build_tasks
 from studyrunner.plan.plausibility import doubts_of_study
-from studyrunner.plan.tasks import TaskPlan
 from studyrunner.result.arrays import SmallArray, coordinates, scene_arrays
 from studyrunner.result.creation_date import describe_date
 from studyrunner.result.existing_result import Label, Target
@@ -30,7 +29,7 @@ from studyrunner.result.software import describe_software
 from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.model_remarks import remarks_of_study
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import merge_facts, pair_arrays, stuck_frequencies_of
+from studyrunner.scene.scene_set import frequencies_of_ratios, merge_facts, pair_arrays, stuck_frequencies_of
 from studyrunner.scene_building import Scenes
 from studyrunner.study.study import Study
 from studyrunner.system.endings import begin_ending, is_ending
@@ -125,7 +124,9 @@ class _ResultWriter:
         """Coordinates of the file, and its variables that no task computes."""
         study, scenes, facts = self.study, self.scenes, self.scenes.facts
         stuck = SmallArray("stuck_frequency", *stuck_frequencies_of(study, facts, scenes.scenes), STUCK_FREQUENCY)
+        hertz = frequencies_of_ratios(study, facts, scenes.scenes)
         return [
+            *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
             *coordinates(study, self.facts, pair_arrays(study, facts, scenes.scenes)),
             stuck,
             *worn_coordinate(study, facts),
@@ -203,7 +204,7 @@ def serve_study(
     try:
         for rank in range(1, ranks.size):
             ranks.send(_GO, rank)
-        run_tasks(ranks, completion, evaluator(scenes.model), progress, scenes)
+        run_tasks(ranks, study, completion, evaluator(scenes.model), progress, scenes)
         progress.say("writing the result")
         summary = writer.write(completion, n_found)
     except BaseException as error:
@@ -235,8 +236,8 @@ def _prepare(
     ):
         progress.note(note)
     remove_leftovers(target.path)
-    identities = Identities([each.digest for each in scenes.facts], hash_of_kind(kind.descr))
-    completion = CompletionIndex(plan, identities, store, kind)
+    identity = Identity(tuple(each.digest for each in scenes.facts), digest(repr(kind.descr)))
+    completion = CompletionIndex(plan, identity, store, kind)
     label = Label.of(study)
     store.note_study(label.name, label.model)
     return completion, _ResultWriter(study, plan, facts, scenes, target, software, options.date)

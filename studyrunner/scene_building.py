@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 from solver.packing import Packed
 from studyrunner.checkpoint.store import Store
+from studyrunner.kinds.task import Task
+from studyrunner.mpi.cost_model import CostKeys, CostModel
 from studyrunner.mpi.mapped_file import hand_out
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Handlers, serve_tasks, work_on_tasks
-from studyrunner.plan.cost_model import CostKeys, CostModel
-from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.scene.computed import InMemory, keep_model, model_key, read_model
 from studyrunner.scene.scene import (
     KeptScene,
@@ -28,7 +28,7 @@ from studyrunner.scene.scene import (
     harmonics_to_build,
     scene_to_keep,
 )
-from studyrunner.scene.scene_set import SceneSet, find_scenes
+from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
 from studyrunner.scene.scene_variables import exact_answers, join_scene_variables
 from studyrunner.scene.variables import SceneVariable, build_scene_variables
 from studyrunner.scene_models import SceneModels
@@ -54,7 +54,7 @@ class SceneTask:
     known: Mapping[str, Packed]
     cost: float = 1.0
     n_results: int = 1
-    opens_others: bool = False
+    gives_starts: bool = False
 
     def cost_of(self, *, first: bool) -> float:
         """Estimated time, s; all scenes are alike."""
@@ -105,7 +105,7 @@ class Scenes:
     def _models(self) -> SceneModels:
         return SceneModels(self._read_model, self.seeing, self.store.path)
 
-    def with_model(self, rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
+    def with_model(self, rank: int, task: Task) -> Task:
         """The task as a rank gets it: with the model where the rank does not have the model."""
         return task if self.model is not None else self._models.with_model(rank, task)
 
@@ -146,7 +146,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
         facts = describe_scene(model)
         kept = scene_to_keep(one, model)
         handed, seeing = hand_out(ranks, model, new_partial(store.path))
-        return Scenes(scenes, (facts,), variables, kept, (), handed, seeing, store)
+        return Scenes(at_ratios(scenes, {0: facts}), (facts,), variables, kept, (), handed, seeing, store)
     _, seeing = hand_out(ranks, SeveralScenes(), new_partial(store.path))
     built = _build_all(ranks, scenes, store, say)
     with keys_as_given(study.scene_axes):
@@ -155,6 +155,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
                 raise each.error
     facts_of_all = tuple(each.facts for each in built if each.facts is not None)
     variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
+    scenes = at_ratios(scenes, dict(enumerate(facts_of_all)))
     return Scenes(scenes, facts_of_all, (*variables, *exact_answers(study)), None, notes, None, seeing, store)
 
 

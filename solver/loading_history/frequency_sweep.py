@@ -316,18 +316,18 @@ class FrequencySweep:
         if unstable := find_instability(case, joint, at, self.run, self.every):
             return replace(lost, outcome=unstable.outcome, message=unstable.sentence)
         found = replace(lost, state=periodic_state(joint, refined.point))
-        if (reference := self._reference(nodes, case, omega)) is not None:
+        if (reference := self._reference(nodes, case, refined.point)) is not None:
             estimate = found.estimate + state_difference(case, joint, refined.point, reference)
             found = replace(found, reference=periodic_state(joint, reference), estimate=estimate)
         return found if refined.accurate else replace(found, outcome=Outcome.INACCURATE)
 
-    def _reference(self, nodes: Sweep[State], case: Case, omega: float) -> State | None:
-        """The state of the reference sweep with the harmonics of a case; None where it has none."""
+    def _reference(self, nodes: Sweep[State], case: Case, state: State) -> State | None:
+        """A state with the history that the reference sweep leaves; None where there is none."""
         with contextlib.suppress(np.linalg.LinAlgError):
-            found = nodes.reference_at(1.0 if self.sweep == "ramp" else omega, self.run.fresh())
-            if found is not None and nodes.reference is not None:
-                joint = case.joint(omega, self.excitation_amplitude)
-                return self.run.move(_path(nodes.reference).case, joint, found)
+            if (found := nodes.reference_node(state.parameter)) is not None:
+                path, node = found
+                assert isinstance(path, LoadingPath)
+                return path.like(node, replace(path, case=case), state, self.run)
         return None
 
 

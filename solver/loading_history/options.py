@@ -45,6 +45,8 @@ class LoadingOptions:
     small_vibration: float = 0.3
     """Fraction of the friction limits: changes of a smaller vibration are relative to this fraction. With 1 the error
     of the motion at 211 Hz is three times as large, with 0 there are a few nodes more."""
+    least_slip: float = 1e-3
+    """Slip of a pair over its motion above which it forgets its history."""
     aimed_change: float = 0.75
     """Expected change of the vibration in the next step, as a fraction of the largest change. Few steps are refused."""
     longest_sweep_step: float = 0.1

@@ -11,12 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.contact.coulomb import STICK, friction_limit
+from solver.accuracy.period_events import nothing_happens
+from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.arc_length import Arc, follow_arc
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.prolongation import carried_history
 from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
 from solver.loading_history.node_resolution import choose_resolution, resolution_holds
 from solver.loading_history.options import LOADING
@@ -146,11 +148,25 @@ class LoadingPath:
     def change(self, before: State, after: State, wider: float) -> float:
         """Change of the vibration in a step over the largest change allowed, times `wider` where pairs slip."""
         one, other = before.evaluation, after.evaluation
+        if self.rests(before) and self.rests(after):
+            # over a whole resonance, where the phase reverses, the change is larger than 1
+            return vibration_change(one, other) / CONTINUATION.linear_change
         limit = np.linalg.norm(friction_limit(self.case.friction_coefficient, one.force_h[:, 0, 0]))
         size = max(vibration_size(one), LOADING.small_vibration * float(limit))
-        sticks = bool((one.status_t == STICK).all() and (other.status_t == STICK).all())
-        most = LOADING.largest_change(self.case.settings.rtol, wider, sticks=sticks)
+        most = LOADING.largest_change(self.case.settings.rtol, wider, sticks=False)
         return float(np.linalg.norm((other.predicted_h - one.predicted_h)[:, 1:])) / (size * most)
+
+    def rests(self, state: State) -> bool:
+        """As in Path."""
+        return nothing_happens(state.evaluation)
+
+    def forgets(self, state: State) -> bool:
+        """As in Path; slip over less than a fraction of the motion of its pair does not count."""
+        at = state.evaluation
+        opens = (at.status_t == SEPARATED).any(axis=1)
+        slip = np.ptp(at.state_t, axis=2).max(axis=1) / self.joint_at(state.parameter).law.state_stiffness
+        moved = np.abs(at.displacement_h[:, 1:, 1:]).sum(axis=(1, 2))
+        return bool((opens | (slip > LOADING.least_slip * moved)).all())
 
     def differs(self, before: State, after: State) -> float:
         """Relative change of the vibration between two states, the larger one of both directions."""
@@ -160,6 +176,14 @@ class LoadingPath:
     def at(self, resolution: Resolution) -> LoadingPath:
         """The path with other harmonics and samples."""
         return replace(self, case=self.case.at(resolution))
+
+    def like(self, node: State, fine: LoadingPath, state: State, run: Run) -> State | None:
+        """The state of another path with the tangential history that a node of this path leaves; None if not found."""
+        joint, before = fine.joint_at(state.parameter), self.joint_at(node.parameter)
+        at = replace(node.evaluation, history=history_at_rest(before, node))
+        balance = Balance(joint, carried_history(self.case, joint, at), state.evaluation.wear_depth)
+        found = run.fresh().state(balance, state.evaluation.predicted_h, state.parameter, CONTINUATION.near_iterations)
+        return found if found is not None and is_stable(balance, found.evaluation, run) else None
 
     def move(self, state: State, other: LoadingPath, run: Run) -> State | None:
         """The state with the harmonics and samples of another path; None where it is not found."""

@@ -60,6 +60,12 @@ class Path(Protocol[S]):
     def change(self, before: S, after: S, wider: float) -> float:
         """Change over a step, over the largest change allowed, which is `wider` times larger in a reference sweep."""
 
+    def rests(self, state: S) -> bool:
+        """Whether no pair slips or opens within the period."""
+
+    def forgets(self, state: S) -> bool:
+        """Whether each pair slips or opens within the period, so that the state follows from its parameter alone."""
+
     def differs(self, before: S, after: S) -> float:
         """Relative change of the vibration between two states."""
 

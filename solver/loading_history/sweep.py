@@ -8,8 +8,9 @@ leaves the sweep unchanged. So the state of a point does not depend on the other
 The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
 slip, up to one step too early. A reference sweep from the same first state has steps twice as long, and harmonics one
 level lower where these are automatic. The difference of both sweeps is at least half the error of the finer one, and as
-a rule the error of the coarser one. Where the sweep jumps over a fold, its reference begins anew behind the jump: the
-place of a jump is no measure of the error by steps.
+a rule the error of the coarser one. There is no difference, and no reference, as long as nothing slips or opens, and
+where each pair slips or opens within the period: such a state follows from its parameter alone. Where the sweep jumps
+over a fold, its reference begins anew behind the jump: the place of a jump is no measure of the error by steps.
 """
 
 from __future__ import annotations
@@ -117,7 +118,6 @@ class Sweep(Generic[S]):
         opens everywhere a state that does not exist.
         """
         self.place_at(path, state)
-        self._begin_reference()
         if self._choose_resolution() > SENSITIVE_ERROR:
             self.state = replace(self.state, states=(), failure=Outcome.UNSETTLED)
             return False
@@ -182,6 +182,13 @@ class Sweep(Generic[S]):
         found = self.reference.state_at(parameter, run)
         return None if isinstance(found, Outcome) else found.state
 
+    def reference_node(self, parameter: float) -> tuple[Path[S], S] | None:
+        """Path and last node of the reference sweep before a parameter; None where it has no state of its own."""
+        if self.reference is None or self.reference.here is None:
+            return None
+        self.reference.advance_to(parameter)
+        return None if self.reference.here is None else (self.reference.path, self.reference.here)
+
     # the line of `take_step`
 
     def attempt(self, here: S, length: float) -> Step[S] | None:
@@ -207,11 +214,11 @@ class Sweep(Generic[S]):
         shortest, _, rescue = self.path.steps
         return Lengths(1, LOADING.aimed_change, shortest, rescue)
 
-    def place_at(self, path: Path[S], state: S) -> None:
-        """Put the sweep at a first node."""
+    def place_at(self, path: Path[S], state: S, length: float = np.inf) -> None:
+        """Put the sweep at a first node; length: of the first step."""
         self.forget()
         self.path = path
-        length = path.steps[1]
+        length = min(length, path.steps[1])
         self.state = replace(self.state, states=(state,), resolution=path.case.resolution, length=length)
 
     def _advance(self, step: Step[S]) -> None:
@@ -224,10 +231,7 @@ class Sweep(Generic[S]):
             fold=(self.state.fold, *step.folds)[-1],
         )
         if self.reference is not None:
-            if not step.folds:
-                self._lead(self.reference, step.state.parameter)
-            if step.folds or self.reference.here is None or self.reference.state.branch > 0:
-                self._begin_reference()
+            self._lead(self.reference, before, step)
         if self.state.checked is None:
             return
         if self.path.differs(self.state.checked, step.state) > ACCURACY.vibration_recheck:
@@ -239,24 +243,34 @@ class Sweep(Generic[S]):
         if self.run.budget.iterations >= saved + LOADING.iterations_per_save:
             self._save()
 
-    def _lead(self, reference: Sweep[S], parameter: float) -> None:
-        """Lead the reference sweep to the present node."""
-        try:
-            reference.advance_to(parameter)
-        except np.linalg.LinAlgError:
-            reference.lose()
-
-    def _begin_reference(self) -> None:
-        """Begin the reference sweep, where there is one, at the current node, with harmonics one level lower."""
-        reference, here = self.reference, self.state.states[-1]
-        if reference is None:
+    def _lead(self, reference: Sweep[S], before: S | None, step: Step[S]) -> None:
+        """Lead the reference sweep to the present node: the end of a step from the node `before`."""
+        if step.folds or self.path.forgets(step.state):
+            reference.drop()
             return
+        if reference.here is None and before is not None and not self.path.rests(step.state):
+            self._begin_reference(reference, before)
+        try:
+            reference.advance_to(step.state.parameter)
+        except np.linalg.LinAlgError:
+            reference.drop()
+        if reference.state.branch > 0:
+            reference.drop()
+
+    def drop(self) -> None:
+        """Be without a state: a reference sweep that does not differ from its sweep."""
+        self.state, self.ahead = replace(self.state, states=()), None
+
+    def _begin_reference(self, reference: Sweep[S], node: S) -> None:
+        """Begin the reference sweep at a node, with harmonics one level lower."""
         path = self.path.at(fewer(self.state.resolution, self.path.case.settings))
         moved = None
         if path.case.resolution != self.state.resolution:
-            moved = self.path.move(here, path, self.run)
+            moved = self.path.move(node, path, self.run)
         reference.state = replace(reference.state, branch=0)
-        reference.place_at(*((self.path, here) if moved is None else (path, moved)))
+        reference.place_at(
+            *((self.path, node) if moved is None else (path, moved)), reference.wider * self.state.length
+        )
 
     def _choose_resolution(self) -> float:
         """Choose the harmonics and samples of the nodes for the current state, as far as they are automatic.
@@ -283,7 +297,7 @@ class Sweep(Generic[S]):
             wanted = path.at(fewer(path.case.resolution, path.case.settings))
             moved = other.path.move(other.here, wanted, self.run)
             if moved is None:
-                self._begin_reference()
+                self._begin_reference(other, state)
             else:
                 other.forget()
                 other.take(wanted, moved)

@@ -90,6 +90,14 @@ class ModePath:
         sticks = all(bool((at.state.evaluation.status_t == STICK).all()) for at in (before, after))
         return self.differs(before, after) / LOADING.largest_change(self.case.settings.rtol, wider, sticks=sticks)
 
+    def rests(self, _: ModeState) -> bool:
+        """As in Path: a mode has a reference sweep from its first amplitude on."""
+        return False
+
+    def forgets(self, _: ModeState) -> bool:
+        """As in Path."""
+        return False
+
     def differs(self, before: ModeState, after: ModeState) -> float:
         """As in Path: of the vibrating predicted force per amplitude."""
         one, other = (at.state.evaluation.predicted_h[:, 1:] / at.parameter for at in (before, after))

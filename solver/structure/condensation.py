@@ -12,7 +12,6 @@ import numpy as np
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, HarmonicStiffness, share_matrices
-from solver.structure.identity import Identity
 from solver.structure.rough_forms import multiply_roughly
 
 DENSE_BYTES = 2e6
@@ -24,7 +23,7 @@ KEPT_STRUCTURES = 8
 errors uses six. Does not change results."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CondensedStructure:
     """`Z_r u + lambda = F_r` for each harmonic, Eq. (8), and the responses as functions of u.
 
@@ -118,13 +117,13 @@ def build_structure(
         moving = _condense_shared(still, relative, omega * np.array(orders, np.float64), excitation_amplitude)
     else:
         moving = _condense_each(model, relative, omega, excitation_amplitude, orders)
-    return CondensedStructure(**_static(Identity(still), tuple(relative.tolist())), **moving)
+    return CondensedStructure(**_static(still, tuple(relative.tolist())), **moving)
 
 
 @lru_cache(maxsize=2)
-def _static(structure: Identity, relative: tuple[int, ...]) -> dict[str, Any]:
+def _static(linear: LinearModel, relative: tuple[int, ...]) -> dict[str, Any]:
     """The static attributes of a `CondensedStructure`, which are the same at all frequencies."""
-    linear, chosen = cast("LinearModel", structure.objects[0]), np.array(relative, np.intp)
+    chosen = np.array(relative, np.intp)
     found = condense(np.real(linear.stiffness), chosen, linear.load_static)
     rows = np.real(linear.response)[:, relative_first(len(linear.mass), chosen)]
     of_pairs, of_others = np.split(rows, [chosen.size], axis=1)

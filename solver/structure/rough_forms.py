@@ -16,14 +16,13 @@ CPU time of an adaptive history of the dovetail with products in double precisio
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
-from solver.structure.identity import Identity
 
 ROUGH_DIRECTIONS = 48
 """Largest number of motions that carry mass, and damping not proportional to stiffness, in rough products."""
@@ -73,7 +72,7 @@ def rough_of_shared(
 
     held_compliance (H, n_i, n_i): compliance of the displacements `internal` (n_i,) with the pairs held, m/N.
     """
-    common = _common_form(Identity(linear), tuple(relative.tolist()))
+    common = _common_form(linear, tuple(relative.tolist()))
     highest = float(rates.max(initial=0.0))
     left_out = highest**2 * common.mass_left_out + highest * common.drag_left_out
     if left_out > ROUGH * common.size:
@@ -119,8 +118,8 @@ class _CommonForm(NamedTuple):
 
 
 @lru_cache(maxsize=2)
-def _common_form(structure: Identity, relative: tuple[int, ...]) -> _CommonForm:
-    rows, linear = np.array(relative, np.intp), cast("LinearModel", structure.objects[0])
+def _common_form(linear: LinearModel, relative: tuple[int, ...]) -> _CommonForm:
+    rows = np.array(relative, np.intp)
     internal = np.setdiff1d(np.arange(len(linear.mass)), rows)
     parts = [np.asarray(np.real(part), np.float64) for part in (linear.stiffness, linear.mass, linear.damping)]
     stiffness, mass, damping = (part[rows[:, None], rows] for part in parts)

@@ -17,9 +17,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from studyrunner.mpi.cost_model import CostModel
 from studyrunner.mpi.dispatch import Assignment, Dispatcher, Work
 from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, wait_for_message
-from studyrunner.plan.cost_model import CostModel
 from studyrunner.system.endings import begin_ending, raise_ending, uninterrupted
 from studyrunner.system.mailbox import LONGEST_WAIT, Mailbox
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import variable_sizes
+from studyrunner.checkpoint.store import RESULTS
 from studyrunner.result.arrays import SmallArray, attributes
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.result.scene_group import write_scene_group
@@ -120,12 +121,13 @@ def _writing(path: Path) -> Iterator[netCDF4.Dataset]:
 
 
 def _keys(shape: Sequence[int], completion: CompletionIndex) -> NDArray[np.bytes_]:
-    """Hashes of the histories of points, in the order of the result file; empty for points that are not computed."""
+    """Hashes of the results of points, in the order of the result file; empty for points that are not computed."""
     keys = np.zeros(math.prod(shape), _KEY_TYPE)
-    for march in itertools.chain.from_iterable(completion.plan.marches):
-        if completion.is_finished(march):
-            for key, scaled in zip(completion.histories(march), march.histories, strict=True):
-                keys[np.ravel_multi_index(np.transpose(scaled.points), shape)] = key.encode()
+    there = completion.store.keys(RESULTS)
+    for task in completion.plan.results:
+        for place, key in enumerate(completion.names(task)):
+            if key in there:
+                keys[np.ravel_multi_index(np.transpose(task.points(place)), shape)] = key.encode()
     return keys
 
 
@@ -141,6 +143,7 @@ def _create_all(
         file.createDimension(name, size)
     on_contact = sorted(each.name for each in arrays if each.name.startswith("contact_"))
     drawn = [each for each in arrays if each.name.startswith(("sample_", "worn_depth"))]
+    drawn += [each for each in arrays if each.name == "frequency" and "frequency_ratio" in each.dimensions]
     for name, entry in variables.items():
         dimensions = (*study.dimensions, *entry.dimensions)
         if entry.is_text:
@@ -220,7 +223,7 @@ def _slabs(
     for region in _regions(shape, slab):
         last = first + math.prod(at.stop - at.start for at in region)
         different, places = np.unique(keys[first:last], return_inverse=True)
-        records, there = completion.read_histories([key.decode() for key in different.tolist()])
+        records, there = completion.read_results([key.decode() for key in different.tolist()])
         if not (there | (different == b"")).all():
             raise StorageError(completion.store.path, ValueError("a result is damaged"), "give the command again")
         records["outcome"][~there] = Outcome.NOT_COMPUTED

@@ -15,8 +15,9 @@ from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.sections import SECTIONS, SOLVER_AXES, StudySection
 from studyrunner.study.toml_text import toml_value
 from studyrunner.user_error import UserError
+from studyrunner.values import Section
 
-_NEW = {
+_NEW: dict[str, dict[str, tuple[object, str]]] = {
     "scene": {
         "model": ("dovetail_sector", "or a scene file, joint.h5, or the deck of a finite-element model, joint.inp"),
         "mesh": (1, "coarse, for first trials; run-study --scene-help dovetail_sector lists all keys of this scene"),
@@ -69,10 +70,9 @@ def _new_study(name: str) -> str:
     lines = [_HEAD.format(name=name)]
     for table in ("study", "scene", "axes", "slow_time", "wear", "solver", "outputs"):
         lines.append(f"[{table}]")
-        given = {"name": (name, "")} if table == "study" else _NEW.get(table, {})
+        given: dict[str, tuple[object, str]] = {"name": (name, "")} if table == "study" else _NEW.get(table, {})
         lines += [f"{key} = {toml_value(value)}" + f" # {note}" * bool(note) for key, (value, note) in given.items()]
-        fields = SECTIONS[table].model_fields if table in SECTIONS else {}
-        for key, field in fields.items():
+        for key, field in SECTIONS[table].model_fields.items() if table != "scene" else ():
             if key not in given and (default := _default(table, field)) not in ("required", "-"):
                 lines.append(f"# {key} = {default} # {_meaning(field)}")
         lines.append("")
@@ -82,9 +82,9 @@ def _new_study(name: str) -> str:
 def key_table() -> str:
     """Markdown: all keys of a study file with meaning and default."""
     lines = ["| key | meaning | default |", "|---|---|---|"]
+    kinds: dict[str, type[Section]] = {**SECTIONS, "scene": SceneSection, "mission": MissionBlock}
     for table in ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", "loading", "scatter", "mission"):
-        kind = {**SECTIONS, "scene": SceneSection, "mission": MissionBlock}[table]
-        for key, field in kind.model_fields.items():
+        for key, field in kinds[table].model_fields.items():
             if field.description and not (table == "axes" and key in SOLVER_AXES):
                 default = _default(table, field)
                 shown = default if default in ("required", "-") else f"`{default}`"

@@ -44,9 +44,9 @@ def _other_axes(*axes: str) -> tuple[str, ...]:
     return tuple(name for name in AxesSection.model_fields if name not in (*axes, *SOLVER_AXES))
 
 
-_AXES = _other_axes("modal_amplitude", "mode")
+_AXES = _other_axes("frequency_ratio", "modal_amplitude", "mode")
 _OF_MODES = ("mode", "sweep")
-_OF_MISSIONS = _other_axes("modal_amplitude", "mode", "step", "scheme")
+_OF_MISSIONS = _other_axes("frequency_ratio", "modal_amplitude", "mode", "step", "scheme")
 
 NUMBERS = tuple(name for name in _OF_MISSIONS if name != "sweep")
 """Axes that hold numbers of the joint and of its excitation, which may scatter."""
@@ -86,6 +86,26 @@ MISSIONS = Kind(
 def kind_of(tables: Tables) -> Kind:
     """The kind of study that the tables ask for."""
     return MISSIONS if "mission" in tables else MODES if "modal_amplitude" in tables["axes"] else WEAR
+
+
+def take_ratio(tables: Tables, found: Mistakes) -> dict[str, str]:
+    """Ratios stand for frequencies until the natural frequencies of the scenes are known (`scene_set.at_ratios`).
+
+    Returns the key of mistakes in the frequencies.
+    """
+    axes = tables["axes"]
+    if "frequency_ratio" not in axes:
+        return {}
+    if "frequency" in axes:
+        found.add("axes.frequency", axes["frequency"], "leave it out, or frequency_ratio: give one of both")
+    if "exact" in listed(tables["outputs"].get("variables")):
+        remedy = "leave it out: it is of given frequencies, and axes.frequency_ratio gives none"
+        found.add("outputs.variables", "exact", remedy)
+    if "frequency" in tables.get("scatter", {}):
+        remedy = "leave it out: axes.frequency_ratio gives each sample the frequency of its own scene"
+        found.add("scatter.frequency", tables["scatter"].pop("frequency"), remedy)
+    axes["frequency"] = axes["frequency_ratio"]
+    return {"axes.frequency": "axes.frequency_ratio"}
 
 
 def take_unused(tables: Tables, found: Mistakes) -> None:

@@ -169,11 +169,7 @@ def _mesh(summary: Summary) -> str:
     assert mesh is not None
     coarse, fine = (show_number(each) for each in mesh.meshes)
     text = f"worn volumes of meshes {coarse} and {fine} differ by {show_percent(mesh.median)} {mesh.at}"
-    text += f", at most {show_percent(mesh.largest)}" if mesh.largest > mesh.median else ""
-    if mesh.limit is not None:
-        volume, order = mesh.limit
-        text += f"; an infinitely fine one would wear {scale_for('m3', volume).show(volume)} (order {order:.1f})"
-    return text
+    return f"{text}, at most {show_percent(mesh.largest)}" if mesh.largest > mesh.median else text
 
 
 def _failure(failure: Failure, n_points: int) -> str:

@@ -44,8 +44,8 @@ def test_result_does_not_depend_on_the_number_of_ranks(tmp_path):
     assert len(tables) == 1
 
 
-def test_marches_are_done_while_their_branch_goes_on(tmp_path):
-    """Every branch stands still after its first start state until a march from it is done, which no rank but one has
+def test_histories_are_done_while_their_sweep_goes_on(tmp_path):
+    """Every sweep stands still after its first start state until a history from it is done, which no rank but one has
     time for."""
     arguments = [FAKED, *GRID, "--set", "axes.sweep=up"]
     done = start(2, arguments, tmp_path, {"FAKE_SECONDS": "0.01", "FAKE_PATIENCE": "120"})
@@ -56,7 +56,7 @@ def test_an_exception_on_one_rank_ends_all(tmp_path):
     done = start(2, [FAKED, *GRID], tmp_path, {"FAKE_FAILURE": "1"})
     assert done.returncode == 1
     assert "unexpected failure on rank 1 of 2" in done.stderr
-    assert re.search(r"ValueError: not \d results from MarchTask", done.stderr)
+    assert re.search(r"ValueError: not \d results from History", done.stderr)
     # What was finished is kept, and the result is written when the run ends in good order only.
     left = {path.name for path in tmp_path.iterdir() if path.suffix != ".partial"}
     assert left - {"two_masses.nc.progress-journal"} == {"two_masses.nc.progress"}
@@ -75,7 +75,7 @@ def default_signals():
 @pytest.mark.parametrize(("n_ranks", "number"), [(0, signal.SIGHUP), (2, signal.SIGINT), (2, signal.SIGUSR1)])
 def test_an_interrupted_run_ends_at_once(n_ranks, number, tmp_path, default_signals):
     def interrupt(running):
-        running.wait_for("along 2 sweeps")
+        running.wait_for("by 2 sweeps")
         running.process.send_signal(number)
 
     ended = run_to_end(n_ranks, [FAKED, *GRID, "-o", "out.nc"], tmp_path, {"FAKE_SECONDS": "60"}, interrupt)
