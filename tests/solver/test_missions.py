@@ -266,7 +266,7 @@ def test_two_thousand_missions_agree_with_missions_one_by_one(exact_blocks, cycl
     """The longer the blocks, the more they adapt the pressures against each other within few missions."""
     rows = (0, 1, 7, 200, 1000, 2000)
     once = exactly_known(rows, cycles, largest_step=1)
-    flown_once = len(exact_blocks)
+    computed_once = len(exact_blocks)
     many = exactly_known(rows, cycles)
     assert many.outcome is once.outcome is Outcome.CONVERGED
     bars = many.wear_depth_error + once.wear_depth_error
@@ -276,9 +276,9 @@ def test_two_thousand_missions_agree_with_missions_one_by_one(exact_blocks, cycl
     of_blocks = many.block_volume_error * many.block_volume + once.block_volume_error * once.block_volume
     assert (np.abs(many.block_volume - once.block_volume) <= of_blocks).all()
     # each mission is two blocks and their reference solution
-    computed = (len(exact_blocks) - flown_once) / 4
+    computed = (len(exact_blocks) - computed_once) / 4
     assert computed < limit
-    assert flown_once == 2000 * 4
+    assert computed_once == 2000 * 4
     assert many.missions[-1] == many.steps.sum() == many.last_mission == 2000
 
 
@@ -352,7 +352,7 @@ def test_a_target_ends_the_missions(exact_blocks):
     assert np.isnan(whole.missions_to_target)
 
 
-def test_a_block_that_fails_at_once_is_flown_in_shorter_steps(monkeypatch):
+def test_a_block_that_fails_at_once_is_computed_in_shorter_steps(monkeypatch):
     """And one that fails in a single mission ends the history there, with what was computed."""
 
     def run(case, like=None):

@@ -1,4 +1,4 @@
-"""Studies of missions: blocks under [[mission]], flown slow_time.missions times in place of cycles."""
+"""Studies of missions: blocks under [[mission]], computed slow_time.missions times in place of cycles."""
 
 import numpy as np
 import pytest
@@ -7,13 +7,14 @@ import xarray as xr
 from solver import Block, Outcome, Passage, integrate_mission
 from studies import build_scene
 from studyrunner.api import run_study
+from studyrunner.kinds.estimate import iterations_of_missions
+from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi import schedule
-from studyrunner.plan.estimate import iterations_of_missions
-from studyrunner.plan.planning import build_tasks
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.studyrunner.faked_blocks import STUDY, blocks, load_of
+from tests.studyrunner.fakes import points_of
 
 __all__ = ["blocks"]
 
@@ -212,10 +213,9 @@ def test_scenes_of_blocks_are_built_once_and_points_are_tasks(study_file):
     assert len(scenes.studies) == 4
     assert scenes.of_blocks == ((0, 0, 1), (2, 2, 3))
     plan = build_tasks(study, 2)
-    (line,) = plan.marches
-    assert [task.scenes for task in line[:: len(line) // 2]] == [(0, 1), (2, 3)]
-    assert plan.n_points == len({point for task in line for point in task.points}) == 8
-    begins = [[block.begin for block in task.blocks] for task in line[:2]]
+    assert [task.scenes for task in plan.results[:: len(plan.results) // 2]] == [(0, 1), (2, 3)]
+    assert plan.n_points == len({point for task in plan.results for point in points_of(task)}) == 8
+    begins = [[block.begin for block in task.blocks] for task in plan.results[:2]]
     assert begins == [["up", "up", "ramp"], ["up", "down", "ramp"]]
 
 
@@ -247,7 +247,7 @@ seconds = 10
     )
     study = read_study(path)
     assert tuple(study.dimensions) == ("wear_coefficient", "excitation_amplitude", "sweep", "rotation_speed")
-    tasks = build_tasks(study, 10).marches[0]
+    tasks = build_tasks(study, 10).results
     assert [[block.frequency for block in task.blocks] for task in tasks] == [[180.0, 200.0], [180.0, 4 * 3100 / 60]]
     assert [task.blocks[1].cycles for task in tasks] == [2000.0, 10 * 4 * 3100 / 60]
     assert find_scenes(study).of_blocks == ((0, 1), (0, 2))
@@ -306,7 +306,7 @@ def test_a_result_at_mission_0_alone_has_no_error(study_file, blocks):
     assert result.last_mission.item() == 0.0
 
 
-def test_the_estimated_time_follows_the_missions_that_are_flown():
+def test_the_estimated_time_follows_the_number_of_missions():
     times = [iterations_of_missions([("ramp", 0.0)], number, one_pair=False) for number in (1, 3, 20, 1e6)]
     assert times[1] == pytest.approx(6 * 200)
     assert times[2] < 4 * times[1]

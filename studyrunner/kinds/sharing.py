@@ -2,8 +2,8 @@
 
 The rates of all present wear laws are proportional to the wear coefficient (`WearLaw.proportional`). The wear equation
 is then dW/dt = k_w f(W), Eq. (7). With s k_w in place of k_w and h / s in place of the step h the same states follow
-each other, each at the cycle count t / s. A task computes the history of the largest k_w; the other histories are read
-from this one at the counts s t. With a law that is not proportional no two k_w share a history.
+each other, each at the cycle count t / s. A task integrates the history of the largest k_w; the other histories are
+read from this one at the counts s t. With a law that is not proportional no two k_w share a history.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from solver.settings import Automatic
+from studyrunner.kinds.task import EQUAL_POINTS, Index, LeftOut
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 
-Index = tuple[int, ...]
 Choice = tuple[int, int, int]
 """Indices on the axes wear_coefficient, step and scheme."""
 
 _SAME = 1e-12  # relative: products of wear coefficient and step that differ by round-off, and numbers of steps
 
-IDLE_RTOL, EQUAL_POINTS = "rtol", "equal points"
+IDLE_RTOL, EQUAL = "rtol", "equal points"
 """Reasons that are no choice of wear coefficient, step and scheme."""
 
 _REASONS = {
@@ -37,7 +37,7 @@ _REASONS = {
     "final wear": 'the scheme "final" comes to the same state for every wear_coefficient',
     "equal products": "wear_coefficient times step is that of another point: the same history at other cycle counts",
     IDLE_RTOL: "rtol is used by nothing: harmonics and samples are given, and the scheme is not adaptive",
-    EQUAL_POINTS: "all values are those of another point",
+    EQUAL: EQUAL_POINTS,
 }
 
 
@@ -61,30 +61,22 @@ class Alike:
 
     histories: for each history the choices that have this history. The first history is the computed one; it needs the
         most cycles.
-    held: whether nothing wears, so that the state at cycle 0 holds for all cycles.
+    unworn: whether nothing wears, so that the state at cycle 0 holds for all cycles.
     """
 
     histories: tuple[tuple[Choice, ...], ...]
-    held: bool = False
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """Number of points that are not computed alone, and the reason."""
-
-    n_points: int
-    reason: str
+    unworn: bool = False
 
 
 @dataclass(frozen=True)
 class Sharing:
     """What is computed from each start state of a study.
 
-    marches: groups of choices; every choice is in one history of one group. causes: number of choices by reason for
+    tasks: groups of choices; every choice is in one history of one group. causes: number of choices by reason for
     sharing.
     """
 
-    marches: tuple[Alike, ...]
+    tasks: tuple[Alike, ...]
     causes: Counter[str]
 
 
@@ -99,7 +91,7 @@ def share_histories(study: Study) -> Sharing:
     choices = itertools.product(range(len(axes.wear_coefficient)), range(len(axes.step)), range(len(axes.scheme)))
     if not study.solver.shortcuts:
         return Sharing(tuple(Alike(((choice,),)) for choice in choices), Counter())
-    marches: list[Alike] = []
+    tasks: list[Alike] = []
     causes: Counter[str] = Counter()
     idle: dict[tuple[str, int], list[Choice]] = {}
     fixed: dict[int, list[Choice]] = {}
@@ -123,22 +115,22 @@ def share_histories(study: Study) -> Sharing:
         if cause in free:
             free[cause].append(tuple(members))
         else:
-            marches.append(Alike((tuple(members),), held=cause != "largest_depth"))
+            tasks.append(Alike((tuple(members),), unworn=cause != "largest_depth"))
     if not proportional:
-        marches += [Alike((same,)) for same in itertools.chain.from_iterable(free.values())]
-        marches += [Alike(((choice,),)) for choice in itertools.chain.from_iterable(fixed.values())]
+        tasks += [Alike((same,)) for same in itertools.chain.from_iterable(free.values())]
+        tasks += [Alike(((choice,),)) for choice in itertools.chain.from_iterable(fixed.values())]
         free, fixed = {}, {}
     for cause, lines in free.items():
         if lines:
             farthest_first = sorted(lines, key=lambda members: -axes.wear_coefficient[members[0][0]])
-            marches.append(Alike(tuple(farthest_first)))
+            tasks.append(Alike(tuple(farthest_first)))
             causes[cause.replace("steps", "wear")] += len(lines) - 1
     for of_scheme in fixed.values():
         for same in _same_products(study, of_scheme):
-            marches.append(Alike(tuple((choice,) for choice in same)))
+            tasks.append(Alike(tuple((choice,) for choice in same)))
             causes["equal products"] += len(same) - 1
-    marches.sort(key=lambda alike: min(itertools.chain.from_iterable(alike.histories)))
-    return Sharing(tuple(marches), causes)
+    tasks.sort(key=lambda alike: min(itertools.chain.from_iterable(alike.histories)))
+    return Sharing(tuple(tasks), causes)
 
 
 def rtol_is_idle(study: Study, harmonics: int | Automatic, samples: int | Automatic) -> bool:
@@ -179,24 +171,24 @@ def _same_products(study: Study, choices: Iterable[Choice]) -> Iterator[tuple[Ch
         yield from ((choice,) for choice in others if choice not in whole)
 
 
-def march_counts(
-    cycles: Sequence[float], scaled: ScaledHistory, march: ScaledHistory, steps_of_given_length: bool
+def counts_of(
+    cycles: Sequence[float], scaled: ScaledHistory, computed: ScaledHistory, steps_of_given_length: bool
 ) -> tuple[float, ...]:
     """Cycle counts, ascending, at which a scaled history at `cycles` is read from the computed history.
 
     A count at the end of a step is moved slightly before the end, so that round-off does not move the count to the next
     step.
     """
-    if scaled == march:
+    if scaled == computed:
         return tuple(cycles)
     if not steps_of_given_length:
-        ratio = scaled.wear_coefficient / march.wear_coefficient
+        ratio = scaled.wear_coefficient / computed.wear_coefficient
         return tuple(ratio * cycle for cycle in cycles)
     counts = []
     for cycle in cycles:
         n_steps = cycle / scaled.step
         whole = _whole_number(n_steps)
-        counts.append(march.step * (n_steps if whole is None else (1.0 - _SAME) * whole))
+        counts.append(computed.step * (n_steps if whole is None else (1.0 - _SAME) * whole))
     return tuple(counts)
 
 
