@@ -237,24 +237,3 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
     # but for the limit, which stands in their attributes
     xr.testing.assert_equal(results(), results("whole.nc"))
     assert count_entries("progress") == 0
-
-
-def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver):
-    expected = whole(solver)
-
-    def fail(task, _):
-        # the second state of the sweep upwards
-        if isinstance(task, Sweep) and task.number == 0 and (place := seen.setdefault(id(task), 0)) < 2:
-            seen[id(task)] = place + 1
-            if place == 1:
-                raise ZeroDivisionError("a bug")
-
-    seen: dict[int, int] = {}
-    solver.disturb = fail
-    assert main(TWO_WAYS) in (0, 3)
-    assert len(solver.tasks) == 2 + 8
-    solver.begin_again()
-    assert main([*TWO_WAYS, "--retry-failed"]) == 0
-    assert [type(task) for task in solver.tasks][:1] == [Sweep]
-    assert solver.n_results == 1 + 2 or solver.n_results == 1
-    xr.testing.assert_identical(results(), expected)

@@ -1,10 +1,12 @@
 """The file of a study: what was written is there later; damage, other runs, and faults of the disk."""
 
 import contextlib
+import errno
 import os
 import sqlite3
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -275,6 +277,18 @@ def test_a_damaged_entry_is_forgotten_and_nothing_else(path):
 
 
 @pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(errno.EDQUOT, "Disk quota exceeded"), "Disk quota exceeded: make room there or give another result"),
+        (OSError(errno.EROFS, "Read-only file system"), "Read-only file system: see that it may be written or give"),
+        (OSError(errno.ESTALE, "Stale file"), "Stale file: mend that or give another result file with -o"),
+    ],
+)
+def test_what_there_is_to_do_depends_on_the_fault(error, words):
+    assert words in str(StorageError(Path("out.nc"), error))
+
+
+@pytest.mark.parametrize(
     ("code", "said"),
     [
         (sqlite3.SQLITE_IOERR_READ, "Input/output error: see whether the disk"),
@@ -346,12 +360,3 @@ def test_the_study_of_a_file_is_read_without_its_lock(path, opened):
     opened.note_study("joint", "sdof_slider")
     assert read_study(path) == ("joint", "sdof_slider")
     assert read_study(path.with_name("none")) is None
-
-
-def test_values_beyond_all_measure_are_left_out_where_they_save_time_only(opened, monkeypatch):
-    monkeypatch.setattr(store, "LARGEST", 10)
-    opened.keep_computed("scene", kept(1))
-    opened.put(PROGRESS, key(1), kept(1))
-    assert (opened.read_computed("scene"), opened.read(PROGRESS, key(1))) == (None, None)
-    with pytest.raises(StorageError, match="bytes in one entry: use a smaller model"):
-        opened.put(RESULTS, key(1), kept(1))
