@@ -173,8 +173,8 @@ def _show_plan(study: Study) -> int:
     from studyrunner.kinds.kind import build_tasks
     from studyrunner.plan.plan_text import format_plan
     from studyrunner.plan.plausibility import doubts_of_study
+    from studyrunner.scene.check_command import remarks_of_study
     from studyrunner.scene.drawn_contacts import contact_changes
-    from studyrunner.scene.model_remarks import remarks_of_study
     from studyrunner.scene.planned_scenes import plan_scenes
 
     before = largest_memory()
