@@ -226,9 +226,6 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     display, announced = ProgressDisplay(), job_size() if ranks.size == 1 else 0
     idle = f"one process, although the job has room for {announced}: srun or mpiexec starts them"
     given = RunOptions(options.fresh, options.retry_failed, options.date)
-    if study.scene.path is None and study.scene.files is None:
-        # no file that may be wrong
-        print(f"[    0 s] {show_text(study.study.name)}: building the scene", file=sys.stderr, flush=True)
     try:
         summary = compute_study(ranks, study, target, given, display, _SlowSteps().say, [idle] if announced > 1 else [])
     except Interrupted as ended:
