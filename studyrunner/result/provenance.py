@@ -69,21 +69,7 @@ def _summarise(study: Study, facts: SceneFacts) -> str:
         if len(values) > 1
     ]
     over = f", over {'; '.join(ranges)}" if ranges else ""
-    if study.has_modes:
-        return (
-            "Nonlinear modes of a joint: natural frequency and damping over the amplitude, scene"
-            f" {study.scene.model} with {pairs}{over}."
-        )
-    if study.has_missions:
-        blocks = ", ".join(block.name for block in study.mission)
-        return (
-            f"Fretting wear of a joint over {study.slow_time.missions} missions of {blocks}: scene {study.scene.model}"
-            f" with {pairs}{over}. Worn volume by block, wear depths, vibration, and the errors of each."
-        )
-    return (
-        f"Fretting wear of a joint under vibration: wear histories of the scene {study.scene.model} with {pairs}{over}."
-        " Wear depths and worn volume, contact pressures and slip, vibration, and the errors of each."
-    )
+    return study.kind.about.format(scene=f"{study.scene.model} with {pairs}{over}")
 
 
 def describe_versions() -> str:
