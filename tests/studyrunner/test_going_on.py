@@ -11,7 +11,6 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi import schedule
@@ -65,33 +64,6 @@ def test_an_interrupt_in_any_task(at, solver, capsys):
     xr.testing.assert_identical(results(), expected)
     again = capsys.readouterr().err
     assert (f"{n_there} of {N_POINTS} points are there from an earlier run" in again) == (n_there > 0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("where", "at"), [("flush", 5), ("note_life", 3), ("put", 6)])
-def test_an_interrupt_anywhere_in_the_main_thread(where, at, solver, monkeypatch):
-    """Before and after each of the calls that change what is kept."""
-    expected = whole(solver)
-    own, n_calls = getattr(Store, where), 0
-
-    def called(store, *arguments, **named):
-        nonlocal n_calls
-        n_calls += 1
-        if n_calls == at:
-            raise KeyboardInterrupt
-        found = own(store, *arguments, **named)
-        if n_calls + 1 == at:
-            n_calls += 1
-            raise KeyboardInterrupt
-        return found
-
-    with monkeypatch.context() as changed:
-        changed.setattr(Store, where, called)
-        status = main(TWO_WAYS)
-    assert status == (130 if n_calls >= at else 0)
-    assert_partial(results(), expected)
-    assert main(TWO_WAYS) == 0
-    xr.testing.assert_identical(results(), expected)
 
 
 @pytest.mark.slow
