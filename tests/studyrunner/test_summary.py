@@ -258,7 +258,7 @@ def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
     made = wearing(*GRID, volume=lambda p: 1e-9 * (3 * p[0] + p[4]), slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
     whole = summary(made)
     for n_values in (1, 7, 50, 100):
-        monkeypatch.setattr("studyrunner.result.view._AT_ONCE", n_values)
+        monkeypatch.setattr("studyrunner.result.points._AT_ONCE", n_values)
         assert str(summary(made)) == str(whole)
         largest = []
         result_of(made).over_points(

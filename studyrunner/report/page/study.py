@@ -10,8 +10,9 @@ import xarray as xr
 
 from studyrunner.coordinates import COORDINATES
 from studyrunner.result.certainty import advise_ended, describe_ended, tell_ends
+from studyrunner.result.points import CONVERGED
 from studyrunner.result.units import scale_for, show_cycles, show_number, units_of
-from studyrunner.result.view import CONVERGED, Point, Result
+from studyrunner.result.view import Point, Result
 from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.statistics.sentence import sentence, sentences
 from studyrunner.summary.answer import summarise
