@@ -85,10 +85,10 @@ WRONG = [
     (SLIDER + '"\\u001b]0;x\\u0007" = 1\n', "", r"solver.\x1b]0;x\x07 = 1: unknown key"),
     (SLIDER.replace("[150.0]", "1e999999999"), "", "axes.frequency = inf: .. finite"),
     (SLIDER, "scene.model=./s.toml", "model: .. no HDF5 file"),
-    (SLIDER, "axes.frequency_ratio=1.0", "axes.frequency = [150.0]: .. one of both"),
+    (SLIDER, "axes.frequency_ratio=1.0", "axes.frequency_ratio = [1.0]: .. nothing that has mass"),
     (RATIO, "", "axes.frequency_ratio = [150.0]: .. nothing that has mass"),
     (RATIO, "axes.frequency_ratio=-1", "axes.frequency_ratio = -1: .. above"),
-    (SAMPLES.replace("[150.0]", "1\nfrequency_ratio = 1"), "axes.frequency={}", "axes.frequency = {}: .. one of both"),
+    (SAMPLES.replace("[150.0]", "1\nfrequency_ratio = 1"), "", "axes.frequency = 1: .. one of both"),
     # axes that are keys of [scene] or [wear]
     (SLIDER, "axes.friction_coefficient={}", "axes.friction_coefficient = {}: .. a list"),
     (SLIDER, "axes.friction_coefficient=[0.3, nan]", "axes.friction_coefficient = nan: .. finite"),
