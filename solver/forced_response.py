@@ -13,6 +13,7 @@ from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import Direction
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome
+from solver.presentation import PresentedResponse
 from solver.results.history import WearHistory
 from solver.settings import SolverSettings
 from solver.structure.joint import friction_of_pairs
@@ -22,8 +23,8 @@ from solver.wear.solutions import SlowTime
 _START = np.zeros(1)  # the only cycle count
 
 
-@dataclass(frozen=True)
-class FrequencyResponse:
+@dataclass(frozen=True, repr=False)
+class FrequencyResponse(PresentedResponse):
     """Periodic states over frequency, at `n_frequency` points, of an unworn joint or at a fixed wear depth.
 
     - frequency (n_frequency,): Hz, as given.

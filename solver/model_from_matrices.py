@@ -57,7 +57,7 @@ def build_model(
     ------
     ValueError
         Shapes do not fit, a number is not finite, a matrix is not symmetric, an area is not positive, or an index is
-        out of range or used twice.
+        out of range or used twice; nothing presses a pair: no closing displacement and no normal load.
     """
     k = _matrix("stiffness", stiffness)
     n = len(k)
@@ -75,12 +75,17 @@ def build_model(
     areas = _numbers("area", area, (n_contact,))
     if (areas <= 0.0).any():
         raise ValueError("area: give a positive area, m2, to every contact pair")
+    loads = _numbers("normal_load", normal_load, (n_contact,))
+    loose = np.flatnonzero((dofs[:, 0] < 0) & (loads <= 0.0))
+    if len(loose):
+        remedy = f"give pair {loose[0]} more than 0 N, as it has no closing displacement that could press it"
+        raise ValueError(f"normal_load: {remedy}")
     nowhere = np.full((n_contact, 3), np.nan)
     contact = ContactInterface(
         dofs=dofs,
         area=areas,
         gap=_numbers("gap", gap, (n_contact,)),
-        normal_load=_numbers("normal_load", normal_load, (n_contact,)),
+        normal_load=loads,
         position=nowhere if position is None else _numbers("position", position, (n_contact, 3)),
         surface=_names("surface", ("",) * n_contact if surface is None else surface, n_contact),
     )

@@ -12,12 +12,13 @@ from solver.forced_response import check_friction, check_numbers, check_settings
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.modes.points import Direction, follow_mode, values_of
 from solver.outcome import Outcome
+from solver.presentation import PresentedMode
 from solver.results.mode_values import OF_A_POINT
 from solver.settings import SolverSettings
 
 
-@dataclass(frozen=True)
-class Backbone:
+@dataclass(frozen=True, repr=False)
+class Backbone(PresentedMode):
     """A nonlinear mode at `n_amplitude` amplitudes.
 
     - amplitude (n_amplitude,): modal amplitude `sqrt(x_1^H M x_1)`, m sqrt(kg), as given; x_1: first harmonic of all

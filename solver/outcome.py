@@ -38,6 +38,12 @@ class Outcome(IntEnum):
     STATIC_SLIDING = 21
     STATIC_OPEN = 22
 
+    def __str__(self) -> str:
+        """The word, as `meaning`."""
+        return self.meaning
+
+    __repr__ = __str__
+
     @property
     def complete(self) -> bool:
         """Whether the point was computed to the end. Its values are then results, each with an estimated error."""

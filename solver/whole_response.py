@@ -22,8 +22,8 @@ from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
+from solver.stability.floquet import Multipliers, Stability, find_multipliers
 from solver.stability.hill import is_stable
-from solver.stability.multipliers import Multipliers, Stability, find_multipliers
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
@@ -43,7 +43,7 @@ class ResponseCurve:
       folds; NaN where not asked for.
     - is_fold (n_points,): points at which the parameter turns.
     - stability: of each point "stable"; "fold", "period doubling" or "Neimark-Sacker" by the disturbance that grows;
-      "unknown" where no multipliers are computed, see `solver.stability.multipliers`.
+      "unknown" where no multipliers are computed, see `solver.stability.floquet`.
     - multipliers: Floquet multipliers of each point, largest modulus first; the largest ones only of a large joint;
       none where unknown. Those of a small joint with impacts belong to a state with at least 19 harmonics.
     - multiplier_error (n_points,): estimated error of the first multiplier by time steps; inf where unknown.

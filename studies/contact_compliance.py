@@ -15,8 +15,7 @@ ContactStiffness = Annotated[
     Field(
         gt=0,
         le=LARGEST_CONTACT_STIFFNESS,
-        description="normal stiffness of the rough surfaces per area, in series with each pair; the tangential one is"
-        " 14/17 times as large; rigid if not given, N/m3",
+        description="normal stiffness per area of rough surfaces; rigid if not given, N/m3",
     ),
 ]
 

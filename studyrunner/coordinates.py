@@ -62,6 +62,12 @@ COORDINATES = {
         comment="Where the frequency follows the resonance: the middle of loading.between, which stands for the range;"
         " excitation_frequency holds the frequency at each count.",
     ),
+    "frequency_ratio": Variable(
+        (),
+        "1",
+        "excitation frequency over the first natural frequency with the joint stuck",
+        comment="Of the same scene; the coordinate frequency is in Hz.",
+    ),
     "wear_coefficient": Variable(
         (),
         "1/Pa",
@@ -91,8 +97,8 @@ COORDINATES = {
     ),
     "sample": Variable((), "1", "number of the sample", comment="What it draws is in the coordinates sample_..."),
     "cycle": Variable((), "1", "number of vibration cycles", comment="Slow time."),
-    "mission": Variable((), "1", "number of flown missions", comment="Slow time."),
-    "block": Variable((), "1", "name of the block of the mission", comment="In the order in which they are flown."),
+    "mission": Variable((), "1", "number of missions", comment="Slow time."),
+    "block": Variable((), "1", "name of the block of the mission", comment="In their order in a mission."),
     "contact": Variable((), "1", "index of the contact pair"),
     "response": Variable((), "1", "name of the response"),
     "phase": Variable(
@@ -111,7 +117,7 @@ COORDINATES = {
     "contact_area": Variable(
         ("contact",), "m2", "area of the contact pair", comment="Weight alpha of the pair, Eq. (7) of the reference."
     ),
-    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair"),
+    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair", "str"),
     "contact_edge": Variable(
         ("contact",),
         "1",

@@ -19,6 +19,7 @@ Alone, under "mpiexec -n N run-study ..." or under "srun run-study ...": the res
 
 _EPILOG = """\
 examples:
+  run-study --new my_study                               writes my_study.toml, a study to start from
   run-study                                              the bundled study "dovetail" -> dovetail.nc
   run-study --plan                                       what that would compute, and how long it takes
   mpiexec -n 2 run-study my_study.toml -o worn.nc        a study of one's own on two cores
@@ -78,7 +79,7 @@ class _SceneHelp(argparse.Action):
 
 
 def parse_options(arguments: Sequence[str]) -> Options:
-    """Options from the command line. Raises UserError; SystemExit after --help, --version and --scene-help."""
+    """Options from the command line. Raises UserError; SystemExit after --help, --new and the like."""
     parser = _Parser(
         prog="run-study",
         description=_DESCRIPTION,
@@ -99,6 +100,8 @@ def parse_options(arguments: Sequence[str]) -> Options:
     parser.add_argument(
         "--version", action="version", version=f"fretwear {metadata.version('fretwear')}", help="print the version"
     )
+    parser.add_argument("--new", metavar="NAME", help="write NAME.toml, a study to start from, and stop")
+    parser.add_argument("--from", dest="deck", type=Path, metavar="DECK", help="with --new: a study of this deck")
     parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
     parser.add_argument(
         "--check", action="store_true", help="print what a finite-element model is, draw its contact pairs; then stop"
@@ -132,6 +135,13 @@ def parse_options(arguments: Sequence[str]) -> Options:
         help="date_created of the result: a date, or now; without it equal runs have equal files",
     )
     found = vars(parser.parse_args(list(arguments)))
+    new, deck = found.pop("new"), found.pop("deck")
+    if new is not None:
+        from studyrunner.study.keys import write_new_study
+
+        path = write_new_study(new, deck)
+        print(f"{path}: run-study {path} computes it", flush=True)
+        parser.exit()
     if found["date"] is not None:
         found["date"] = check_date(found["date"], "command line", "--date")
     return Options(**found)

@@ -1,24 +1,57 @@
-"""The models of several scenes on their way to the ranks: while they are in use, once in memory on each machine.
+"""The models of scenes on their way to the ranks: while they are in use, once in memory on each machine.
 
-Rank 0 keeps the models in the file of the run, and a task brings the model to a rank that does not have it: as a file
-that the ranks map (`mapped_file`), or the model itself where the rank does not see that file.
+A task brings the model to a rank that does not have it: as a file that the ranks map (`mapped_file`), or the model
+itself where the rank does not see that file.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Collection
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
-from studyrunner.evaluate import ModelCache
+from studyrunner.kinds.task import Task
 from studyrunner.mpi.mapped_file import MappedFile, write_mapped
-from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.system.files import new_partial
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
+
+MODELS_A_RANK = 2
+"""Models, or sets of models of the blocks of a mission, that a rank holds where a study has several scenes."""
+
+Models = TypeVar("Models")
+
+
+class ModelCache(Generic[Models]):
+    """The models that a rank has computed with last, by the numbers of the scenes that a task needs.
+
+    Rank 0 keeps such a list for each rank, without models, and so knows which models the rank has.
+    """
+
+    def __init__(self) -> None:
+        self._models: OrderedDict[tuple[int, ...], Models] = OrderedDict()
+
+    def use(self, scenes: tuple[int, ...]) -> bool:
+        """Whether the models are there; they are then the last to be removed."""
+        if scenes in self._models:
+            self._models.move_to_end(scenes)
+        return scenes in self._models
+
+    def add(self, scenes: tuple[int, ...], models: Models) -> None:
+        """Adds models; removes those that were not used for longest where there are too many."""
+        self._models[scenes] = models
+        if len(self._models) > MODELS_A_RANK:
+            self._models.popitem(last=False)
+
+    def __iter__(self) -> Iterator[tuple[int, ...]]:
+        return iter(self._models)
+
+    def __getitem__(self, scenes: tuple[int, ...]) -> Models:
+        return self._models[scenes]
 
 
 class SceneModels:
@@ -36,7 +69,7 @@ class SceneModels:
         self._held: dict[int, ModelCache[None]] = {}
         self._files: dict[int, MappedFile] = {}
 
-    def with_model(self, rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
+    def with_model(self, rank: int, task: Task) -> Task:
         """The task as a rank gets it: with the models that the rank does not have."""
         held = self._held.setdefault(rank, ModelCache())
         if held.use(task.scenes):

@@ -1,4 +1,4 @@
-"""What users of Python import: a few names of each package, against exact answers and against the command."""
+"""What users of Python import, against exact answers and against the command."""
 
 import re
 import subprocess
@@ -9,14 +9,32 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib import pyplot
 
+import fretwear
 import solver
 import studies
 import studyrunner
-from solver import FrequencyResponse, Outcome, SolverSettings, build_model, frequency_response, march_wear
-from studies import SceneError, build_scene, read_scene
+from fretwear import (
+    Block,
+    FrequencyResponse,
+    Outcome,
+    SceneError,
+    SolverSettings,
+    Study,
+    UserError,
+    backbone,
+    build_model,
+    build_scene,
+    frequency_response,
+    integrate_mission,
+    march_wear,
+    open_result,
+    read_scene,
+    read_study,
+    run_study,
+)
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
-from studyrunner import Study, UserError, open_result, read_study, run_study
 from studyrunner.cli import main
 from tests.studyrunner.faked_runs import Solver
 
@@ -48,8 +66,11 @@ def test_every_name_is_there_and_is_said():
             assert getattr(package, name).__name__ == name
             assert name in dir(package)
             assert f"`{name}`" in package.__doc__
+            assert getattr(fretwear, name) is getattr(package, name)
         with pytest.raises(AttributeError, match="no attribute 'nothing'"):
             package.nothing  # noqa: B018
+    assert {"join_results", "worn_volume_statistics"} <= set(dir(fretwear))
+    assert hasattr(xr.Dataset, "fretwear")
 
 
 @pytest.mark.slow
@@ -80,7 +101,10 @@ def test_the_example_of_the_page_runs(tmp_path, monkeypatch, capsys):
     assert np.isfinite(names["result"]["worn_volume"]).all()
     assert set(names["curve"].outcome) == {Outcome.CONVERGED}
     assert names["history"].outcome is Outcome.CONVERGED
-    assert "1.27e-05 m at 505 Hz, converged" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "1.27e-05 m at 505 Hz, converged" in said
+    assert "\n  worn volume " in said
+    np.testing.assert_array_equal(names["dataset"].worn_volume, names["history"].worn_volume)
 
 
 def test_the_map_of_the_house_names_what_there_is():
@@ -233,6 +257,32 @@ def test_one_joint_gives_the_bits_of_a_study(result):
     np.testing.assert_array_equal(history.wear_depth[:, 0], at.wear_depth)
 
 
+def test_results_are_datasets_pictures_and_five_lines():
+    model = build_scene("sdof_slider")
+    missions = integrate_mission([Block(model, 160.0, 10.0, 0.5, cycles=10.0)], 1.1e-11, [0, 10])
+    assert missions.to_xarray().sizes == {"mission": 2, "contact": 1, "block": 1, "response": 1, "end": 2, "step": 5}
+    curve, mode = frequency_response(model, FREQUENCIES, 10.0, 0.5), backbone(model, 1e-3, 0.5, sweep="down")
+    for found, index, value in (
+        (march_wear(model, 160.0, 10.0, 0.5, 1.1e-11, 1e4), "cycle", "worn_volume"),
+        (missions, "mission", "worn_volume"),
+        (curve, "frequency", "response"),
+        (mode, "modal_amplitude", "damping_ratio"),
+    ):
+        lines = repr(found).splitlines()
+        assert len(lines) == 5
+        assert lines[0].startswith(f"{type(found).__name__}: ")
+        assert "converged" in lines[0] + lines[1]
+        dataset = found.to_xarray()
+        assert dataset[value].dims[0] == index
+        np.testing.assert_array_equal(dataset[value], getattr(found, value))
+        assert dataset.outcome.values.ravel()[0] == "converged"
+        axes = found.plot()
+        assert axes.lines
+        pyplot.close(axes.figure)
+    failed = march_wear(slider(), 150.0, 10.0, 0.5, 1e-11, 1e4, settings=SolverSettings(time_limit=0.0))
+    assert "time_limit" in repr(failed)
+
+
 def test_a_point_that_fails_is_one_point():
     settings = SolverSettings(time_limit=0.0)
     curve = frequency_response(slider(), [150.0], 10.0, 0.5, settings=settings)
@@ -253,6 +303,7 @@ def test_a_point_that_fails_is_one_point():
         ({"contact_dofs": [[0, 2, -1]]}, "contact_dofs: give -1 or an index from 0 to 1"),
         ({"contact_dofs": [[0, 0, -1]]}, "contact_dofs: give each displacement to one pair only"),
         ({"contact_dofs": [[-1, -1, -1]]}, "contact_dofs: give every pair a displacement"),
+        ({"contact_dofs": [[-1, 1, -1]]}, "normal_load: give pair 0 more than 0 N"),
         ({"area": 0.0}, "area: give a positive area, m2, to every contact pair"),
         ({"load_harmonic": [1.0]}, "load_harmonic: give shape (2,) instead of (1,)"),
         ({"response": [2]}, "response: give indices from 0 to 1"),

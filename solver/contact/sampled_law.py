@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from solver.contact.coulomb import friction_limit, sample_tangents
 from solver.contact.law import ContactLaw, Marched
@@ -63,16 +64,29 @@ def _take_mass_law(found: SampledLaw, place: int, law: ContactLaw, at: Marched, 
     gain, loss = step_gains(law.penalty.mass[pair], law.penalty.drag[pair], step)
     there = np.array([0, 1]) if line < 0 else np.array([line])
     rows, friction = 1 + there, float(law.friction_coefficient[pair])
+    limit = friction_limit(friction, np.maximum(at.predicted_t[pair, 0], 0.0))
+    slopes = _mass_slopes(at.predicted_t[pair, 1:], at.start[pair], limit, (gain, loss), line)
+    by_predicted, by_before = (slopes[:, there[:, None], first + there] for first in (0, 2))
+    block = (slice(None), place, rows[:, None], rows)
     for part in (found.by_force, found.by_motion, found.by_last_motion):
         part[:, place, rows] = 0.0
-    velocity, out, slopes = at.start[pair].copy(), np.empty(7), np.empty((5, 5))
-    for n in range(at.status_t.shape[1]):
-        limit = friction_limit(friction, max(float(at.predicted_t[pair, 0, n]), 0.0))
-        step_mass(at.predicted_t[pair, 1:, n], velocity, limit, gain, loss, line, out, slopes)
+    found.by_force[block] = np.eye(there.size) - by_predicted
+    if law.contact.has_normal[pair]:
+        found.by_force[:, place, rows, 0] = np.where(limit[:, None] > 0.0, -friction * slopes[:, there, 4], 0.0)
+    found.by_speed[block] = -gain / step * by_predicted
+    found.by_last_speed[block] = (by_before - loss * by_predicted) / step
+
+
+@njit(cache=True)
+def _mass_slopes(
+    force_t: FloatArray, start: FloatArray, limit_t: FloatArray, gains: tuple[float, float], line: int
+) -> FloatArray:
+    """Derivatives (N, 5, 5) of the steps of a mass through the period, as `rigid_slider.step_mass`.
+
+    force_t (2, N), limit_t (N,): predicted force and friction limit, N. start (2,): velocity, m/s.
+    """
+    slopes, out, velocity = np.empty((limit_t.size, 5, 5)), np.empty(7), start.copy()
+    for n in range(limit_t.size):
+        step_mass(force_t[:, n], velocity, limit_t[n], gains[0], gains[1], line, out, slopes[n])
         velocity[:] = out[2:4]
-        by_predicted, by_before = slopes[np.ix_(there, there)], slopes[np.ix_(there, 2 + there)]
-        found.by_force[n, place][np.ix_(rows, rows)] = np.eye(there.size) - by_predicted
-        if law.contact.has_normal[pair] and limit > 0.0:
-            found.by_force[n, place, rows, 0] = -friction * slopes[there, 4]
-        found.by_speed[n, place][np.ix_(rows, rows)] = -gain / step * by_predicted
-        found.by_last_speed[n, place][np.ix_(rows, rows)] = (by_before - loss * by_predicted) / step
+    return slopes

@@ -76,7 +76,7 @@ def follow_naturally(
             state, done = State(result.evaluation, history, reach), ahead
             fraction = min(2.0 * fraction, 1.0)
         else:
-            fraction *= 0.5
+            fraction = 0.5 * (ahead - done)
             failures += not result.converged
             if fraction < shortest or failures > CONTINUATION.attempts or run.budget.exhausted:
                 return state, False

@@ -51,7 +51,7 @@ class Motion:
     velocity: ComplexArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _LoadedStructure(CondensedStructure):
     """A structure with a load in each harmonic, load_h (n_rel, 2H+1), N."""
 

@@ -42,7 +42,7 @@ class Balance:
     - joint: the joint.
     - history (n_contact, 2): corrected slip X_T at the start of the period, m.
     - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6).
-    - wear_gain (n_contact,): `archard.wear_gain` of the step, m/J; 0 where W is given.
+    - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given.
     - wearing: wearing work of the wear law.
     """
 
@@ -168,13 +168,20 @@ class Linearisation:
         tangent[:, 0, :] += self.growth_tangent
         return tangent
 
+    @cached_property
     def active(self) -> IntArray:
         """Pairs whose motion depends on their predicted force."""
-        return self._active
+        return np.flatnonzero(differs_from_identity(self.force_tangent, _PASSIVE))
 
     @cached_property
-    def _active(self) -> IntArray:
-        return np.flatnonzero(differs_from_identity(self.force_tangent, _PASSIVE))
+    def active_rows(self) -> IntArray:
+        """Relative displacements of the active pairs."""
+        return self.joint.rows_of(self.active)
+
+    @cached_property
+    def passive_rows(self) -> IntArray:
+        """All other relative displacements: the columns of their unknowns are those of the identity."""
+        return np.setdiff1d(np.arange(self.joint.component_index.size), self.active_rows, assume_unique=True)
 
     def transmit(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Changes of motion, m, and contact force, N, both (n_contact, 3, m), for a step (n_rel, m), N."""
@@ -205,7 +212,7 @@ class Linearisation:
     @cached_property
     def _held_back(self) -> tuple[IntArray, SingleArray]:
         """Active pairs, and the part `1 - d lambda/dp` that they do not transmit, in single precision."""
-        pairs = self.active()
+        pairs = self.active
         return pairs, (np.eye(self.force_tangent.shape[1]) - self.force_tangent[pairs]).astype(np.float32)
 
     @cached_property

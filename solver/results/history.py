@@ -10,6 +10,7 @@ import numpy as np
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
 from solver.outcome import Outcome
 from solver.packing import packable
+from solver.presentation import PresentedHistory
 from solver.settings import Resolution
 
 
@@ -67,8 +68,8 @@ class StartState:
     reference: PeriodicState | None = None
 
 
-@dataclass(frozen=True)
-class WearHistory:
+@dataclass(frozen=True, repr=False)
+class WearHistory(PresentedHistory):
     """A point of a study on the slow time scale, at `n_output` cycle counts.
 
     At output counts that were not reached, real values are NaN and whole numbers 0.
@@ -102,7 +103,7 @@ class WearHistory:
     - harmonics_used, samples_used (n_output,): int, 0 where there is no state.
     - run_time: CPU seconds of the computing thread, start state included.
     - branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
-    - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step_limit`); inf if
+    - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.rate_slope`); inf if
       there is no limit.
     - final_method: method by which the scheme "final" has found the final state: "active_set" or "march"; empty for the
       other schemes. A final state of an active set has the count inf, and no state between the unworn one and the
@@ -118,6 +119,8 @@ class WearHistory:
     - message: addition to the outcome: an unexpected error, the cycle from which on a condition is violated, the error
       reached; empty where there is nothing to add.
     """
+
+    OVER = ("cycles", "cycle")
 
     outcome: Outcome
     cycles: FloatArray

@@ -15,7 +15,7 @@ that are open during the whole period are free: they need no law.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -27,6 +27,9 @@ from solver.model import BoolArray, FloatArray, IntArray, LinearModel
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Joint
 
+_PARTS = 32  # of a period, which has a power of two of samples
+_SAMPLES_AT_ONCE = 64  # of the contact law: bounds the memory of large joints
+
 
 @dataclass(frozen=True)
 class Monodromy:
@@ -36,6 +39,9 @@ class Monodromy:
     - compliance (n, n): inverse of `9/4 M / h^2 + 3/2 C / h + K`, m/N.
     - select (3p, n): from the displacements that move to the motion of the switching pairs.
     - law: derivative of the contact law.
+
+    A disturbance (4n, j) has the displacements now and at the sample before, and the velocities (m per sample)
+    likewise.
     """
 
     inertia: FloatArray
@@ -46,22 +52,22 @@ class Monodromy:
 
     @property
     def size(self) -> int:
-        """Size of a disturbance: displacements and velocities at two samples."""
+        """Size of a disturbance."""
         return 4 * len(self.inertia)
 
     @cached_property
     def _contact(self) -> tuple[FloatArray, FloatArray]:
         """Motion under unit contact forces (n, 3p), m/N, and the inverse (N, 3p, 3p) of the law for the forces."""
-        spread = np.asarray(self.select @ self.compliance).T
+        law, spread = self.law, np.asarray(self.select @ self.compliance).T
         flexibility = np.asarray(self.select @ spread)
-        n_samples, n_pairs = self.law.by_force.shape[:2]
-        blocks = flexibility.reshape(n_pairs, 3, 3 * n_pairs)
+        n_samples, n_pairs = law.by_force.shape[:2]
+        blocks, pairs = flexibility.reshape(n_pairs, 3, 3 * n_pairs), np.arange(n_pairs)
         inverse = np.empty((n_samples, 3 * n_pairs, 3 * n_pairs))
-        pairs = np.arange(n_pairs)
-        for n in range(n_samples):
-            system = -((self.law.by_motion[n] + 1.5 * self.law.by_speed[n]) @ blocks)
-            system.reshape(n_pairs, 3, n_pairs, 3)[pairs, :, pairs] += self.law.by_force[n]
-            inverse[n] = np.linalg.inv(system.reshape(3 * n_pairs, 3 * n_pairs))
+        for first in range(0, n_samples, _SAMPLES_AT_ONCE):
+            part = slice(first, first + _SAMPLES_AT_ONCE)
+            system = -((law.by_motion[part] + 1.5 * law.by_speed[part]) @ blocks)
+            system.reshape(len(system), n_pairs, 3, n_pairs, 3)[:, pairs, :, pairs] += law.by_force[part].swapaxes(0, 1)
+            inverse[part] = np.linalg.inv(system.reshape(len(system), 3 * n_pairs, 3 * n_pairs))
         return spread, inverse
 
     @cached_property
@@ -86,21 +92,32 @@ class Monodromy:
         return np.where(place.reshape(-1, 1, 3) < 0, 4 * n, places).ravel()
 
     def apply(self, disturbance: FloatArray) -> FloatArray:
-        """Disturbances (size, j) a period later: displacements now and at the sample before, velocities likewise."""
-        n_columns = disturbance.shape[1]
-        now, before, speed, speed_before = np.split(disturbance, 4)
+        """Disturbances (size, j) a period later."""
+        for n in range(len(self.law.by_force)):
+            disturbance = self._step(n, disturbance)
+        return disturbance
+
+    def matrix(self) -> FloatArray:
+        """The monodromy (size, size). Parts of the period of equal length are integrated side by side."""
+        length = len(self.law.by_force) // _PARTS
+        steps: FloatArray = np.broadcast_to(np.eye(self.size), (_PARTS, self.size, self.size))
+        for n in range(length):
+            steps = self._step(slice(n, None, length), steps)
+        return reduce(lambda before, after: after @ before, steps)
+
+    def _step(self, n: int | slice, disturbance: FloatArray) -> FloatArray:
+        """Disturbances (size, j) at sample n from those at the sample before; (k, size, j) for k samples n at once."""
+        now, before, speed, speed_before = np.split(disturbance, 4, axis=-2)
         spread, inverse = self._contact
-        nothing = np.zeros((1, n_columns))
-        for n, solve in enumerate(inverse):
-            # BDF2: v = 3/2 y + known; acceleration from v in the same way
-            known = 0.5 * before - 2.0 * now
-            after = self._response @ np.concatenate([1.5 * known + 0.5 * speed_before - 2.0 * speed, known])
-            if solve.size:
-                past = np.concatenate([after, now, known, speed, nothing])[self._places]
-                right = self._law_of_past[n] @ past.reshape(-1, 12, n_columns)
-                after -= spread @ (solve @ right.reshape(-1, n_columns))
-            now, before, speed, speed_before = after, now, 1.5 * after + known, speed
-        return np.concatenate([now, before, speed, speed_before])
+        # BDF2: v = 3/2 y + known; acceleration from v in the same way
+        known = 0.5 * before - 2.0 * now
+        after = self._response @ np.concatenate([1.5 * known + 0.5 * speed_before - 2.0 * speed, known], axis=-2)
+        if inverse.size:
+            *of, _, j = disturbance.shape
+            past = np.concatenate([after, now, known, speed, np.zeros((*of, 1, j))], axis=-2)[..., self._places, :]
+            right = self._law_of_past[n] @ past.reshape(*of, -1, 12, j)
+            after = after - spread @ (inverse[n] @ right.reshape(*of, -1, j))
+        return np.concatenate([after, now, 1.5 * after + known, speed], axis=-2)
 
 
 def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples: int) -> Monodromy:

@@ -1,14 +1,10 @@
 """A cylinder on a flat, the classic fretting test: plane strain, one material, no mass.
 
-A constant force presses. An oscillating tangential force Q, or a prescribed stroke, moves the cylinder.
-`excitation_amplitude` multiplies Q or the stroke; the frequency has no influence. Strips of half of the contact carry
-uniform tractions on two elastic half-planes; each strip also stands for its mirror image (`half_space.influence`).
-
-- Without wear the pressure is that of Hertz and the stick zone that of Cattaneo. Partial slip wears to a known profile
-  (`closed_forms.hertz`).
-- The depth of a pair is the sum of flat and cylinder. Areas, forces and volumes are of both halves.
-- The strips stay at their places: a stroke has to be small against the contact. Load or wear on the last strip shows
-  that there are too few strips.
+A constant force P presses. A tangential force Q or a stroke moves the cylinder; `excitation_amplitude` multiplies Q or
+the stroke, and the frequency has no influence. Strips of half of the contact carry uniform tractions on two elastic
+half-planes; each strip also stands for its mirror image (`half_space.influence`). Areas, forces and volumes are of both
+halves, a depth is the sum of both bodies. A stroke has to be small against the contact. Without wear the pressure is
+that of Hertz, the stick zone that of Cattaneo; partial slip wears to a known profile (`closed_forms.hertz`).
 """
 
 from __future__ import annotations
@@ -42,10 +38,9 @@ FRICTION_IN_MODEL = True
 
 
 class Parameters(BaseModel):
-    """Parameters of bodies, loads and strips.
+    """The defaults are steel under 120 N/mm, with half of the force at which the cylinder slides.
 
-    The defaults are steel under 120 N/mm with half of the force at which the cylinder slides: the half-width is 0.0913
-    mm, the largest pressure is 836 MPa, and half of the contact area sticks.
+    The half-width is 0.0913 mm, the largest pressure 836 MPa, and half of the contact area sticks.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -67,9 +62,8 @@ class Parameters(BaseModel):
     half_width: float | None = Field(
         None,
         gt=0,
-        description="half of the width of all strips, m; default: somewhat more than the half-width of the worn"
-        " contact, with an edge of strips at the edge of the stick zone; for a sliding stroke a study chooses it by the"
-        " expected wear, and without a study it is 1.5 times the half-width of the unworn contact",
+        description="half of the width of all strips, m; default: what the worn contact needs, in a study;"
+        " without a study, for a sliding stroke, 1.5 times the unworn contact",
     )
     depth: float | None = Field(
         None,

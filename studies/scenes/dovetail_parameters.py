@@ -15,9 +15,8 @@ TRAVELLING_RETAINER = 1e7
 
 
 class Parameters(BaseModel):
-    """One sector of a bladed disk with a dovetail root. SI units, except rotation speed and angles.
+    """x is the centre line of the sector, y the tangential direction, z the axis of rotation, to the trailing edge.
 
-    The sector's centre line is x, the tangential direction y, the axis of rotation z (leading edge at negative z).
     Radii of the dovetail and of the blade are measured along the centre line.
     """
 
@@ -31,8 +30,7 @@ class Parameters(BaseModel):
     retention_stiffness: float | None = Field(
         None,
         ge=0,
-        description="stiffness of the retainer that keeps the root from sliding along its slot;"
-        " if not given 1e7 under a travelling wave and 0 at nodal diameter 0, N/m",
+        description="retainer along the slot; default 1e7 under a travelling wave and else 0, N/m",
     )
     mesh: int = Field(2, ge=1, le=8, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs, -")
     stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")
@@ -71,7 +69,7 @@ class Parameters(BaseModel):
     root_thickness: float = Field(0.0055, gt=0, description="thickness in mid-chord at the foot of the blade, m")
     tip_thickness: float = Field(0.0026, gt=0, description="thickness in mid-chord at the tip, m")
     root_edge_thickness: float = Field(
-        0.90, gt=0, le=1, description="thickness of the edges at the foot over that in mid-chord, parabolic between, -"
+        0.90, gt=0, le=1, description="thickness of the edges at the foot over that in mid-chord, -"
     )
     tip_edge_thickness: float = Field(0.78, gt=0, le=1, description="the same ratio at the tip, -")
     root_stagger: float = Field(12.0, ge=-80, le=80, description="angle of chord to axis at the foot, degrees")

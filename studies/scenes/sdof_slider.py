@@ -1,10 +1,9 @@
 """A spring-mounted mass that slides on a rigid support: the textbook case of dry friction.
 
-The mass moves along one tangent. A constant force presses the mass on the support, or a spring that wear relaxes: with
-the wear depth W the normal force is `N(W) = normal_load - normal_stiffness W` until the pair opens. A spring gives way
-to rough surfaces: `contact_stiffness` divides N(W) by `1 + normal_stiffness / (contact_stiffness area)`. Without wear
-the motion has the closed form of Den Hartog, "Forced vibrations with combined Coulomb and viscous friction", Trans.
-ASME 53 (1931), if the mass never stops, has no viscous damping, and the contact is rigid.
+A spring presses the mass, and wear relaxes the spring: with the wear depth W the normal force is
+`N(W) = normal_load - normal_stiffness W` until the pair opens. `contact_stiffness` divides N(W) by
+`1 + normal_stiffness / (contact_stiffness area)`. Without wear, damping and contact stiffness, and if the mass never
+stops, the motion is that of Den Hartog, Trans. ASME 53 (1931).
 """
 
 from __future__ import annotations
@@ -20,10 +19,9 @@ from studies.scenes.closed_forms.den_hartog import DenHartogSlider, WearingSlide
 
 
 class Parameters(BaseModel):
-    """Parameters of mass, mount and support.
+    """The defaults resonate at 201.3 Hz without friction.
 
-    The defaults resonate at 201.3 Hz without friction. Excited with 10 N at 160 Hz the mass never stops, and half of
-    the normal force is lost by wear within 1e5 cycles at a wear coefficient of 1.1e-11 1/Pa.
+    With 10 N at 160 Hz the mass never stops, and 1e5 cycles at 1.1e-11 1/Pa wear off half of the normal force.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)

@@ -1,13 +1,8 @@
 """A sphere on a flat: two elastic half-spaces of one material, no mass.
 
-A constant force presses. An oscillating tangential force Q along x, or a prescribed stroke, moves the sphere.
-`excitation_amplitude` multiplies Q or the stroke; the frequency has no influence. Square patches of a quarter of the
-contact carry uniform tractions; each patch also stands for its mirror images (`half_space.influence`).
-
-- Without wear the pressure is that of Hertz and the stick zone that of Cattaneo and Mindlin, without tractions across
-  the force. Partial slip wears to a known profile (`closed_forms.hertz`).
-- The depth of a pair is the sum of flat and sphere. Areas, forces and volumes are of all four quarters.
-- Load or wear on a patch at the edge shows that the patched circle is too small.
+As `cylinder_on_flat`, with a force along x. Square patches of a quarter of the contact carry uniform tractions; each
+patch also stands for its mirror images (`half_space.influence`). Areas, forces and volumes are of all quarters. The
+stick zone is that of Cattaneo and Mindlin, without tractions across the force.
 """
 
 from __future__ import annotations
@@ -42,10 +37,9 @@ FRICTION_IN_MODEL = True
 
 
 class Parameters(BaseModel):
-    """Parameters of bodies, loads and patches.
+    """The defaults are steel under 100 N, with half of the force at which the sphere slides.
 
-    The defaults are steel under 100 N with half of the force at which the sphere slides: the radius of the contact is
-    0.190 mm, the largest pressure is 1.32 GPa, and the stick zone has 0.79 of the radius.
+    The radius of the contact is 0.190 mm, the largest pressure 1.32 GPa, and the stick zone has 0.79 of the radius.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -66,9 +60,8 @@ class Parameters(BaseModel):
     half_width: float | None = Field(
         None,
         gt=0,
-        description="radius of the patched circle, m; default: somewhat more than the radius of the worn contact, with"
-        " patches within the stick zone that have the area of the zone; for a sliding stroke a study chooses it by the"
-        " expected wear, and without a study it is 1.4 times the radius of the unworn contact",
+        description="radius of the patched circle, m; default: what the worn contact needs, in a study;"
+        " without a study, for a sliding stroke, 1.4 times the unworn contact",
     )
 
     @model_validator(mode="after")

@@ -14,11 +14,7 @@ from studies.contact_compliance import ContactStiffness
 
 
 class Parameters(BaseModel):
-    """Parameters of chain and support.
-
-    The defaults resonate at 0.098 and 0.257 Hz without friction; the friction force is 7.2 N, suited to
-    excitations of about 20 N.
-    """
+    """The defaults resonate at 0.098 and 0.257 Hz without friction; the friction force, 7.2 N, suits about 20 N."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 

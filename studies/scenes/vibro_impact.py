@@ -1,9 +1,8 @@
 """A spring-mounted mass that hits an elastic wall behind a gap: a bilinear spring as a unilateral contact.
 
-The wall is a spring to ground. Its massless tip stands `gap` away from the resting mass. The closing displacement of
-the pair is `u_N = x - y`, with x of the mass and y of the tip. In the coordinates (u_N, x) the energy of the wall
-spring is `wall_stiffness (x - u_N)^2 / 2`. Open, the tip rests (`u_N = x`). Closed, `u_N = gap`, and the contact force
-is `wall_stiffness (x - gap)`: exactly the bilinear spring.
+The wall is a spring to ground, whose massless tip stands `gap` away from the resting mass. The closing displacement is
+`u_N = x - y`, with x of the mass and y of the tip; the energy of the wall is `wall_stiffness (x - u_N)^2 / 2`. Open,
+the tip rests (`u_N = x`); closed, `u_N = gap`, and the force is `wall_stiffness (x - gap)`.
 """
 
 from __future__ import annotations
@@ -16,10 +15,9 @@ from studies.contact_compliance import ContactStiffness
 
 
 class Parameters(BaseModel):
-    """Parameters of mass, mount and wall.
+    """The defaults resonate at 0.159 Hz without the wall.
 
-    The defaults resonate at 0.159 Hz without the wall and suit excitations of about 0.02 N. There the response has two
-    branches, with and without impacts, from 0.175 to 0.248 Hz.
+    With 0.02 N the response has two branches, with and without impacts, from 0.175 to 0.248 Hz.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)

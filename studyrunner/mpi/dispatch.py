@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from studyrunner.plan.cost_model import CostKeys, CostModel, Measurement
+from studyrunner.mpi.cost_model import CostKeys, CostModel, Measurement
 
 AHEAD_SECONDS = 0.2
 """A rank gets a second task in advance behind a task that takes less than this time, s."""
@@ -50,8 +50,8 @@ class Work(Protocol):
         """Number of results that the task gives one after the other, at least 1."""
 
     @property
-    def opens_others(self) -> bool:
-        """Whether results of the task make other tasks possible."""
+    def gives_starts(self) -> bool:
+        """Whether other tasks wait for the results."""
 
 
 Task = TypeVar("Task", bound=Work)
@@ -148,7 +148,7 @@ class Dispatcher(Generic[Task]):
     def add(self, tasks: Iterable[Task]) -> None:
         """Adds tasks that have become possible."""
         for task in tasks:
-            (self._openers if task.opens_others else self._others).add(self._n_known, task)
+            (self._openers if task.gives_starts else self._others).add(self._n_known, task)
             self._n_known += 1
 
     def assign(self) -> Iterator[tuple[int, Assignment[Task]]]:
@@ -220,7 +220,7 @@ class Dispatcher(Generic[Task]):
         self._next_watch = now + max(WATCH_SECONDS, _WATCH_SHARE * (now - self._began))
         for held in self._held.values():
             task = held.task
-            if held.began is None or task.opens_others:
+            if held.began is None or task.gives_starts:
                 continue
             at_least = _AS_LONG_AGAIN * (now - held.began)
             if at_least > task.cost * self._costs.correction(task.cost_keys):

@@ -1,7 +1,8 @@
-"""What the report is made of: drawings, tables, and sentences about what is missing; how drawings look, and titles."""
+"""What the report is made of: drawings, tables, and sentences about what is missing; how drawings look."""
 
 from __future__ import annotations
 
+import csv
 import math
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -19,33 +20,23 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
-from matplotlib.textpath import TextPath
 from matplotlib.ticker import AutoLocator, FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from studyrunner.result.units import show_power
 from studyrunner.result.view import Result
 
-WIDTH = 7.5
-"""Inches of a figure across a printed page: 190 mm, both columns of a journal."""
+FloatArray = NDArray[np.float64]
 
-COLUMN_WIDTH = 3.55
-"""Inches of a figure in one column of a journal: 90 mm."""
+WIDTH, COLUMN_WIDTH = 7.5, 3.55
+"""Inches of a figure across a printed page, 190 mm, and in one column of a journal, 90 mm."""
 
-_COLUMN_HEIGHT = 2.6
-_COLUMN_LABEL = 28
-"""Characters of a vertical label that fit beside such a panel."""
+_COLUMN_HEIGHT, _COLUMN_LABEL = 2.6, 28  # inches; characters of a vertical label that fit beside such a panel
+DPI, PRINT_DPI = 200, 300
+"""Of what is drawn as pixels in the SVG files; of the PNG files, as journals ask for."""
 
-DPI = 200
-"""Of what is drawn as pixels in the SVG files."""
-
-PRINT_DPI = 300
-"""Of the PNG files, as journals ask for."""
-
-_MANY = 600
-"""Points of a line from which on it is pixels in the SVG files, as maps are."""
+_MANY = 600  # points of a line from which on it is pixels in the SVG files, as maps are
 
 MAP = "cividis"
 """Colour map of values from low to high: its lightness grows evenly, and it looks the same to the colour blind."""
@@ -53,14 +44,10 @@ MAP = "cividis"
 # Okabe & Ito (2008), "Color universal design", without its yellow, which vanishes on white. Lightness differs as well.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9")
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
-_CHARACTERS = 13.0
-"""Of a label of a legend, in an inch."""
-_LEGEND_ROW = 0.18
-"""Inches of one row of a legend."""
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_CHARACTERS, _MARK, _LEGEND_ROW = 14.0, 6, 0.18  # of a legend: letters in an inch, a mark in letters, inches of a row
 _FEWEST_TICKS, _MOST_TICKS = 3, 6
-_NAMED = ("frequency", "scheme")
-"""Axes that titles of figures of a single point name."""
+_ERROR = "fretwear_error"  # attribute of a line: the error of its values
 
 _STYLE: Any = {
     "font.size": 9.5,
@@ -75,9 +62,9 @@ _STYLE: Any = {
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-4, 5),
-    # Formulas as tick labels take most of the time of a figure.
+    # formulas as tick labels take most of the time of a figure
     "axes.formatter.use_mathtext": False,
-    # Names of a file are text, whatever signs they have.
+    # names of a file are text, whatever signs they have
     "text.parse_math": False,
     "grid.color": "#d9d9d9",
     "grid.linewidth": 0.6,
@@ -96,7 +83,7 @@ _STYLE: Any = {
 
 @dataclass(frozen=True)
 class Drawing:
-    """One figure. name: of its file, without suffix. caption: plain sentences that say what is seen."""
+    """One figure. name: of its files, without suffix. caption: plain sentences that say what is seen."""
 
     name: str
     title: str
@@ -104,10 +91,14 @@ class Drawing:
     figure: Figure
 
     def save(self, folder: Path) -> tuple[Path, ...]:
-        """Write `<name>.svg` and `<name>.png` into a folder that exists; the SVG files.
+        """Write `<name>.svg`, `<name>.png` and `<name>.csv` into a folder that exists; the SVG files.
 
-        A figure of one panel also becomes `<name>_column.svg` and `<name>_column.png`, as wide as a column.
+        A figure of one panel also becomes `<name>_column.svg` and `<name>_column.png`, as wide as a column. A figure
+        without lines and maps has no CSV file.
         """
+        if rows := plotted_values(self.figure):
+            with (folder / f"{self.name}.csv").open("w", newline="", encoding="utf-8") as file:
+                csv.writer(file).writerows([("panel", "series", "x", "x value", "y", "y value", "value"), *rows])
         with style():
             paths = [_save(self.figure, folder / self.name)]
             if self.fits_column:
@@ -119,7 +110,7 @@ class Drawing:
     def fits_column(self) -> bool:
         """Whether it has one plane panel, no map, and its legend names what is drawn in it."""
         panels, legends = self.figure.axes, self.figure.legends
-        if len(panels) != 1 or panels[0].name != "rectilinear" or panels[0].findobj(QuadMesh):
+        if len(panels) != 1 or panels[0].findobj(QuadMesh):
             return False
         labels = set(panels[0].get_legend_handles_labels()[1])
         return all({text.get_text() for text in legend.get_texts()} <= labels for legend in legends)
@@ -145,6 +136,9 @@ class Table:
     note: str = ""
 
 
+Item = Drawing | Missing | Table
+
+
 @contextmanager
 def style() -> Iterator[None]:
     """Inside, figures are built and saved in the one style of the report, whatever a file matplotlibrc says."""
@@ -152,6 +146,36 @@ def style() -> Iterator[None]:
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         yield
+
+
+def plotted_values(figure: Figure) -> list[tuple[object, ...]]:
+    """The numbers of all lines, dots and maps of a figure, as shown: rows of panel, series, x, its value, y, its value.
+
+    The last column is the error of a value of a line, or the value of a cell or dot of a map.
+    """
+    rows: list[tuple[object, ...]] = []
+    for panel in figure.axes:
+        texts = [" ".join(text.split()) for text in (panel.get_title(), panel.get_xlabel(), panel.get_ylabel())]
+        found: list[tuple[str, Any, Any, Any]] = []
+        for line in panel.get_lines():
+            x, y = line.get_data()
+            if not str(line.get_label()).startswith("_") or np.size(x) > 2:
+                found.append((str(line.get_label()), x, y, getattr(line, _ERROR, np.full(np.shape(y), np.nan))))
+        for each in panel.collections:
+            if isinstance(each, QuadMesh) and panel.get_label() != "<colorbar>":
+                corners = np.asarray(each.get_coordinates())
+                x, y = np.moveaxis(0.5 * (corners[1:, 1:] + corners[:-1, :-1]), 2, 0)
+                values: Any = np.ma.filled(np.ma.asarray(each.get_array(), float), np.nan)
+                found.append(("map", x, y, values))
+            elif isinstance(each, PathCollection):
+                x, y = np.asarray(each.get_offsets()).T
+                values = each.get_array()
+                found.append((str(each.get_label()), x, y, np.full(x.size, np.nan) if values is None else values))
+        for series, *columns in found:
+            for x, y, value in zip(*(np.ravel(column) for column in columns), strict=True):
+                numbers = ["" if not np.isfinite(number) else f"{number:.9g}" for number in (x, y, value)]
+                rows.append((texts[0], series, texts[1], numbers[0], texts[2], *numbers[1:]))
+    return rows
 
 
 def _save(figure: Figure, path: Path) -> Path:
@@ -164,7 +188,7 @@ def _save(figure: Figure, path: Path) -> Path:
         mesh.set_rasterized(True)
     svg, png = path.with_name(f"{path.name}.svg"), path.with_name(f"{path.name}.png")
     figure.savefig(svg, format="svg", metadata={"Date": None})
-    # What stands where is the same for both: it is found once.
+    # what stands where is the same for both: it is found once
     figure.set_layout_engine("none")
     figure.savefig(png, format="png", dpi=PRINT_DPI)
     return svg
@@ -174,32 +198,33 @@ def set_in_column(figure: Figure) -> None:
     """Lay a figure of one panel out anew, as wide as a column of a journal; its text keeps its size."""
     figure.set_size_inches(COLUMN_WIDTH, _COLUMN_HEIGHT)
     figure.set_layout_engine("constrained")
-    legends = list(figure.legends)
-    for legend in legends:
+    handles = [handle for legend in figure.legends for handle in legend.legend_handles]
+    for legend in list(figure.legends):
         legend.remove()
     (panel,) = figure.axes
     panel.set_ylabel(textwrap.fill(panel.get_ylabel(), _COLUMN_LABEL, break_on_hyphens=False))
     if isinstance(panel.yaxis.get_major_locator(), AutoLocator):
         # steps of 2.5 have one digit more: with them the layout goes to and fro
         panel.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-    if legends:
+    if handles:
         add_legend(figure)
 
 
-def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """An empty figure, of a size in inches, that lays itself out. It is none of pyplot: nothing has to close it."""
-    return Figure(figsize=(width, height), layout="constrained")
-
-
 def new_panels(n_rows: int, n_columns: int, height: float, **options: Any) -> tuple[Figure, NDArray[Any]]:
-    """A figure and its axes (n_rows, n_columns)."""
-    figure = new_figure(height)
+    """A figure, inches high, that lays itself out, and its axes (n_rows, n_columns). Nothing has to close it."""
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
     panels: NDArray[Any] = figure.subplots(n_rows, n_columns, squeeze=False, **options)
     return figure, panels
 
 
+def new_panel(height: float) -> tuple[Figure, Axes]:
+    """A figure of one panel."""
+    figure, panels = new_panels(1, 1, height)
+    return figure, panels[0, 0]
+
+
 def line_style(number: int, n_points: int = 0) -> dict[str, Any]:
-    """Colour, dashes and marker of the line of this number: each tells it from the others.
+    """Colour, dashes and marker of the line of this number.
 
     n_points: on the line; where there are many, markers stand on some of them only.
     """
@@ -208,38 +233,58 @@ def line_style(number: int, n_points: int = 0) -> dict[str, Any]:
         "linestyle": _DASHES[number % len(_DASHES)],
         "marker": _MARKERS[number % len(_MARKERS)],
         "markevery": max(1, n_points // 12),
-        # Lines are drawn over those before them, which stay visible around the smaller markers.
+        # lines are drawn over those before them, which stay visible around the smaller markers
         "markersize": 5.4 - 0.6 * min(number, 4),
     }
+
+
+def add_line(
+    panel: Axes, x: FloatArray, y: FloatArray, error: FloatArray | None = None, *, band: bool = False, **look: Any
+) -> float:
+    """A line with the errors of its values as bars, or as a band; how high it and its errors reach.
+
+    x, y, error (n,): as shown, error NaN, infinite or 0 where there is none to draw. Errors count to the height as far
+    as twice the largest value: those that leave the values too little room are cut.
+    """
+    (line,) = panel.plot(x, y, **look)
+    highest = float(np.nanmax(y, initial=0.0))
+    if error is None:
+        return highest
+    setattr(line, _ERROR, error)
+    drawn = np.isfinite(error) & np.isfinite(y) & (error > 0.0)
+    if not drawn.any():
+        return highest
+    # what is worn is not less than nothing
+    at, high = x[drawn], (y + error)[drawn]
+    low = np.where(y[drawn] >= 0.0, np.maximum(y[drawn] - error[drawn], 0.0), y[drawn] - error[drawn])
+    if band:
+        panel.fill_between(at, low, high, color=line.get_color(), alpha=0.18, linewidth=0.0, gid="error")
+    else:
+        sides = np.stack([y[drawn] - low, error[drawn]])
+        bars: dict[str, Any] = {"fmt": "none", "ecolor": line.get_color(), "elinewidth": 1.0, "capsize": 2.5}
+        panel.errorbar(at, y[drawn], yerr=sides, zorder=2.5, **bars)
+    return max(highest, min(float(high.max()), 2.0 * highest))
 
 
 def add_legend(figure: Figure, handles: Sequence[Artist] | None = None) -> None:
     """A legend below all panels, where it covers no curve, in as many columns as fit; the figure grows by its height.
 
-    handles: what is named; by default whatever has a label in any panel, each label once.
+    handles: what is named; by default whatever has a label in any panel, each label once, if there are at least two.
     """
+    found: dict[str, Any] = {str(handle.get_label()): handle for handle in handles or ()}
     if handles is None:
-        found: dict[str, Artist] = {}
         for panel in figure.axes:
             for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
                 found.setdefault(str(label), handle)
-    else:
-        found = {str(handle.get_label()): handle for handle in handles}
-    if not found:
+    if len(found) < 2:
         return
-    labels = [textwrap.fill(label, int(_CHARACTERS * figure.get_figwidth())) for label in found]
-    size = FontProperties(size=mpl.rcParams["legend.fontsize"]).get_size_in_points()
-    gap = size * mpl.rcParams["legend.columnspacing"]
-    mark = size * (mpl.rcParams["legend.handlelength"] + mpl.rcParams["legend.handletextpad"])
-    widest = max(TextPath((0, 0), line, size=size).get_extents().width for text in labels for line in text.split("\n"))
-    room = 72.0 * figure.get_figwidth() - size
-    n_columns = max(1, min(len(labels), int((room + gap) // (widest + mark + gap))))
-    n_rows = math.ceil(len(labels) / n_columns)
-    # as even as that number of rows allows
-    n_columns = math.ceil(len(labels) / n_rows)
-    more = sum(text.count("\n") for text in labels)
-    figure.set_figheight(figure.get_figheight() + _LEGEND_ROW * (n_rows + more))
-    figure.legend(list(found.values()), labels, loc="outside lower center", ncols=n_columns)
+    room = int(_CHARACTERS * figure.get_figwidth())
+    labels = [textwrap.fill(label, room - _MARK) for label in found]
+    longest = max(len(line) for text in labels for line in text.split("\n")) + _MARK
+    n_rows = math.ceil(len(labels) / max(1, room // longest))
+    n_lines = n_rows + sum(text.count("\n") for text in labels)
+    figure.set_figheight(figure.get_figheight() + _LEGEND_ROW * n_lines)
+    figure.legend(list(found.values()), labels, loc="outside lower center", ncols=math.ceil(len(labels) / n_rows))
 
 
 def set_from_zero(panel: Axes, largest: float) -> None:
@@ -248,16 +293,21 @@ def set_from_zero(panel: Axes, largest: float) -> None:
 
 
 def add_colour_bar(figure: Figure, panels: Any, norm: Normalize, label: str, **options: Any) -> None:
-    """The colour bar of maps, dots or faces. panels, options: as for `colorbar`; cmap: another than `MAP`."""
-    figure.colorbar(ScalarMappable(norm, options.pop("cmap", None)), ax=panels, label=label, **options)
+    """The colour bar of maps, dots or faces. panels, options: as for `colorbar`."""
+    figure.colorbar(ScalarMappable(norm), ax=panels, label=label, **options)
+
+
+def label_outer(panels: NDArray[Any]) -> None:
+    """Labels of axes at the left and below only."""
+    for panel in panels[:, 1:].flat:
+        panel.set_ylabel("")
+    for panel in panels[:-1].flat:
+        panel.set_xlabel("")
 
 
 def set_log(axis: Axis, low: float, high: float, percent: bool = False) -> None:
     """A logarithmic axis that shows values between these, above zero, with three to six ticks in few digits."""
-    if isinstance(axis, XAxis):
-        axis.axes.set_xscale("log")
-    else:
-        axis.axes.set_yscale("log")
+    (axis.axes.set_xscale if isinstance(axis, XAxis) else axis.axes.set_yscale)("log")
     decades = [10.0**power for power in range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 2)]
     if high < 20.0 * low:
         low, high = 0.9 * low, 1.1 * high
@@ -265,9 +315,8 @@ def set_log(axis: Axis, low: float, high: float, percent: bool = False) -> None:
         ticks = [factor * decade for decade in decades for factor in steps if low <= factor * decade <= high]
         if len(ticks) >= _FEWEST_TICKS:
             break
-    ticks = ticks[:: -(-len(ticks) // _MOST_TICKS)] if ticks else []
     axis.set_minor_locator(NullLocator())
-    axis.set_major_locator(FixedLocator(ticks))
+    axis.set_major_locator(FixedLocator(ticks[:: -(-len(ticks) // _MOST_TICKS) or 1]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: _show_tick(value, percent)))
 
 
@@ -284,27 +333,18 @@ def hatch_empty(panel: Axes, anything_empty: bool) -> None:
         panel.patch.set(hatch="xxx", edgecolor="0.55", linewidth=0.0)
 
 
-def mark_failed(panel: Axes, positions: NDArray[np.float64], failed: NDArray[np.bool_]) -> int:
-    """Crosses on the horizontal axis where points have no result; how many these are.
+def mark_failed(panel: Axes, positions: FloatArray, failed: NDArray[np.bool_]) -> str:
+    """Crosses on the horizontal axis where points have no result; a sentence about them, empty where there are none.
 
     positions (n,): along the axis. failed (n_lines, n).
     """
-    n_failed = int(np.count_nonzero(failed))
-    if n_failed:
-        at = positions[failed.any(axis=0)]
-        panel.plot(
-            at,
-            np.zeros(at.size),
-            linestyle="none",
-            marker="x",
-            color="black",
-            markersize=5,
-            clip_on=False,
-            label="no result",
-            transform=panel.get_xaxis_transform(),
-            zorder=5,
-        )
-    return n_failed
+    if not failed.any():
+        return ""
+    at = positions[failed.any(axis=0)]
+    look: dict[str, Any] = {"linestyle": "none", "marker": "x", "color": "black", "markersize": 5, "zorder": 5}
+    where = panel.get_xaxis_transform()
+    panel.plot(at, np.zeros(at.size), clip_on=False, label="no result", transform=where, **look)
+    return f"Crosses: at these, {int(failed.sum())} in all, no point has a result"
 
 
 def title_at(result: Result, title: str, over: str = "") -> str:
@@ -312,7 +352,6 @@ def title_at(result: Result, title: str, over: str = "") -> str:
 
     over: an axis that the figure is drawn over.
     """
-    names = [name for name in result.axes if name in _NAMED or name in (*result.varying, *result.fixed)]
-    names = [name for name in names if name != over]
-    where = result.describe(result.shown_point(), names)
+    named = ("frequency", "scheme", *result.varying, *result.fixed)
+    where = result.describe(result.shown_point(), [name for name in result.axes if name in named and name != over])
     return f"{title}: {where}" if where else title

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from studyrunner.result.sample_statistics import SAMPLE
+from studyrunner.statistics.samples import SAMPLE
 from studyrunner.system.progress import count
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import hashlib
 import platform
 from importlib import metadata
 
-from studyrunner.plan.identity import solver_digest
+from studyrunner.kinds.task import solver_digest
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study

@@ -1,4 +1,4 @@
-"""The statistics of worn volumes in sentences, one for each point, as the last lines of a run show them."""
+"""The statistics of worn volumes in sentences: range, median, groups, and which input decides, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.percent import show_percent
-from studyrunner.statistics.ranking import describe_ranking
-from studyrunner.statistics.samples_of_result import CYCLE
+from studyrunner.statistics.estimates import FEWEST
+from studyrunner.statistics.samples import CYCLE, Array
 
 _MM3 = 1e9
-_OWN_DIMS = ("quantile", "bound", "exceeded_volume", "exceeded_depth", "input", "grid", "group")
+_MEASURES = ("first_index", "rank_correlation")
 
 
 def sentences(statistics: xr.Dataset) -> list[str]:
@@ -22,7 +22,7 @@ def sentences(statistics: xr.Dataset) -> list[str]:
     decides most (rank correlation 0.80, interval 0.71 to 0.86)".
     """
     last = statistics.isel({CYCLE: -1}, missing_dims="ignore")
-    axes = [name for name in last["worn_volume_quantile"].dims if name not in _OWN_DIMS]
+    axes = list(last["n_without_value"].dims)
     varying = [name for name in axes if last.sizes[name] > 1 or name == "frequency"]
     lines = []
     for place in np.ndindex(*(last.sizes[name] for name in axes)):
@@ -46,15 +46,20 @@ def describe_volumes(point: xr.Dataset) -> str:
     if 0.5 in probabilities:
         middle = int(np.flatnonzero(probabilities == 0.5)[0])
         text += f", median {_range(*ends[middle])} mm3 ({_error(point, middle)})"
-    if n_without:
-        text += f"; {n_without} without a value to be trusted"
-    return text + _groups(point)
+    text += f"; {n_without} have no volume that can be trusted" if n_without else ""
+    n_lower, n_upper = point["group_size"].values.tolist()
+    if n_upper:
+        lower, upper = point["group_gap"].values * _MM3
+        text += f"; two groups, {n_lower} samples up to {lower:.3g} mm3 and {n_upper} from {upper:.3g} mm3"
+        contact = int(point["deciding_contact"])
+        text += "" if contact < 0 else f", which differ in the wear depth of contact pair {contact}"
+    return text
 
 
-def _range(low: float, high: float) -> str:
+def _range(low: float, high: float, *, digits: str = ".3g") -> str:
     if math.isinf(high):
-        return f"above {low:.3g}"
-    first, last = f"{low:.3g}", f"{high:.3g}"
+        return f"above {low:{digits}}"
+    first, last = f"{low:{digits}}", f"{high:{digits}}"
     return first if first == last else f"{first} to {last}"
 
 
@@ -68,19 +73,70 @@ def _error(point: xr.Dataset, middle: int) -> str:
     return f"numerical error {show_percent(float(moved.sum() / ends[finite].sum()) if moved.any() else 0.0)}"
 
 
-def _groups(point: xr.Dataset) -> str:
-    n_lower, n_upper = (int(number) for number in point["group_size"].values)
-    if n_upper == 0:
-        return ""
-    lower, upper = point["group_gap"].values * _MM3
-    text = f"; two groups, {n_lower} samples up to {lower:.3g} mm3 and {n_upper} from {upper:.3g} mm3"
-    contact = int(point["deciding_contact"])
-    return text if contact < 0 else f"{text}, which differ in the wear depth of contact pair {contact}"
-
-
 def _show(coordinate: xr.DataArray) -> str:
-    units = str(coordinate.attrs.get("units", "1"))
-    value = coordinate.values[()]
+    units, value = str(coordinate.attrs.get("units", "1")), coordinate.values[()]
     if coordinate.dtype.kind not in "iuf":
         return str(value)
     return f"{float(value):.10g} {units}" if units != "1" else f"{coordinate.name} {float(value):.10g}"
+
+
+# --- which input decides ---
+
+
+def measure_of(statistics: xr.Dataset) -> str | None:
+    """Name of the statistic by which the inputs are ranked; None where there is none."""
+    return next((name for name in _MEASURES if name in statistics), None)
+
+
+def _measured(point: xr.Dataset) -> tuple[Array, Array]:
+    """Estimates and intervals (n_inputs, 2) of the statistic by which the inputs are ranked."""
+    name = measure_of(point)
+    value, interval = (point[f"{name}{each}"].transpose("input", "bound").values for each in ("", "_interval"))
+    return value, interval
+
+
+def leading_input(point: xr.Dataset) -> int:
+    """Place of the input with the largest estimate, whatever its uncertainty; the first where there is none."""
+    if measure_of(point) is None:
+        return 0
+    return int(np.argmax(np.abs(np.nan_to_num(_measured(point)[0])).max(axis=1)))
+
+
+def deciding_input(point: xr.Dataset) -> int | None:
+    """Place along `input` of the input that decides most; None where the samples do not tell.
+
+    They tell where the interval of the strength of one input, a share or a correlation without its sign, is above those
+    of all others.
+    """
+    if measure_of(point) is None:
+        return None
+    ends = np.nan_to_num(_measured(point)[1])
+    least = np.where((ends[:, 0] < 0.0) & (ends[:, 1] > 0.0), 0.0, np.abs(ends).min(axis=1))
+    most = int(np.argmax(least))
+    others = np.delete(np.abs(ends).max(axis=1), most)
+    return most if least[most] > others.max(initial=0.0) else None
+
+
+def describe_ranking(point: xr.Dataset) -> str:
+    """The deciding input in words, or why none is known; "" where no input varies."""
+    name = measure_of(point)
+    if name is None:
+        return ""
+    n_samples, words = int(point["n_samples"]), [str(each).replace("_", " ") for each in point["input"].values]
+    values, intervals = _measured(point)
+    if np.isnan(values).all():
+        # two independent samples for each base sample
+        too_few = n_samples < FEWEST * (2 if name == "first_index" else 1)
+        return f"{n_samples} samples are too few to say which input decides" if too_few else ""
+    without = [word for word, row in zip(words, values, strict=True) if np.isnan(row).all()]
+    more = f"; {' and '.join(without)} {'is' if len(without) == 1 else 'are'} not ranked" if without else ""
+    most = leading_input(point)
+    low, high = intervals[most]
+    if name == "first_index":
+        share = _range(*(100.0 * values[most]).tolist(), digits=".0f")
+        shown = f"{share} % of the variance, interval {100.0 * low:.0f} to {100.0 * high:.0f} %"
+    else:
+        shown = f"rank correlation {_range(*values[most].tolist(), digits='.2f')}, interval {low:.2f} to {high:.2f}"
+    if deciding_input(point) is None:
+        return f"which input decides is not known: {words[most]} has the largest estimate ({shown}){more}"
+    return f"{words[most]} decides most ({shown}){more}"

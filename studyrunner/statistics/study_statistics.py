@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,13 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.scatter.design import SaltelliLayout
-from studyrunner.statistics.bands import Array, Band, SampleValues
-from studyrunner.statistics.indices import FEWEST, RANKS, SOBOL, rank_correlations, saltelli_indices
-from studyrunner.statistics.quantiles import exceedance, quantile
-from studyrunner.statistics.samples_of_result import (
+from studyrunner.statistics.estimates import exceedance, quantiles, rank_correlations, saltelli_indices
+from studyrunner.statistics.samples import (
     CYCLE,
     SAMPLE,
-    counted,
+    Array,
+    Band,
+    SampleValues,
     depth_samples,
     inputs_of,
     is_of_pairs,
@@ -28,8 +27,9 @@ from studyrunner.statistics.two_groups import deciding_pair, density, two_groups
 
 _N_THRESHOLDS = 41
 _N_DENSITY = 101
-_BOUND = "bound"
-_BOUNDS = ("lowest", "highest")
+_FEWEST = 2
+_MOST_VALUES, _MOST_OF_ALL = 10**6, 10**7
+"""Worn volumes of a file from which on only some of the cycle counts are used, and none: a million take some 30 s."""
 
 
 def worn_volume_statistics(
@@ -41,10 +41,10 @@ def worn_volume_statistics(
 ) -> xr.Dataset:
     """What the samples of a result say of worn volume and depth, over all its other dimensions.
 
-    Each statistic comes with a dimension `bound`: its lowest and highest value over all that samples without a value
-    may have, which are equal where all have one. Beside it stand NAME_interval, the confidence interval, and
-    NAME_error, its ends with every value less or more its numerical error. Indices and groups are of the samples
-    themselves: with saltelli, indices are of the whole design, all others of its independent rows.
+    Each statistic has a dimension `bound`: its lowest and highest value over all that samples without a value may have,
+    which are equal where all have one. NAME_interval is the confidence interval, NAME_error are the ends with every
+    value less or more its numerical error. With saltelli, indices are of the whole design, all others of its
+    independent rows.
 
     Parameters
     ----------
@@ -54,10 +54,8 @@ def worn_volume_statistics(
         Probabilities between 0 and 1, ascending.
     confidence
         Of the intervals, between 0 and 1.
-    exceed
-        m3, worn volumes whose probability of exceedance is told; 41 up to the largest volume where left out.
-    depth
-        m, depths whose probability to be exceeded before a cycle count is told; chosen likewise.
+    exceed, depth
+        Worn volumes, m3, and depths, m, whose probability of exceedance is wanted; by default 41 up to the largest.
 
     Returns
     -------
@@ -82,47 +80,47 @@ def worn_volume_statistics(
         # missions count slow time in place of cycles
         in_cycles = dataset.drop_dims("block", errors="ignore").rename(mission=CYCLE)
         return worn_volume_statistics(in_cycles, quantiles, confidence, exceed, depth).rename({CYCLE: "mission"})
-    dataset = counted(dataset)
-    everything, dims = volume_samples(dataset)
+    if "cycle_count" in dataset:
+        # each point has counts of its own: they share the last one only
+        dataset = dataset.isel({CYCLE: [-1]})
     section = scatter_of(dataset)
     layout = SaltelliLayout(len(section.inputs)) if section is not None and section.method == "saltelli" else None
-    rows = _independent(dataset.sizes[SAMPLE], layout)
+    everything, dims = volume_samples(dataset)
+    rows = np.arange(dataset.sizes[SAMPLE])
+    if layout is not None:
+        # A and B are independent samples
+        rows = rows[rows % layout.rows_per_base < 2]
     values, names = everything.at((..., rows)), list(dims)
+    found = _of_values(values, names, quantiles, confidence, exceed)
+    depths = depth_samples(dataset)
+    if depths is not None:
+        of_depth = depths[0].at((..., rows))
+        axis = _axis("exceeded_depth", _thresholds(depth, of_depth), "m", "wear depth")
+        words = "probability that a pair is worn deeper before this count"
+        band = exceedance(of_depth, axis.values, confidence)
+        found |= _band_arrays("wear_depth_exceedance", words, "1", band, list(depths[1]), axis)
+    found |= _of_inputs(dataset, everything, layout, confidence, names)
+    found |= _of_groups(dataset, values, rows, dims)
+    kept = {name: array for name, array in dataset.coords.items() if set(array.dims) <= set(dims)}
+    return xr.Dataset(found, kept, {"title": f"Statistics of {len(rows)} samples", "confidence": confidence})
 
-    axis = _axis("quantile", quantiles, "1", "probability")
-    band = _stacked(values, quantiles, confidence)
+
+def _of_values(
+    values: SampleValues,
+    names: list[Hashable],
+    probabilities: Sequence[float],
+    confidence: float,
+    exceed: ArrayLike | None,
+) -> dict[str, xr.DataArray]:
+    axis = _axis("quantile", probabilities, "1", "probability")
+    band = quantiles(values, probabilities, confidence)
     found = _band_arrays("worn_volume_quantile", "quantile of worn volume", "m3", band, names, axis)
     axis = _axis("exceeded_volume", _thresholds(exceed, values), "m3", "worn volume")
     band = exceedance(values, axis.values, confidence)
     found |= _band_arrays("worn_volume_exceedance", "probability of a larger worn volume", "1", band, names, axis)
-
-    depths = depth_samples(dataset)
-    if depths is not None:
-        depth_values = depths[0].at((..., rows))
-        axis = _axis("exceeded_depth", _thresholds(depth, depth_values), "m", "wear depth")
-        band = exceedance(depth_values, axis.values, confidence)
-        long_name = "probability that a pair is worn deeper before this count"
-        found |= _band_arrays("wear_depth_exceedance", long_name, "1", band, list(depths[1]), axis)
-
-    found |= _index_arrays(dataset, everything, layout, confidence, names)
-    found["n_samples"] = _array(np.int32(values.n_samples), [], "1", "samples")
+    found["n_samples"] = _array(np.int32(values.low.shape[-1]), [], "1", "samples")
     n_without = (~values.is_known).sum(axis=-1)
-    found["n_without_value"] = _array(n_without, names, "1", "samples without a value to be trusted")
-    found |= _group_arrays(dataset, values, rows, dims)
-    kept = {name: array for name, array in dataset.coords.items() if set(array.dims) <= set(dims)}
-    return xr.Dataset(found, kept, {"title": f"Statistics of {values.n_samples} samples", "confidence": confidence})
-
-
-def _independent(n_rows: int, layout: SaltelliLayout | None) -> NDArray[np.intp]:
-    """Rows that are independent samples: all, or A and B of a Saltelli design."""
-    rows = np.arange(n_rows)
-    return rows if layout is None else rows[rows % layout.rows_per_base < 2]
-
-
-def _stacked(values: SampleValues, probabilities: Sequence[float], confidence: float) -> Band:
-    """Quantiles (..., n_probabilities)."""
-    bands = [quantile(values, each, confidence) for each in probabilities]
-    return Band(*(np.stack([getattr(band, each.name) for band in bands], axis=-1) for each in fields(Band)))
+    return found | {"n_without_value": _array(n_without, names, "1", "samples without a value to be trusted")}
 
 
 def _thresholds(given: ArrayLike | None, values: SampleValues) -> Array:
@@ -132,17 +130,14 @@ def _thresholds(given: ArrayLike | None, values: SampleValues) -> Array:
 
 
 def _axis(name: str, values: Sequence[Any] | Array, units: str, long_name: str) -> xr.DataArray:
-    attributes = {"units": units, "long_name": long_name}
-    return xr.DataArray(
-        np.asarray(values), dims=[name], coords={name: (name, np.asarray(values), attributes)}, name=name
-    )
+    along = xr.Variable(name, np.asarray(values), {"units": units, "long_name": long_name})
+    return xr.DataArray(along, coords={name: along})
 
 
 def _band_arrays(
-    name: str, long_name: str, units: str, band: Band, dims: list[Hashable], axis: xr.DataArray | None = None
+    name: str, long_name: str, units: str, band: Band, dims: list[Hashable], axis: xr.DataArray
 ) -> dict[str, xr.DataArray]:
-    """NAME, NAME_interval and NAME_error. axis: of the last dimension, if it is no axis of the result."""
-    coordinates = {} if axis is None else dict(axis.coords)
+    """NAME, NAME_interval and NAME_error. axis: of the last dimension but `bound`."""
     found = {}
     for suffix, low, high, words in (
         ("", band.lowest, band.highest, ""),
@@ -153,17 +148,13 @@ def _band_arrays(
         if not name.endswith("correlation"):
             # no other quantity here is below 0
             ends = np.maximum(ends, 0.0)
-        array = _array(ends, [*dims, *coordinates, _BOUND], units, long_name + words)
-        found[name + suffix] = array.assign_coords({**coordinates, _BOUND: list(_BOUNDS)})
+        array = _array(ends, [*dims, *axis.dims, "bound"], units, long_name + words)
+        found[name + suffix] = array.assign_coords({**axis.coords, "bound": ["lowest", "highest"]})
     return found
 
 
-def _index_arrays(
-    dataset: xr.Dataset,
-    values: SampleValues,
-    layout: SaltelliLayout | None,
-    confidence: float,
-    dims: list[Hashable],
+def _of_inputs(
+    dataset: xr.Dataset, values: SampleValues, layout: SaltelliLayout | None, confidence: float, dims: list[Hashable]
 ) -> dict[str, xr.DataArray]:
     """What each input decides; nothing where nothing scatters."""
     inputs = inputs_of(dataset)
@@ -172,43 +163,37 @@ def _index_arrays(
     table = np.stack(list(inputs.values()), axis=1)
     axis = _axis("input", list(inputs), "1", "input that scatters")
     if layout is None:
-        method, comment = RANKS, "Of an input with a draw for each pair nothing is said; the method saltelli does."
         words = "rank correlation of the worn volume with the input"
         band = rank_correlations(table, values, confidence)
         found = _band_arrays("rank_correlation", words, "1", band, dims, axis)
         of_one_draw = xr.DataArray([not is_of_pairs(dataset, each) for each in inputs], dims="input")
-        found = {name: array.where(of_one_draw) for name, array in found.items()}
-    else:
-        method, comment = SOBOL, "Of an input with a draw for each pair: what all of them decide together."
-        words = "share of the variance that the input decides"
-        first, total = saltelli_indices(layout, table, values, confidence)
-        found = _band_arrays("first_index", f"{words} alone", "1", first, dims, axis)
-        found |= _band_arrays("total_index", f"{words}, with the others", "1", total, dims, axis)
-    for array in found.values():
-        array.attrs |= {"method": method, "comment": comment, "fewest": FEWEST}
-    return found
+        # the mean over the pairs says nothing of what their own draws decide
+        return {name: array.where(of_one_draw) for name, array in found.items()}
+    words = "share of the variance that the input decides"
+    first, total = saltelli_indices(layout, table, values, confidence)
+    found = _band_arrays("first_index", f"{words} alone", "1", first, dims, axis)
+    return found | _band_arrays("total_index", f"{words}, with the others", "1", total, dims, axis)
 
 
-def _group_arrays(
+def _of_groups(
     dataset: xr.Dataset, values: SampleValues, rows: NDArray[np.intp], dims: Mapping[Hashable, int]
 ) -> dict[str, xr.DataArray]:
     """Density and groups at the last count."""
     axes = [name for name in dims if name != CYCLE]
     shape = tuple(dims[name] for name in axes)
-    place = tuple(-1 if name == CYCLE else slice(None) for name in dims)
-    at_last = values.at(place)
+    at_last = values.at(tuple(-1 if name == CYCLE else slice(None) for name in dims))
+    name = next((name for name in ("wear_depth_last", "wear_depth") if name in dataset), "")
     depths = None
-    name = "wear_depth_last" if "wear_depth_last" in dataset else "wear_depth"
-    if name in dataset:
+    if name:
         depths = dataset[name].isel({CYCLE: -1}, missing_dims="ignore").isel({SAMPLE: rows})
         depths = depths.transpose(*axes, SAMPLE, "contact")
-    grid, curve = np.full((*shape, _N_DENSITY), np.nan), np.full((*shape, _N_DENSITY), np.nan)
+    grid, curve = np.full((2, *shape, _N_DENSITY), np.nan)
     sizes, gap = np.zeros((*shape, 2), dtype=np.int32), np.full((*shape, 2), np.nan)
     contact = np.full(shape, -1, dtype=np.int32)
     for point in np.ndindex(shape):
         samples = at_last.at(point)
         groups, known = two_groups(samples), samples.low[samples.is_known]
-        sizes[point] = (known.size, 0) if groups is None else (groups.n_lower, groups.n_upper)
+        sizes[point] = (known.size, 0) if groups is None else groups.sizes
         if known.size:
             margin = 0.1 * float(np.ptp(known))
             grid[point] = np.linspace(max(known.min() - margin, 0.0), known.max() + margin, _N_DENSITY)
@@ -228,3 +213,19 @@ def _group_arrays(
 
 def _array(values: NDArray[Any] | np.int32, dims: Sequence[Hashable], units: str, long_name: str) -> xr.DataArray:
     return xr.DataArray(values, dims=list(dims), attrs={"units": units, "long_name": long_name})
+
+
+def statistics_of_file(dataset: xr.Dataset, quantiles: Sequence[float]) -> xr.Dataset | None:
+    """`worn_volume_statistics` at all counts, or at some of these, evenly spaced, where a file has many.
+
+    None without samples, without worn volumes, or with too many of them.
+    """
+    if dataset.sizes.get(SAMPLE, 0) < _FEWEST or "worn_volume" not in dataset:
+        return None
+    counts = dataset.sizes[CYCLE]
+    per_count = dataset["worn_volume"].size // counts
+    if 2 * per_count > _MOST_OF_ALL:
+        return None
+    kept = min(counts, max(2, _MOST_VALUES // per_count))
+    places = np.unique(np.linspace(0, counts - 1, kept).astype(int))
+    return worn_volume_statistics(dataset.isel({CYCLE: places}), quantiles)

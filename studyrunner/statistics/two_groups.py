@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from studyrunner.statistics.bands import Array, SampleValues
+from studyrunner.statistics.samples import Array, SampleValues
 
 _FALSE_ALARMS = 0.005
-"""Bound of the probability that samples of one group are told as two."""
+"""Bound of the probability that samples of one group are taken for two."""
 _FEWEST_SPACINGS = 2
 """In each group: with one a gap passes at ratios that no joint has."""
 
@@ -32,14 +32,9 @@ class Groups:
     is_placed: NDArray[np.bool_]
 
     @property
-    def n_lower(self) -> int:
-        """Samples below the gap."""
-        return int(np.count_nonzero(self.is_placed & ~self.is_upper))
-
-    @property
-    def n_upper(self) -> int:
-        """Samples above the gap."""
-        return int(np.count_nonzero(self.is_placed & self.is_upper))
+    def sizes(self) -> tuple[int, int]:
+        """Numbers of samples below and above the gap."""
+        return int((self.is_placed & ~self.is_upper).sum()), int((self.is_placed & self.is_upper).sum())
 
 
 def two_groups(values: SampleValues) -> Groups | None:
@@ -52,8 +47,12 @@ def two_groups(values: SampleValues) -> Groups | None:
     numerical errors beside it. Of the gaps that pass the longest is taken. A sample whose error is more than half of
     the range of all samples may lie on either side of a gap and counts as one without a value.
     """
-    values = _without_vague(values)
-    known = values.is_known
+    known, wide = values.is_known, values.widened
+    if known.any():
+        vague = known & (values.error > 0.5 * np.ptp(values.low[known]))
+        low, high = np.where(vague, wide.low, values.low), np.where(vague, wide.high, values.high)
+        values = SampleValues(low, high, np.where(vague, 0.0, values.error))
+        known = values.is_known
     order = np.argsort(values.low[known], kind="stable")
     sample, error = values.low[known][order], values.error[known][order]
     gap, number = np.diff(sample), np.arange(len(sample) - 1)
@@ -70,17 +69,10 @@ def two_groups(values: SampleValues) -> Groups | None:
     return Groups(lower, upper, is_upper, is_upper | (values.high < upper))
 
 
-def _without_vague(values: SampleValues) -> SampleValues:
-    known = values.is_known
-    if not known.any():
-        return values
-    vague = known & (values.error > 0.5 * np.ptp(values.low[known]))
-    wide = values.widened
-    return SampleValues(
-        np.where(vague, wide.low, values.low),
-        np.where(vague, wide.high, values.high),
-        np.where(vague, 0.0, values.error),
-    )
+def _chance(gap: Array, number: NDArray[np.intp], length: Array) -> Array:
+    """Probability of a gap beside so many spacings of this length in all on one side, if they are of one density."""
+    share = np.divide(length, length + gap, out=np.ones(len(gap)), where=length + gap > 0.0)
+    return np.asarray(share**number)
 
 
 def density(values: SampleValues, groups: Groups | None, grid: Array) -> Array:
@@ -117,9 +109,3 @@ def deciding_pair(depths: Array, groups: Groups) -> int | None:
     distance = np.abs(above.mean(axis=0) - below.mean(axis=0))
     ratio = np.divide(distance, width, out=np.full(len(width), np.inf), where=width > 0.0)
     return int(np.argmax(np.where(apart, ratio, -1.0))) if apart.any() else None
-
-
-def _chance(gap: Array, number: NDArray[np.intp], length: Array) -> Array:
-    """Probability of a gap beside so many spacings of this length in all on one side, if they are of one density."""
-    share = np.divide(length, length + gap, out=np.ones(len(gap)), where=length + gap > 0.0)
-    return np.asarray(share**number)

@@ -38,19 +38,19 @@ class MissionBlock(Section):
 
     name: Annotated[str, AfterValidator(_check_name)] = Field(description="of the block, a coordinate of the result")
     frequency: Positive | Annotated[dict[str, Positive], AfterValidator(_check_passage)] | None = Field(
-        None, description="Hz; a number, or {start, stop, rate} of a passage, whose rate is in Hz/s"
+        None, description="Hz; or {start, stop, rate}: a passage, with rate in Hz/s; that of [axes] if missing"
     )
     engine_order: Positive | None = Field(
-        None, description="in place of a frequency: frequency over rotation_speed, which is in revolutions per second"
+        None, description="in place of a frequency, which is then the order times rotation_speed / 60"
     )
-    cycles: Positive | None = Field(None, description="cycles of steady vibration in one mission; or seconds")
-    seconds: Positive | None = Field(None, description="duration of steady vibration in one mission, s; or cycles")
+    cycles: Positive | None = Field(None, description="of steady vibration in one mission; or seconds")
+    seconds: Positive | None = Field(None, description="s, of steady vibration in one mission; or cycles")
     begin: Literal["ramp", "sweep", "continue"] = Field(
         "ramp",
-        description="how the block begins: by raising the excitation, by a sweep, or from the last state of the block"
-        " before; a passage is a sweep",
+        description="the excitation rises from the static state, a sweep as axes.sweep says, or from the last state"
+        " of the block before; a passage is a sweep",
     )
-    excitation_amplitude: Positive | None = Field(None, description="N; that of [axes] where it is left out")
+    excitation_amplitude: Positive | None = Field(None, description="N; that of [axes] if missing")
     parameters: dict[str, Any] = Field(default_factory=dict, exclude=True)
 
     def rules(self) -> Iterator[Wrong]:

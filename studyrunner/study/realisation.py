@@ -23,7 +23,8 @@ from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, WrongValueError
 from studyrunner.values import Wrong
 
-_NO_PAIRS = ScatteredPairs(("",), np.full((1, 3), np.nan))
+_NO_PAIRS = ScatteredPairs(("",), np.zeros((1, 3)))
+"""Stands for the pairs where inputs are drawn that do not belong to pairs."""
 
 
 @dataclass(frozen=True)

@@ -43,9 +43,9 @@ class SceneSection(Section):
     offers: names in `outputs.variables` that this scene knows and not every scene knows.
     """
 
-    model: str
+    model: str = Field(description="name of a bundled scene, or path of a scene file or a deck, beside the study file")
     parameters: SerializeAsAny[BaseModel]
-    worn: Worn | None = None
+    worn: Worn | None = Field(None, description="wear before the history begins")
     path: Path | None = Field(None, exclude=True)
     group: str = Field("", exclude=True)
     files: ModelFiles | None = Field(None, exclude=True)

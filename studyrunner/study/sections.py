@@ -102,25 +102,28 @@ _Knots = Annotated[Listed[float], Field(min_length=1, max_length=_MOST_KNOTS), A
 class StudySection(Section):
     """[study]: name and title of the study."""
 
-    name: Annotated[str, AfterValidator(_check_name)] = Field(description="name of the study and of its result file")
-    title: str = Field("", description="goes into the result")
+    name: Annotated[str, AfterValidator(_check_name)] = Field(description="of the study and of its result file")
+    title: str = Field("", description="of the result")
 
 
 class AxesSection(Section):
     """[axes]: every axis becomes a dimension of the result, in the order of the values given here."""
 
     frequency: Annotated[Axis[Positive], BeforeValidator(_check_word)] = Field(
-        description='Hz; a number, a list or {start, stop, num}; or "resonance" or "peak", see [loading]'
+        description='Hz; or "resonance" or "peak", followed in the range of [loading]; not for modes and missions'
     )
-    wear_coefficient: Axis[NotNegative] = Field((1.1e-11,), description="1/Pa")
-    excitation_amplitude: Axis[Positive] = Field((1.0,), description="N, multiplies the scene's unit harmonic load")
-    step: Axis[Positive] = Field((1000.0,), description="h, cycles; the adaptive scheme chooses its own")
-    scheme: Axis[Scheme] = Field(("adaptive",), description="of the wear steps")
+    frequency_ratio: Axis[Positive] | None = Field(
+        None, description="in place of frequency: over the first natural frequency of the same scene, all pairs stuck"
+    )
+    wear_coefficient: Axis[NotNegative] = Field((1.1e-11,), description="1/Pa, of the law of [wear]")
+    excitation_amplitude: Axis[Positive] = Field((1.0,), description="N, factor of the harmonic load of the scene")
+    step: Axis[Positive] = Field((1000.0,), description="h, cycles: length of implicit and explicit steps")
+    scheme: Axis[Scheme] = Field(("adaptive",), description="how wear is integrated over the cycles")
     sweep: Axis[Sweep] = Field(
-        ("up",), description="how the unworn state is reached: along the frequency, or by raising the excitation"
+        ("up",), description="how the unworn state is reached: the frequency rises, or falls, or the excitation rises"
     )
     modal_amplitude: Axis[Positive] | None = Field(
-        None, description="m sqrt(kg), of nonlinear modes, in place of frequency and excitation"
+        None, description="m sqrt(kg), of nonlinear modes, in place of a frequency"
     )
     mode: Axis[Mode] | None = Field(None, description="number of the nonlinear mode, by frequency, from 1 on")
     harmonics: Axis[Harmonics] | None = Field(None, description="harmonics above the static one")
@@ -138,16 +141,14 @@ class WearSection(Section):
     TAKEN: ClassVar = {"threshold": ("threshold",), "table": ("pressure", "depth", "factor")}
     """Keys of the laws that take any, beside `surfaces`, which all take."""
 
-    law: Literal["archard", "energy", "threshold", "table"] = Field(
-        "archard", description="what of the slip work wears"
-    )
+    law: Literal["archard", "energy", "threshold", "table"] = Field("archard", description="what wears")
     threshold: NotNegative | None = Field(
         None, description="J/m2, slip work per area in a cycle below which nothing wears"
     )
-    pressure: _Knots | None = Field(None, description="Pa, mean over a period, of the rows of the table")
-    depth: _Knots | None = Field(None, description="m, worn depth, of the columns of the table")
+    pressure: _Knots | None = Field(None, description="Pa, ascending: mean over a period, of the rows of factor")
+    depth: _Knots | None = Field(None, description="m, ascending: worn depth, of the columns of factor")
     factor: Listed[Listed[NotNegative]] | None = Field(
-        None, description="of wear_coefficient, a list of rows of the table, one for each pressure"
+        None, description="of wear_coefficient, for the law table: a list of rows, one for each pressure"
     )
     surfaces: dict[str, NotNegative] | None = Field(
         None, description="factor of wear_coefficient on each surface of the scene, as {flat = 1.0, cylinder = 0.5}"
@@ -195,29 +196,29 @@ class SlowTimeSection(Section):
     """[slow_time]: end of the histories, and cycle counts of the output."""
 
     cycles: Cycles = Field(
-        100_000.0, description="cycles; 0 for the unworn states only, inf: until nothing wears any more"
+        100_000.0, description="of vibration; 0: the unworn states only, inf: until nothing wears any more"
     )
     missions: Annotated[Whole, Field(ge=1, le=10_000_000)] | None = Field(
         None, description="how often the blocks under [[mission]] are repeated, in place of cycles"
     )
     final_share: Fraction = Field(
-        1e-4, description="of the largest wear rate of each pair: below it nothing wears any more, with cycles = inf"
+        1e-4,
+        description="with cycles = inf: share of its largest wear rate below which a pair wears no more",
     )
     outputs: (
         Annotated[Whole, Field(ge=1, le=1_000_000)]
         | Annotated[Listed[NotNegative], Field(min_length=1), AfterValidator(ascending)]
     ) = Field(
         101,
-        description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts; with"
-        " cycles = inf their number, spaced evenly in worn volume and cycles",
+        description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts",
     )
     until: Annotated[dict[str, Positive], AfterValidator(_check_target)] | None = Field(
         None,
-        description="wear at which a point ends, {wear_depth = m of the deepest pair}, {worn_volume = m3}, or"
-        " {frequency_shift = relative change of the resonance of the vibration}",
+        description="wear at which a point ends: {wear_depth = 1e-5}, m, of the deepest pair, {worn_volume = 1e-9}, m3,"
+        " or {frequency_shift = 0.01}, relative change of the resonance",
     )
     largest_depth: Positive | None = Field(
-        None, description="m; the explicit scheme then wears no pair deeper than this in a step, Eq. (22), for any h"
+        None, description="m, that a pair wears in an explicit step, Eq. (22); in place of step"
     )
 
     def rules(self) -> Iterator[Wrong]:
@@ -243,32 +244,26 @@ class SlowTimeSection(Section):
 class SolverSection(Section):
     """[solver]: resolution and accuracy. A key under [axes] replaces the key here."""
 
-    harmonics: Harmonics = Field(AUTO, description="harmonics above the static one")
-    samples: Samples = Field(AUTO, description="time samples in a period")
+    harmonics: Harmonics = Field(AUTO, description="or number of harmonics above the static one")
+    samples: Samples = Field(AUTO, description="or number of time samples in a period, more than twice the harmonics")
     tolerance: Fraction = Field(1e-8, description="of the scaled residual")
-    rtol: Fraction = Field(1e-2, description="relative error that automatic settings and adaptive steps aim at")
-    shortcuts: bool = Field(
-        True, description="whether points with the same history share one; false: every point is computed on its own"
-    )
-    time_limit: Positive | None = Field(
-        None, description="s, CPU time that a start state or a wear history may take; none unless it is given"
-    )
+    rtol: Fraction = Field(1e-2, description="aim for the relative error of worn volume and response")
+    shortcuts: bool = Field(True, description="whether points with the same history share one")
+    time_limit: Positive | None = Field(None, description="s, CPU time that a start state or a wear history may take")
 
 
 class OutputsSection(Section):
     """[outputs]: variables of the result; `outcome` and the totals of a point are always there."""
 
     variables: Annotated[Listed[str], BeforeValidator(_check_variables), AfterValidator(once)] = Field(
-        (DEFAULT,), description="list of names of result variables"
+        (DEFAULT,), description="list of names; default stands for the usual ones, see RESULT_FILE.md"
     )
     loops: Annotated[
         Listed[Annotated[Whole, Field(ge=0, le=1_000_000)]],
         AfterValidator(once),
         AfterValidator(lambda loops: tuple(sorted(loops))),
-    ] = Field((), description="list of the indices of the contact pairs whose fretting loops are kept")
-    scene: bool = Field(
-        False, description="whether the reduced model of a bundled scene is kept, as that of a scene file always is"
-    )
+    ] = Field((), description="list of the contact pairs, from 0 on, whose fretting loops are stored")
+    scene: bool = Field(False, description="whether the result holds the reduced model of a bundled scene")
 
 
 class LoadingSection(Section):

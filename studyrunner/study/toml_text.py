@@ -58,7 +58,7 @@ def format_toml(tables: Mapping[str, Any]) -> str:
     for name, section in tables.items():
         for table in section if isinstance(section, list | tuple) else [section] if section else []:
             lines.append(f"[[{name}]]" if table is not section else f"[{name}]")
-            lines += [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None]
+            lines += [f"{_key(key)} = {toml_value(value)}" for key, value in table.items() if value is not None]
     return "\n".join(lines) + "\n"
 
 
@@ -67,9 +67,10 @@ def _key(key: str) -> str:
     return key if _BARE_KEY.fullmatch(key) else json.dumps(key, ensure_ascii=False)
 
 
-def _value(value: object) -> str:
+def toml_value(value: object) -> str:
+    """A value on one line, as TOML."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
+        return "{" + ", ".join(f"{_key(key)} = {toml_value(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
     return "inf" if value == math.inf else json.dumps(value, ensure_ascii=False)

@@ -15,20 +15,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, describe_ended
-from studyrunner.result.missions import as_history
-from studyrunner.result.points import COMPLETE_WORDS
-from studyrunner.result.sample_statistics import SAMPLE
 from studyrunner.result.units import show_number
-from studyrunner.result.view import Result
-from studyrunner.statistics.ranking import describe_ranking
-from studyrunner.statistics.sentence import describe_volumes
+from studyrunner.result.view import COMPLETE_WORDS, Result, as_history
+from studyrunner.statistics.samples import SAMPLE
+from studyrunner.statistics.sentence import describe_ranking, describe_volumes
 from studyrunner.summary.doubts import doubts
-from studyrunner.summary.mesh_change import MeshChange, compare_meshes
 from studyrunner.summary.wear import (
     Life,
+    MeshChange,
     MostWear,
     NothingWore,
     Vibration,
+    compare_meshes,
     most_wear,
     shortest_life,
     vibration_of,
@@ -187,7 +185,7 @@ def _failures(result: Result) -> tuple[Failure, ...]:
         if ending.word == "sensitive" or not lines:
             # what the message of a sensitive one holds is no result
             place = np.argwhere(result.dataset["outcome"].values == number)[0]
-            lines = [where_is(result, dict(zip(result.axes, map(int, place), strict=True)))]
+            lines = [where_is(result, result.point_at(place))]
         first = re.split(r"[.:](?:\s|$)", ending.sentence)[0]
         advice = " ".join(advise_ended(result, number)[:1]).rstrip(".")
         found.append(Failure(ending.word, is_complete, n_points, first, advice, lines[0]))

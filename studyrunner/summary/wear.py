@@ -1,4 +1,4 @@
-"""Where a joint wears most, how much and how deep; why nothing wore; where its resonance went; how long it lives."""
+"""Where a joint wears most, how much and how deep; why nothing wore; its resonance, its life, the effect of meshes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.result.points import WELL_ENOUGH
 from studyrunner.result.scene_pairs import last_depth, tells_depth
-from studyrunner.result.view import NO_VOLUME, Result
+from studyrunner.result.view import NO_VOLUME, WELL_ENOUGH, Result
 
 _NO_SLIP = 1e-12  # m, round-off: less than the size of an atom
 
@@ -107,6 +106,19 @@ class Life:
     n_unsure: int = 0
 
 
+@dataclass(frozen=True)
+class MeshChange:
+    """How far the worn volumes of two meshes are apart, relative: in the median and at most.
+
+    at: "at the resonance", "at equal frequency ratio".
+    """
+
+    meshes: tuple[float, float]
+    at: str
+    median: float
+    largest: float
+
+
 def where_is(result: Result, point: dict[str, int]) -> str:
     """A point in words, along the axes that vary; where none does, its frequency."""
     return result.describe(point, result.varying or ("frequency",))
@@ -121,7 +133,7 @@ def most_wear(result: Result) -> MostWear | NothingWore | None:
     if worn.max() <= NO_VOLUME:
         return _nothing(result, best)
     place = np.unravel_index(int(np.argmax(worn)), worn.shape)
-    point = {name: int(index) for name, index in zip(result.axes, place, strict=True)}
+    point = result.point_at(place)
     volume, at = float(worn[place]), result.last_kept(point)
     return MostWear(
         point,
@@ -255,7 +267,27 @@ def shortest_life(result: Result) -> Life | None:
         return Life(str(quantity), float(target), Number(math.nan), "", beyond, n_unsure)
     place = np.unravel_index(int(np.nanargmin(lives)), lives.shape)
     error = float(errors[place])
-    point = {name: int(index) for name, index in zip(result.axes, place, strict=True)}
+    point = result.point_at(place)
     return Life(
         str(quantity), float(target), Number(float(lives[place]), error), where_is(result, point), beyond, n_unsure
     )
+
+
+def compare_meshes(result: Result) -> MeshChange | None:
+    """How far worn volumes of the two finest meshes are apart, at equal distance to the resonance; else None.
+
+    The resonance moves with the mesh: at one frequency one mesh may wear a multiple of the other.
+    """
+    at = f"at the {result.followed}" if result.followed else ""
+    at = at or ("at equal frequency ratio" if "frequency_ratio" in result.axes else "")
+    if not at or "mesh" not in result.varying or not result.wears or not result.has("worn_volume"):
+        return None
+    meshes = result.dataset["mesh"].values.astype(float)
+    two = np.argsort(meshes)[-2:]
+    volumes = np.where(result.best_known, result.worn, np.nan).take(two, axis=result.axes.index("mesh"))
+    coarse, fine = np.moveaxis(volumes, result.axes.index("mesh"), 0)
+    larger = np.fmax(coarse, fine)
+    apart = np.abs(fine - coarse) / np.where(larger > NO_VOLUME, larger, np.nan)
+    if np.isnan(apart).all():
+        return None
+    return MeshChange((meshes[two[0]], meshes[two[1]]), at, float(np.nanmedian(apart)), float(np.nanmax(apart)))

@@ -13,7 +13,7 @@ from solver import (
     frequency_response,
     response_curve,
 )
-from solver.stability.multipliers import Multipliers
+from solver.stability.floquet import Multipliers
 from tests.event_driven import close_orbit
 from tests.references import vibro_impact_orbit
 from tests.solver.models import OMEGA, cyclic_model, random_model, scene

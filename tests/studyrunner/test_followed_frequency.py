@@ -8,7 +8,7 @@ import xarray as xr
 
 from studyrunner.cli import main
 from studyrunner.report.drawing import Drawing
-from studyrunner.report.figures.volume import draw_excitation
+from studyrunner.report.figures.history import draw_excitation
 from studyrunner.result.view import Result
 from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.test_scene_axes import arguments, compute
@@ -73,7 +73,7 @@ def test_every_point_without_a_resonance_says_why(capsys):
 def test_the_report_draws_the_frequency_over_cycles():
     found = computed("drawn.nc")
     result = Result(Path("drawn.nc"), found)
-    (drawing,) = draw_excitation(result)
+    drawing = draw_excitation(result)
     assert isinstance(drawing, Drawing)
     lines = drawing.figure.axes[0].get_lines()
     followed = found.excitation_frequency.squeeze().values

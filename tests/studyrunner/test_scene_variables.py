@@ -8,7 +8,7 @@ import xarray as xr
 
 from studies.finite_element.joint.reduction import GluedStructureError, Reduction
 from studyrunner.cli import main
-from studyrunner.plan.planning import build_tasks
+from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
 from studyrunner.scene import computed
 from studyrunner.scene.scene import build_study_scene
@@ -18,7 +18,7 @@ from studyrunner.study.sections import WearSection
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, fake_histories
-from tests.studyrunner.made_results import build_dataset, write_dataset
+from tests.studyrunner.results import build_dataset, write_dataset
 from tests.studyrunner.test_write_result import write_study
 
 SLIDER = ("axes.frequency=[160, 60, 150]", "slow_time.outputs=3", "axes.excitation_amplitude=[10, 11]")

@@ -26,6 +26,7 @@ harmonics = 5
 MODES = '[study]\nname = "m"\n[scene]\nmodel = "sdof_slider"\n[axes]\nmodal_amplitude = [1e-3, 1e-4]\n'
 FOLLOWED = SLIDER.replace("[150.0]", '"peak"\n[loading]\nbetween = [180.0, 230.0]')
 SAMPLES = SLIDER + "[scatter]\nsamples = 8\nfriction_coefficient = {normal = {std = 0.03}}\n"
+RATIO = SLIDER.replace("frequency =", "frequency_ratio =")
 END = SLIDER.replace("cycles = 0", "cycles = inf")
 MISSIONS = faked_blocks.STUDY
 DRAW = "scatter.friction_coefficient"
@@ -95,6 +96,10 @@ WRONG = [
     (SLIDER + '"\\u001b]0;x\\u0007" = 1\n', "", r"solver.\x1b]0;x\x07 = 1: unknown key"),
     (SLIDER.replace("[150.0]", "1e999999999"), "", "axes.frequency = inf: .. finite"),
     (SLIDER, "scene.model=./s.toml", "model: .. no HDF5 file"),
+    (SLIDER, "axes.frequency_ratio=1.0", "axes.frequency = [150.0]: .. one of both"),
+    (RATIO, "", "axes.frequency_ratio = [150.0]: .. nothing that has mass"),
+    (RATIO, "axes.frequency_ratio=-1", "axes.frequency_ratio = -1: .. above"),
+    (SAMPLES.replace("[150.0]", "1\nfrequency_ratio = 1"), "axes.frequency={}", "axes.frequency = {}: .. one of both"),
     # axes that are keys of [scene] or [wear]
     (SLIDER, "axes.friction_coefficient={}", "axes.friction_coefficient = {}: .. a list"),
     (SLIDER, "axes.friction_coefficient=[0.3, nan]", "axes.friction_coefficient = nan: .. finite"),

@@ -10,8 +10,7 @@ import xarray as xr
 
 from studyrunner.scatter.drawn_values import ScatteredPairs, drawn
 from studyrunner.scatter.section import ScatterSection
-from studyrunner.statistics.ranking import deciding_input, describe_ranking
-from studyrunner.statistics.sentence import sentences
+from studyrunner.statistics.sentence import deciding_input, describe_ranking, sentences
 from studyrunner.statistics.study_statistics import worn_volume_statistics
 
 SCATTER = """\
@@ -103,13 +102,10 @@ def test_correlations_tell_which_input_decides():
 @pytest.mark.parametrize(
     ("noise", "n", "says"),
     [
+        # correlations -0.60 and 0.995 of six samples, as they may come by chance
         (0.0, 6, "6 samples are too few to say which input decides"),
         (0.1, 12, r"wear coefficient decides most \(rank correlation 0\.\d\d, interval 0\.\d\d to (0\.9\d|1\.00)\)"),
-        (
-            30.0,
-            12,
-            r"which input decides is not known: \w+ coefficient has the largest estimate \(rank .*, interval .*\)",
-        ),
+        (30.0, 12, r"which input decides is not known: \w+ coefficient has the largest .*\(rank .*, interval .*\)"),
     ],
 )
 def test_a_ranking_says_its_uncertainty_and_none_is_made_of_too_few_samples(noise, n, says):
@@ -130,7 +126,6 @@ def test_a_ranking_says_its_uncertainty_and_none_is_made_of_too_few_samples(nois
 def test_a_saltelli_design_is_read_as_one():
     found = worn_volume_statistics(result(SCATTER.replace('"sobol"', '"saltelli"').replace("128", "256")))
     assert found.attrs["title"] == "Statistics of 512 samples"
-    assert "scipy" in found["total_index"].attrs["method"]
     np.testing.assert_allclose(found["total_index"].isel(cycle=-1, bound=0), [[0.02, 0.98, 0.0]] * 2, atol=0.06)
 
 
@@ -151,7 +146,7 @@ def test_samples_without_a_value_and_sensitive_ones_are_bands():
     lowest = found["worn_volume_quantile"].isel(frequency=0, cycle=-1, quantile=0, bound=0)
     assert lowest == pytest.approx(np.sort(low)[6])
     # what the missing samples may have is no part of the numerical error
-    said = r"\(numerical error 1 %\); 2 without a value to be trusted; wear coefficient decides most \(rank corr"
+    said = r"\(numerical error 1 %\); 2 have no volume that can be trusted; wear coefficient decides most \(rank corr"
     assert re.search(said, sentences(found)[0])
     # with more than 5 % of them there is no upper end
     part["worn_volume"][0, 8:20, 2], low[8:20] = np.nan, whole["worn_volume"][0, 8:20, 1]

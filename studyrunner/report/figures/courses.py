@@ -1,4 +1,4 @@
-"""The horizontal axis of figures over an axis of the study, and the values of the file along it."""
+"""What figures are drawn over: an axis of the study, or slow time."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import line_style, set_log
-from studyrunner.result.units import scale_for, units_of
+from studyrunner.report.drawing import FloatArray, line_style, set_log
+from studyrunner.result.units import Scale, scale_for, units_of
 from studyrunner.result.view import Result
 
 _DECADES = 30.0
@@ -28,12 +28,12 @@ class Course:
 
     axis: str
     index: NDArray[np.intp]
-    values: NDArray[np.float64]
+    values: FloatArray
     label: str
     name: str
     logarithmic: bool
 
-    def read(self, result: Result, name: str, point: Mapping[str, int]) -> NDArray[np.float64]:
+    def read(self, result: Result, name: str, point: Mapping[str, int]) -> FloatArray:
         """A variable along the course, at a point whose index along it does not matter: (n, what follows the axes)."""
         where = {axis: place for axis, place in point.items() if axis != self.axis}
         values = result.read(name).isel(where).transpose(self.axis, ...).values
@@ -49,10 +49,10 @@ class Course:
         return result.describe({self.axis: int(self.index[place])}, [self.axis])
 
     @property
-    def edges(self) -> NDArray[np.float64]:
+    def edges(self) -> FloatArray:
         """Edges (n + 1,) of cells around the values, as shown."""
         if self.logarithmic:
-            found: NDArray[np.float64] = np.exp(cell_edges(np.log(self.values)))
+            found: FloatArray = np.exp(cell_edges(np.log(self.values)))
             return found
         return cell_edges(self.values)
 
@@ -83,10 +83,13 @@ def find_course(result: Result, axis: str | None = None) -> Course | None:
     return Course(axis, index, shown, scale.label(text), name, decades)
 
 
-def cell_edges(positions: NDArray[np.float64], width: float = 1.0) -> NDArray[np.float64]:
-    """Edges (n + 1,) of cells around rising positions (n,): halfway between them; of this width around a single one."""
-    if positions.size == 1:
-        return np.array([positions[0] - 0.5 * width, positions[0] + 0.5 * width])
+def cell_edges(positions: FloatArray) -> FloatArray:
+    """Edges (n + 1,) of cells around rising positions (n,), n > 1: halfway between them."""
     middle = 0.5 * (positions[1:] + positions[:-1])
     first, last = 2.0 * positions[0] - middle[0], 2.0 * positions[-1] - middle[-1]
     return np.concatenate([[first], middle, [last]])
+
+
+def slow_time(result: Result, scale: Scale) -> str:
+    """Label of an axis of slow time."""
+    return scale.label("vibration cycles") if result.blocks is None else "missions"

@@ -1,211 +1,187 @@
-"""Frequency response of the joint, new and worn, on the branches of both sweeps (Fig. 9 of the paper)."""
+"""Frequency response of the new joint and of one worn joint (Fig. 9 of the paper), and of joints worn differently."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-from studyrunner.report.drawing import COLOURS, Drawing, Missing, add_legend, mark_failed, new_panels, set_from_zero
+from studyrunner.report.drawing import (
+    COLOURS,
+    Drawing,
+    FloatArray,
+    Missing,
+    add_legend,
+    add_line,
+    line_style,
+    mark_failed,
+    new_panel,
+    new_panels,
+    set_from_zero,
+)
 from studyrunner.report.figures.courses import Course, find_course
 from studyrunner.result.choice import choose
 from studyrunner.result.units import Scale, scale_for
-from studyrunner.result.view import NO_VOLUME, Point, Result, as_sentences
-from studyrunner.system.progress import count
+from studyrunner.result.view import NO_VOLUME, Result, as_sentences
 
 _MOST_LINES, _MOST_RESPONSES, _MOST_FOLDS = 3, 3, 12
 _OF_WEAR = ("wear_coefficient", "step", "scheme")
-_WORN = "worn_cycle"
-_NEW: dict[str, Any] = {"markerfacecolor": "white", "linestyle": (0, (4, 2)), "linewidth": 1.2}
-_WORN_POINTS: dict[str, Any] = {"linewidth": 0.5, "linestyle": ":"}
-"""No curve: the points are of different joints."""
+_BEFORE = "worn_cycle"
 _RING: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 10, "markerfacecolor": "none"}
+_WORN: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (5, 1.5)), "marker": "s", "markersize": 4.5}
 
 
-def draw_responses(result: Result) -> Iterator[Drawing | Missing]:
-    """The frequency response; a sentence where the file has one frequency or no response."""
-    course, title = find_course(result, "frequency"), "Frequency response"
-    if not result.has("response_amplitude"):
-        yield Missing("frequency_response", title, result.lacks("response_amplitude"))
-    elif course is None:
-        yield Missing("frequency_response", title, "The study has one frequency: give several under [axes] frequency.")
-    else:
-        yield _draw(result, course)
-
-
-def _draw(result: Result, course: Course) -> Drawing:
+def draw_responses(result: Result) -> Drawing | Missing:
     """Amplitude of the first harmonic over frequency, one panel a response.
 
-    Of a point that wore, the first and the last count: the latter joins points that wore differently.
+    Lines are of the new joint, or of joints that were worn before; with `result.again["response"]` also of the joint
+    that is worn as the shown point is.
     """
-    # Scheme, step and wear coefficient make no difference at the first cycle: the sweep is what the figure is about.
-    choice = choose(result, ["frequency"], _MOST_LINES, first=(_WORN, "sweep", "excitation_amplitude", "scheme"))
+    name, title, course = "frequency_response", "Frequency response of the new joint", find_course(result, "frequency")
+    again = result.again.get("response")
+    if course is None and again is None:
+        said = "The study has one frequency: give several under [axes] frequency"
+        followed = ", or use study-report --worn-response" if result.followed else ""
+        return Missing(name, title, f"{said}{followed}.")
+    if course is not None and result.cycles[0] != 0.0:
+        return Missing(name, title, "The file holds no new joint: add 0 to slow_time.outputs.")
     n_panels = min(len(result.responses), _MOST_RESPONSES)
     figure, panels = new_panels(n_panels, 1, 0.5 + 3.1 * n_panels, sharex=True)
-    amplitudes = [course.read(result, "response_amplitude", point) for point in choice.points]
-    unit = str(result.dataset["response_amplitude"].attrs.get("units", "m"))
-    failed = np.array([np.isnan(amplitude[:, 0, 0]) for amplitude in amplitudes])
-    wears = not result.has("worn_volume") or bool(np.nanmax(result.worn) > NO_VOLUME)
-    ends = [0, -1] if len(result.cycles) > 1 and wears else [0]
-    peaks: list[str] = []
+    unit, told = str(result.dataset["response_amplitude"].attrs.get("units", "m")), ("", "")
+    sizes = [each["response_amplitude"].isel(cycle=0).values for each in (result.dataset, again) if each is not None]
+    scale, peaks = scale_for(unit, *sizes), []
     for number, panel in enumerate(panels[:, 0]):
-        scale = scale_for(unit, *(amplitude[:, :, number] for amplitude in amplitudes))
-        drawn: set[str] = set()
-        for line, (point, label) in enumerate(choice):
-            for end in ends:
-                told = _tell_unworn(result, point, choice.points) if end == 0 and result.cycles[0] == 0 else label
-                text = ", ".join(filter(None, (told, _state(result, end))))
-                # states at the first count are the same for all that differs in wear alone: NaN where one has none
-                same = [each for each, other in enumerate(choice.points) if end or _same_start(result, other, point)]
-                values = amplitudes[line][:, end, number]
-                for each in [] if end else same:
-                    values = np.where(np.isnan(values), amplitudes[each][:, end, number], values)
-                if text in drawn or np.isnan(values).all():
-                    continue
-                drawn.add(text)
-                style = course.line_style(line) | {"label": text}
-                if len(ends) > 1:
-                    style |= _NEW if end == 0 else _WORN_POINTS
-                _draw_branch(result, panel, course, point, scale(values), end, style)
-                if number == 0:
-                    top = int(np.nanargmax(values))
-                    peaks.append(f"{scale.show(float(values[top]))} at {course.at(result, top)} ({text})")
-            if result.has("exact_response_amplitude"):
-                _draw_exact(result, panel, course, point, number, scale, ends)
+        if course is not None:
+            new, told = _draw_new(result, panel, course, scale, number)
+            peaks += new if number == 0 else []
+        if again is not None:
+            worn = _draw_again(panel, again, scale, number)
+            peaks += worn if number == 0 else []
         set_from_zero(panel, panel.dataLim.ymax)
         panel.set_ylabel(scale.label(f"amplitude of {result.responses[number]}"))
-        _mark_folds(result, panel)
-        n_failed = mark_failed(panel, course.values, failed)
+    panels[-1, 0].set_xlabel("excitation frequency (Hz)")
     add_legend(figure)
-    course.set_axis(panels[-1, 0])
-    more = len(result.responses) - n_panels
-    caption = as_sentences(
-        f"Largest amplitude of the first harmonic of {result.responses[0]}: {'; '.join(peaks)}",
-        _how_to_read(result, len(ends) > 1),
-        _tell_folds(result),
-        f"Crosses: at these, {count(n_failed, 'point')} in all without a result" if n_failed else "",
-        f"{more} more responses are in the file" if more else "",
-        choice.sentence,
+    text = as_sentences(
+        f"Largest amplitude of the first harmonic of {result.responses[0]}: {'; '.join(filter(None, peaks))}",
+        f"One joint, {again.attrs['title']}: its response curve at that wear, without further wear" if again else "",
+        f"{again.attrs['how']}" if again else "study-report --worn-response adds the curve of one worn joint",
+        "More responses are in the file" if len(result.responses) > n_panels else "",
+        *told,
     )
-    return Drawing("frequency_response", _title(result, len(ends) > 1), caption, figure)
+    if _BEFORE in result.axes:
+        title = "Frequency response of one joint, worn before"
+    elif again is not None:
+        title = f"Frequency response, new and {again.attrs['title']}"
+    return Drawing(name, title, text, figure)
 
 
-def _title(result: Result, worn: bool) -> str:
-    if worn:
-        return "Response at each frequency, new and after wear at that frequency"
-    if _WORN in result.axes:
-        return "Frequency response of one joint, worn before"
-    return "Frequency response of the new joint" if result.cycles[0] == 0 else "Frequency response"
+def _draw_new(
+    result: Result, panel: Axes, course: Course, scale: Scale, number: int
+) -> tuple[list[str], tuple[str, str]]:
+    """Lines of a response of the new joint; their peaks in words, and sentences about what failed or is left out."""
+    # how a joint wears makes no difference to the new one: NaN where a scheme has found no state
+    alike = [axis for axis in _OF_WEAR if axis in result.axes]
+    choice = choose(result, ["frequency", *alike], _MOST_LINES, first=(_BEFORE, "sweep", "excitation_amplitude"))
+    own = result.read("response_amplitude").isel(cycle=0, response=number).max(alike)
+    lines = [own.isel(point, missing_dims="ignore").values[course.index] for point in choice.points]
+    peaks = []
+    for place, (line, (point, label)) in enumerate(zip(lines, choice, strict=True)):
+        text = label if _BEFORE in result.varying else ", ".join(filter(None, (label, "new joint")))
+        _draw_branch(result, panel, course, {**result.shown_point(), **point}, scale(line), place, text)
+        peaks.append(_tell_peak(scale, line, course.values, text))
+    if result.has("exact_response_amplitude"):
+        _draw_exact(result, panel, course, scale, number)
+    _mark_folds(result, panel)
+    return peaks, (mark_failed(panel, course.values, np.isnan(lines)), choice.sentence)
 
 
-def _how_to_read(result: Result, worn: bool) -> str:
-    if worn:
-        return (
-            "After wear, each point shows a joint that wore at its own frequency only: the line through these points is"
-            " not the response curve of one worn joint, and a lower peak does not mean that wear protects. For that"
-            " curve run the study with [scene] worn = {result = ..., frequency = ..., cycle = [0, ...]} and"
-            " slow_time.cycles = 0"
-        )
-    return "Each line is the response of one joint, worn before as its label says" if _WORN in result.varying else ""
+def _draw_again(panel: Axes, again: xr.Dataset, scale: Scale, number: int) -> list[str]:
+    """Lines of a response computed again, of the worn joint and where it is there of the new one; their peaks."""
+    frequency, peaks = again["frequency"].values, []
+    for cycle in range(again.sizes["cycle"]):
+        is_new = again.sizes["cycle"] > 1 and cycle == 0
+        values = again["response_amplitude"].isel(cycle=cycle, response=number).values
+        label, look = ("new joint", line_style(0)) if is_new else (str(again.attrs["title"]), _WORN)
+        error = again["response_error"].isel(cycle=cycle).values * values
+        add_line(panel, frequency, scale(values), scale(error), label=label, **look)
+        peaks.append(_tell_peak(scale, values, frequency, label))
+    return peaks
 
 
-def _state(result: Result, end: int) -> str:
-    """What a line shows: the new joint, or the worn one."""
-    if end == 0:
-        label = "new" if result.cycles[0] == 0 else result.cycle_label(0)
-        return "" if _WORN in result.axes else label
-    return f"each point after its own {result.cycle_label(end)}"
-
-
-def _tell_unworn(result: Result, point: Point, points: tuple[dict[str, int], ...]) -> str:
-    """Label of an unworn state: nothing that only tells how it wears."""
-    told = [
-        name
-        for name in result.varying
-        if name not in _OF_WEAR and len({other.get(name) for other in points}) > 1 and name in point
-    ]
-    return result.describe(point, told)
-
-
-def _same_start(result: Result, one: Point, other: Point) -> bool:
-    """Whether two points differ in nothing but how they wear."""
-    return result.cycles[0] == 0 and all(one[name] == other[name] for name in one if name not in _OF_WEAR)
+def _tell_peak(scale: Scale, values: FloatArray, frequency: FloatArray, text: str) -> str:
+    if np.isnan(values).all():
+        return ""
+    top = int(np.nanargmax(values))
+    return f"{scale.show(float(values[top]))} at {frequency[top]:.6g} Hz ({text})"
 
 
 def _draw_branch(
-    result: Result,
-    panel: Axes,
-    course: Course,
-    point: Point,
-    values: NDArray[np.float64],
-    end: int,
-    style: dict[str, Any],
+    result: Result, panel: Axes, course: Course, point: dict[str, int], values: FloatArray, number: int, label: str
 ) -> None:
-    """One line with its unstable states; that of the first count open where the sweep has jumped."""
+    """The line of a new joint, open where the sweep has jumped; its unstable states in rings."""
     at = course.values
     if result.has("stable"):
-        unstable = course.read(result, "stable", point)[:, end] == 0
-        named = "unstable" not in panel.get_legend_handles_labels()[1]
+        unstable = course.read(result, "stable", point)[:, 0] == 0
         if unstable.any():
-            panel.plot(at[unstable], values[unstable], color="black", label="unstable" if named else None, **_RING)
-    if end == 0 and result.has("branch"):
+            named = "unstable" in panel.get_legend_handles_labels()[1]
+            panel.plot(at[unstable], values[unstable], color="black", label="_" if named else "unstable", **_RING)
+    if result.has("branch"):
         jumps = np.flatnonzero(np.diff(course.read(result, "branch", point)) != 0) + 1
         at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan)
-    panel.plot(at, values, **style)
+    # the second colour is that of the worn joint
+    panel.plot(at, values, **course.line_style(number + (number > 0)), label=label)
 
 
-def _draw_exact(
-    result: Result, panel: Axes, course: Course, point: Point, number: int, scale: Scale, ends: list[int]
-) -> None:
-    """Exact answers as broad grey lines."""
-    exact = course.read(result, "exact_response_amplitude", point)[:, :, number]
-    for end in ends:
-        if np.isfinite(exact[:, end]).any():
-            label = None if "exact" in panel.get_legend_handles_labels()[1] else "exact"
-            panel.plot(course.values, scale(exact[:, end]), color="0.5", linewidth=5, alpha=0.45, zorder=1, label=label)
-
-
-def folds(result: Result) -> list[tuple[str, float]]:
-    """Folds at which sweeps left their branch: label of the sweep and Hz, each once, from low to high."""
-    if not result.has("fold_frequency"):
-        return []
-    fold = result.read("fold_frequency")
-    sweeps = np.array([""])
-    if "sweep" in fold.dims:
-        fold, sweeps = fold.transpose(..., "sweep"), result.dataset["sweep"].values.astype(str)
-    values = fold.values.reshape(-1, len(sweeps))
-    found = {
-        (str(sweep), float(frequency))
-        for sweep, line in zip(sweeps, values.T, strict=True)
-        for frequency in np.unique(line[np.isfinite(line)])
-    }
-    return sorted(found, key=lambda one: (one[1], one[0]))
+def _draw_exact(result: Result, panel: Axes, course: Course, scale: Scale, number: int) -> None:
+    """The exact answer at the shown point as a broad grey line."""
+    exact = course.read(result, "exact_response_amplitude", result.shown_point())[:, 0, number]
+    if np.isfinite(exact).any():
+        panel.plot(course.values, scale(exact), color="0.5", linewidth=5, alpha=0.45, zorder=1, label="exact")
 
 
 def _mark_folds(result: Result, panel: Axes) -> None:
-    """A line down at each fold; its triangle points the way of the sweep."""
-    named: set[str] = set()
-    for sweep, frequency in folds(result)[:_MOST_FOLDS]:
-        label = f"fold, sweep {sweep}" if sweep else "fold"
-        panel.axvline(frequency, color=COLOURS[3], linewidth=0.9, linestyle=(0, (1, 2)), zorder=1)
-        style: dict[str, Any] = {
-            "marker": {"up": ">", "down": "<"}.get(sweep, "v"),
-            "color": COLOURS[3],
-            "markersize": 6,
-        }
-        label_once = None if label in named else label
-        panel.plot(frequency, 0.97, linestyle="none", transform=panel.get_xaxis_transform(), label=label_once, **style)
-        named.add(label)
+    """A line at each fold at which a sweep has left its branch."""
+    if not result.has("fold_frequency"):
+        return
+    fold = result.read("fold_frequency")
+    sweeps = result.dataset["sweep"].values.astype(str) if "sweep" in fold.dims else [""]
+    for number, sweep in enumerate(sweeps):
+        values = (fold.isel(sweep=number) if sweep else fold).values
+        for place, frequency in enumerate(np.unique(values[np.isfinite(values)])[:_MOST_FOLDS]):
+            label = "_" if place else f"fold, sweep {sweep}: jump to another branch"
+            panel.axvline(frequency, color="0.4", linewidth=0.9, linestyle=("--", ":")[number % 2], label=label)
 
 
-def _tell_folds(result: Result) -> str:
-    """Where sweeps jump, in a sentence."""
-    found = folds(result)
-    if not found:
-        return ""
-    shown = ", ".join(f"{frequency:.6g} Hz{f' (sweep {sweep})' if sweep else ''}" for sweep, frequency in found[:4])
-    more = f" and {len(found) - 4} more" if len(found) > 4 else ""
-    return f"Dotted, upright: folds at which a sweep jumps to another branch, at {shown}{more}"
+def draw_after_wear(result: Result) -> Drawing | None:
+    """Amplitude of each point after its own wear, beside that of the new joint; nothing where no point wears."""
+    course = find_course(result, "frequency")
+    wears = not result.has("worn_volume") or float(np.nanmax(result.worn, initial=0.0)) > NO_VOLUME
+    if course is None or len(result.cycles) == 1 or not wears:
+        return None
+    choice = choose(result, ["frequency"], _MOST_LINES)
+    amplitudes = [course.read(result, "response_amplitude", point)[..., 0] for point in choice.points]
+    scale, (figure, panel) = (
+        scale_for(str(result.dataset["response_amplitude"].attrs["units"]), *amplitudes),
+        new_panel(3.4),
+    )
+    first = "new joint" if result.cycles[0] == 0.0 else f"each after its own {result.cycle_label(0)}"
+    for number, (amplitude, label) in enumerate(zip(amplitudes, choice.labels, strict=True)):
+        style = course.line_style(number)
+        text = ", ".join(filter(None, (label, f"each after its own {result.cycle_label(-1)}")))
+        if number == 0:
+            panel.plot(course.values, scale(amplitude[:, 0]), color="0.5", linewidth=1.0, label=first)
+        panel.plot(course.values, scale(amplitude[:, -1]), **style | {"linestyle": "none"}, label=text)
+    set_from_zero(panel, panel.dataLim.ymax)
+    panel.set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
+    course.set_axis(panel)
+    add_legend(figure)
+    text = as_sentences(
+        "Each mark is another joint, which wore at its own frequency: the marks are no response curve",
+        "That they are low where the new joint resonates does not mean that wear protects",
+        "The response curves of one new and one worn joint are above",
+        choice.sentence,
+    )
+    title = "Response of different joints, each after wear at its own frequency"
+    return Drawing("response_after_own_wear", title, text, figure)

@@ -12,9 +12,9 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.report.figures.loops import find_loops
-from studyrunner.result.sample_statistics import DRAWN
 from studyrunner.result.units import Scale, scale_for, units_of
 from studyrunner.result.view import NO_VOLUME, Result
+from studyrunner.statistics.samples import DRAWN
 from studyrunner.variables import CERTIFICATE
 
 _CHARACTERS_A_FLOAT = 16.0 / 3.0

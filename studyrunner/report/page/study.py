@@ -10,10 +10,9 @@ import xarray as xr
 
 from studyrunner.coordinates import COORDINATES
 from studyrunner.result.certainty import advise_ended, describe_ended, tell_ends
-from studyrunner.result.endings import Ending
-from studyrunner.result.sample_statistics import DRAWN, SAMPLE
 from studyrunner.result.units import scale_for, show_cycles, show_number, units_of
 from studyrunner.result.view import CONVERGED, Point, Result
+from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.statistics.sentence import sentence, sentences
 from studyrunner.summary.answer import summarise
 from studyrunner.summary.lines import summary_rows
@@ -64,8 +63,8 @@ def describe_study(result: Result) -> StudyFacts:
     facts += [(label, str(attributes[name])) for name, label in named.items() if name in attributes]
     numbers = Counter(result.dataset["outcome"].values.ravel().tolist())
     endings = [
-        Ended(count(numbers[number], "point"), _with_advice(result, ending), describe_ended(result, number))
-        for number, ending in sorted(result.endings.items())
+        Ended(count(numbers[number], "point"), _with_advice(result, number), describe_ended(result, number))
+        for number in sorted(result.endings)
         if numbers[number] and number != CONVERGED
     ]
     summary = " ".join(filter(None, (_tell_samples(result), tell_ends(result))))
@@ -78,8 +77,8 @@ def describe_study(result: Result) -> StudyFacts:
     )
 
 
-def _with_advice(result: Result, ending: Ending) -> str:
-    return " ".join((ending.sentence, *advise_ended(result, ending.number)))
+def _with_advice(result: Result, number: int) -> str:
+    return " ".join((result.endings[number].sentence, *advise_ended(result, number)))
 
 
 def _axis_values(result: Result, name: str) -> str:

@@ -12,7 +12,7 @@ from selenium.webdriver.support.select import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
 from studyrunner.report.page.page import write_page
-from tests.studyrunner.report.page_cases import as_result
+from tests.studyrunner.results import as_result
 
 CHROMIUM, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
 MARKS = [

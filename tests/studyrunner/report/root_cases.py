@@ -11,7 +11,7 @@ from studies.finite_element.joint.pairing import ContactPairs
 from studies.scene_answers import SurfaceMesh
 from studies.scenes.dovetail_parameters import Parameters
 from studies.scenes.dovetail_sector import define_sector, describe_mesh
-from tests.studyrunner.report.page_cases import build_file
+from tests.studyrunner.results import build_file
 
 STUDY = '[study]\nname = "s"\n[scene]\nmodel = "dovetail_sector"\nn_sectors = 47\n'
 

@@ -6,6 +6,7 @@ from selenium.webdriver import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
+from solver.outcome import Outcome
 from tests.studyrunner.report.browsing import (
     DESKTOP,
     MARKS,
@@ -20,9 +21,8 @@ from tests.studyrunner.report.browsing import (
     text_of,
     write,
 )
-from tests.studyrunner.report.page_cases import SENTENCES, build_file
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs
-from tests.studyrunner.report.scatter_cases import sample_file
+from tests.studyrunner.results import build_file, sample_file
 
 pytestmark = MARKS
 EVIL = "</script><img src=x onerror='window.hurt=1'><script>window.hurt=2</script>"
@@ -98,7 +98,7 @@ def test_a_click_and_a_slider_pick_the_point(page, dataset):
     shown = float(page.execute_script(script).split("\u00a0")[0])
     assert shown == pytest.approx(dataset["run_time"].values[2, 0, 0, 0, 1, 0], rel=1e-3)
     slide(page, "frequency", 1)
-    assert SENTENCES[4] in text_of(page, "picked")
+    assert Outcome.MARCH_FAILED.sentence in text_of(page, "picked")
 
 
 def test_every_variable_is_drawn_and_over_every_dimension(page):

@@ -12,23 +12,25 @@ from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
+from studyrunner.report import contents
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, set_in_column, style
 from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.report.figures.trends import find_peak, find_quantities
 from studyrunner.result.view import Result
-from tests.studyrunner.report.figure_cases import (
+from tests.studyrunner.report.figure_numbers import cells_of, draw_figure, lines_of, values_of
+from tests.studyrunner.report.root_cases import dovetail_file
+from tests.studyrunner.report.test_settings import finest_file
+from tests.studyrunner.results import (
+    N_SAMPLES,
     make_result,
+    sample_file,
     with_endings,
     with_loops,
     with_sector,
     with_two_responses,
     with_variables,
 )
-from tests.studyrunner.report.figure_numbers import cells_of, draw_figure, lines_of, values_of
-from tests.studyrunner.report.root_cases import dovetail_file
-from tests.studyrunner.report.scatter_cases import N_SAMPLES, sample_file
-from tests.studyrunner.report.test_settings import finest_file
 
 ALL_DRAWINGS = (
     "final_worn_volume worn_volume worn_volume_map wear_rate_map frequency_response worn_root wear_depth worn_profile"
@@ -206,18 +208,18 @@ def test_frequency_response_of_both_sweeps_is_open_at_the_fold_and_unstable_stat
     branch, fold, stable = (result.dataset[name].copy() for name in ("branch", "fold_frequency", "stable"))
     branch[2:, ..., 0] = 1
     fold[2, ..., 0] = 201.4
-    stable[1, ..., -1] = 0
+    stable[1, ..., 0] = 0
     changed = with_variables(result, branch=branch, fold_frequency=fold, stable=stable)
     lines = lines_of(draw_figure(changed, "frequency_response").figure.axes[0])
     for number, sweep in enumerate(("up", "down")):
-        for cycle, text in ((0, "new"), (-1, "each point after its own 20\N{NO-BREAK SPACE}000 cycles")):
-            x, y = lines[f"sweep {sweep}, {text}"]
-            known = np.isfinite(y)
-            expected = 1e3 * values_of(result, "response_amplitude", sweep=number, cycle=cycle)
-            np.testing.assert_allclose([x[known], y[known]], [result.dataset["frequency"].values, expected])
-            assert np.flatnonzero(~known).tolist() == ([2] if (number, cycle) == (0, 0) else [])
-    assert lines["fold, sweep up"][0].tolist() == [201.4]
-    ringed = 1e3 * values_of(result, "response_amplitude", frequency=1, cycle=-1, sweep=0)
+        x, y = lines[f"sweep {sweep}, new joint"]
+        known = np.isfinite(y)
+        expected = 1e3 * values_of(result, "response_amplitude", sweep=number, cycle=0)
+        np.testing.assert_allclose([x[known], y[known]], [result.dataset["frequency"].values, expected])
+        assert np.flatnonzero(~known).tolist() == ([2] if number == 0 else [])
+    (fold,) = [line for label, line in lines.items() if label.startswith("fold, sweep up")]
+    assert set(fold[0].tolist()) == {201.4}
+    ringed = 1e3 * values_of(result, "response_amplitude", frequency=1, cycle=0, sweep=0)
     np.testing.assert_allclose(lines["unstable"], [[201.0], [ringed]])
 
 
@@ -226,9 +228,19 @@ def test_worn_joints_have_response_curves_of_their_own():
     worn = Result(made.path, made.dataset.rename(wear_coefficient="worn_cycle"))
     lines = lines_of(draw_figure(worn, "frequency_response").figure.axes[0])
     for number, label in enumerate(("worn cycle 0 1/Pa", "worn cycle 100\N{NO-BREAK SPACE}000 1/Pa")):
-        for cycle, text in ((0, ""), (-1, ", each point after its own 20\N{NO-BREAK SPACE}000 cycles")):
-            expected = 1e3 * values_of(worn, "response_amplitude", worn_cycle=number, cycle=cycle)
-            np.testing.assert_allclose(lines[label + text][1], expected)
+        expected = 1e3 * values_of(worn, "response_amplitude", worn_cycle=number, cycle=0)
+        np.testing.assert_allclose(lines[label][1], expected)
+
+
+def test_joints_that_wore_differently_are_marks_and_no_curve():
+    result = make_result()
+    drawing = draw_figure(result, "response_after_own_wear")
+    assert "different joints" in drawing.title
+    lines = drawing.figure.axes[0].get_lines()
+    expected = 1e3 * values_of(result, "response_amplitude", scheme=0, cycle=-1)
+    (own,) = [line for line in lines if str(line.get_label()).startswith("implicit")]
+    assert own.get_linestyle() == "None"
+    np.testing.assert_allclose(own.get_ydata(), expected)
 
 
 def test_an_exact_answer_is_drawn_beside_the_computed_one():
@@ -255,7 +267,7 @@ def test_the_map_of_outcomes_speaks_words():
     result = make_result(failed=[2, 5])
     drawing = draw_figure(result, "outcome_map")
     panel = drawing.figure.axes[0]
-    np.testing.assert_array_equal(cells_of(panel), [[0, 1, 0, 0], [0, 0, 1, 0]])
+    np.testing.assert_array_equal(cells_of(panel), [[0, 3, 0, 0], [0, 0, 3, 0]])
     assert [label.get_text() for label in panel.get_xticklabels()] == ["200", "201", "202", "204"]
     assert [text.get_text() for text in drawing.figure.legends[0].get_texts()] == ["converged", "branch lost"]
 
@@ -409,3 +421,9 @@ def test_samples_are_those_of_the_file():
     two = draw_figure(Result(Path("two.nc"), sample_file(factor=1.05, jump=1.0)), "deciding_input").figure.axes[0]
     groups = {each.get_label(): len(each.get_offsets()) for each in two.collections if "group" in str(each.get_label())}
     assert groups == {"lower group": N_SAMPLES // 2, "upper group": N_SAMPLES // 2}
+
+
+def test_the_page_on_the_report_lists_all_figures():
+    page = (Path(contents.__file__).parents[1] / "REPORT.md").read_text(encoding="utf-8")
+    assert f"list_figures -->\n{contents.list_figures()}\n<!--" in page
+    assert len({entry.name for entry in contents.FIGURES}) == len(contents.FIGURES)

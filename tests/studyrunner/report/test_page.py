@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studyrunner.report.drawing import Drawing, Missing, Table, new_figure
+from studyrunner.report.drawing import Drawing, Missing, Table, new_panel
 from studyrunner.report.page import page
 from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.page import inline_svg, write_page
 from studyrunner.result.view import Result
-from tests.studyrunner.report.page_cases import AXES, as_result, build_file
 from tests.studyrunner.report.root_cases import dovetail_file
+from tests.studyrunner.results import AXES, as_result, build_file
 
 EVIL = "</script></title><img src=x onerror=alert(1)><script>alert(2)</script>&amp;\"'{{ 7 * 7 }}{% endif %}"
 
@@ -53,8 +53,7 @@ class Reader(HTMLParser):
 
 
 def drawing(name, text="a"):
-    figure = new_figure(2.0)
-    panel = figure.subplots()
+    figure, panel = new_panel(2.0)
     panel.plot([0.1, 0.3, 0.2], color="black")
     panel.fill_between([0, 1], [1, 1])
     panel.set_title(text, parse_math=False)
@@ -95,7 +94,7 @@ def test_items_stand_in_their_order_and_in_the_list_of_contents(written, found):
     assert all((folder / link).is_file() for link in links if not link.startswith("#"))
     names = {
         f"{name}{width}.{kind}" for name in ("first", "second") for width in ("", "_column") for kind in ("svg", "png")
-    }
+    } | {"first.csv", "second.csv"}
     assert {path.name for path in folder.iterdir()} == {"some.nc", "index.html", *names}
 
 

@@ -11,7 +11,7 @@ import pytest
 from studyrunner.report import contents
 from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, main
 from studyrunner.report.drawing import Missing, Table
-from tests.studyrunner.report.page_cases import build_file
+from tests.studyrunner.results import build_file
 
 pytestmark = pytest.mark.processes
 

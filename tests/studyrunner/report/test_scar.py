@@ -6,14 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.report.figures.loops import draw_loops
-from studyrunner.report.figures.pairs import draw_pairs
-from studyrunner.result.measured import read_profile
-from studyrunner.result.scars import find_scar
+from studyrunner.result.scars import find_scar, read_profile
 from studyrunner.result.view import Result, open_for_report
 from studyrunner.user_error import UserError
-from tests.studyrunner.report.figure_cases import make_result
-from tests.studyrunner.report.page_cases import build_file
+from tests.studyrunner.report.figure_numbers import draw_figure
+from tests.studyrunner.results import build_file, make_result
 
 X = 1e-5 * np.array([1.0, 1.0, 1.0, 3.0, 3.0, 5.0, 5.0, 5.0, 7.0, 7.0, 9.0, 9.0])
 Y = 1e-5 * np.array([1.0, 3.0, 5.0, 1.0, 3.0, 1.0, 3.0, 5.0, 1.0, 3.0, 1.0, 3.0])
@@ -34,7 +31,7 @@ def test_the_scar_is_symmetric_and_that_of_the_pairs(model):
     scar = find_scar(result)
     assert scar is not None
     depth = result.dataset["wear_depth"].isel(result.shown_point()).isel(cycle=-1).values
-    drawing = next(each for each in draw_pairs(result) if each.name == "worn_profile")
+    drawing = draw_figure(result, "worn_profile")
     panel = drawing.figure.axes[-1] if model == "cylinder_on_flat" else drawing.figure.axes[1]
     (line,) = [each for each in panel.lines if str(each.get_label()).startswith("after")]
     at, drawn = np.array(line.get_xdata()), np.array(line.get_ydata())
@@ -60,8 +57,7 @@ def test_the_measured_profile_is_drawn_beside_it(tmp_path):
     profile = read_profile(path)
     np.testing.assert_allclose(profile.x, [-2e-5, 2e-5])
     np.testing.assert_allclose(profile.depth, [0.5e-6, 1.5e-6])
-    drawings = draw_pairs(replace(half_space("cylinder_on_flat"), measured=profile))
-    drawing = next(each for each in drawings if each.name == "worn_profile")
+    drawing = draw_figure(replace(half_space("cylinder_on_flat"), measured=profile), "worn_profile")
     (line,) = [each for each in drawing.figure.axes[0].lines if each.get_label() == "measured"]
     assert len(line.get_xdata()) == 2
     assert "scar.csv" in drawing.caption
@@ -106,7 +102,7 @@ def test_loops_stand_about_their_means_and_the_caption_tells_the_drift(tmp_path)
     result = Result(tmp_path / "a.nc", dataset)
     loops = dataset["loop_displacement"]
     loops.values[..., -1, :, :, 1] += 3e-3  # last count, first tangent
-    drawing = next(iter(draw_loops(result)))
+    drawing = draw_figure(result, "fretting_loops")
     for line in drawing.figure.axes[0].lines[:2]:
         assert abs(np.mean(np.array(line.get_xdata())[:-1])) < 1e-9 * np.ptp(line.get_xdata())
     point = result.shown_point()

@@ -9,8 +9,8 @@ import pytest
 from studyrunner.report import contents
 from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
 from studyrunner.report.root import vtu
-from tests.studyrunner.report.page_cases import as_result, build_file
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs
+from tests.studyrunner.results import as_result, build_file
 
 TITLE = "wear --> after -- a title"
 

@@ -1,0 +1,159 @@
+"""Estimated work of a task, for the order of the tasks, the time left and `--plan`.
+
+The estimates fit the bundled studies on one core within a factor of two. A joint that jumps takes longer. A joint in
+which nothing slips takes no step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+ITERATIONS_AT_FIRST = 560
+"""Newton iterations to the first state of a sweep, so many that with the planned harmonics they take the time: between
+the dovetail (32 samples at its resonance: 270) and the root of the deck `blade_root` (1180, with up to 13 harmonics).
+The time of both studies is then estimated within 1.6."""
+
+ITERATIONS_OF_RAMP = 180
+"""Newton iterations to the only state of a ramp (1 and 48 pairs: 221 and 146)."""
+
+ITERATIONS_A_STATE = 50
+"""Newton iterations for each further frequency of a sweep (5 points of a slider 70, 18 around the resonance of the
+dovetail 65, 11 of a mass that hits a wall 130 to 260; 3 where nothing slips)."""
+
+ITERATIONS_OF_MODE = 900
+"""Newton iterations to the first point of a nonlinear mode, so many that they take the time: one with frequency and
+damping among the unknowns takes about five times as long as one of forced vibration."""
+
+ITERATIONS_A_MODE_POINT = 300
+"""The same for each further amplitude, with errors (study `modes`: 3300 for 9 amplitudes; 30 where nothing slips)."""
+
+ITERATIONS_A_STEP = 3
+"""Newton iterations of one step in slow time, explicit or implicit (measured: 2 to 4 where the joint slips)."""
+
+ADAPTIVE_STEPS = 40
+"""Steps of a history with the adaptive scheme."""
+
+STEPS_TO_THE_END = 100
+"""Steps of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)."""
+
+ITERATIONS_TO_A_FINAL_STATE = 50
+"""Newton iterations of the scheme "final" without integration (4 to 35 pairs: 15 to 60)."""
+
+ITERATIONS_AN_ADAPTIVE_STEP = 7
+"""Newton iterations of one adaptive step near the resonance (36 and 48 pairs: 4 to 13), with refused steps and the
+reference solution."""
+
+MISSIONS_A_DOUBLING = 2.0
+"""Missions that are computed for each doubling of their number, by the history and again by its reference solution: 6
+of 20 on a slider, 18 to 26 of thousands on a dovetail, 42 of a million on a slider."""
+
+WAYS_OF_ONE_PAIR = 0.25
+"""Ramps and sweeps of a joint of one pair, which slips: 2 of 14 missions with 20 missions, 12 of 84 with a million
+(`solver.missions.block_start`)."""
+
+WAYS = 0.5
+"""Newton iterations of the way to a block in a later mission, over those of the first one (dovetail with 16 pairs: 150
+to 190 of 320 to 380)."""
+
+ITERATIONS_OF_BLOCK = 20
+"""Newton iterations of a block behind its start state (slider: 10 to 35, those of a way that is not gone included)."""
+
+ITERATIONS_OF_PASSAGE = 900
+"""Newton iterations of a passage (dovetail with 16 pairs, rtol 0.1, 17 to 25 frequencies: 970 where most of its time
+goes, 330 where nothing slips; 2500 with about 40 frequencies)."""
+
+ITERATIONS_AN_OCTAVE = 350
+"""Those of a wide passage for each octave (slider from 1 to 10 000 Hz: 5600, and 2700 of its reference solution)."""
+
+AUTOMATIC_HARMONICS = 5
+"""Harmonics of a state on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
+
+COMPILE_SECONDS = 9
+"""Time for compiling the functions of the solver, s, once on a machine."""
+
+AUTOMATIC_HARMONICS_AT_MOST = 9
+"""Largest automatic number of harmonics for which the memory is estimated."""
+
+_BASE_MEMORY = 250e6
+_NOTICED_MEMORY = 1e8  # what building a small scene takes is in the libraries' and differs from run to run
+_MATRICES_A_RANK = 1
+
+
+def seconds_an_iteration(n_unknowns: int) -> float:
+    """Time of one Newton iteration, s, on average: few of them factorise the Jacobian anew.
+
+    Fits 1.5, 4, 6.5, 8, 35, 45 and 140 ms measured at 20, 660, 1144, 1584, 3360, 5280 and 7056 unknowns within a factor
+    of 1.8.
+    """
+    return 1.5e-3 + 5e-6 * n_unknowns + 1.0e-9 * float(n_unknowns) ** 2
+
+
+def iterations_of_sweep(sweep: str, n_frequencies: int) -> int:
+    """Newton iterations of a sweep through so many frequencies, or of a ramp."""
+    first = ITERATIONS_OF_RAMP if sweep == "ramp" else ITERATIONS_AT_FIRST
+    return first + ITERATIONS_A_STATE * (n_frequencies - 1)
+
+
+def iterations_of_mode(n_amplitudes: int) -> int:
+    """Newton iterations of a nonlinear mode at so many amplitudes."""
+    return ITERATIONS_OF_MODE + ITERATIONS_A_MODE_POINT * (n_amplitudes - 1)
+
+
+def iterations_of_history(scheme: str, cycles: float, step: float) -> int:
+    """Newton iterations of a history over so many cycles where the joint wears."""
+    if cycles > 0.0 and scheme == "final":
+        return ITERATIONS_TO_A_FINAL_STATE
+    if cycles > 0.0 and scheme == "adaptive":
+        return ITERATIONS_AN_ADAPTIVE_STEP * ADAPTIVE_STEPS
+    return ITERATIONS_A_STEP * (max(1, math.ceil(cycles / step)) if cycles < math.inf else STEPS_TO_THE_END)
+
+
+def missions_computed(missions: float) -> int:
+    """Missions that are computed for a number of missions, by the history or by its reference solution."""
+    return math.ceil(min(missions, 2.0 + MISSIONS_A_DOUBLING * math.log2(max(missions, 1.0))))
+
+
+def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float, *, one_pair: bool) -> float:
+    """Newton iterations of a mission history.
+
+    blocks: how each block begins, and the octaves of a passage, 0 for steady vibration. one_pair: whether the joint has
+    one contact pair only.
+    """
+    each = 0.0
+    for begin, octaves in blocks:
+        if octaves > 0.0:
+            each += ITERATIONS_OF_PASSAGE + ITERATIONS_AN_OCTAVE * octaves
+        elif begin == "continue":
+            each += 2 * ITERATIONS_OF_BLOCK
+        else:
+            each += ITERATIONS_OF_BLOCK + iterations_of_sweep(begin, 1) * (WAYS_OF_ONE_PAIR if one_pair else WAYS)
+    return 2 * missions_computed(missions) * each
+
+
+def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float) -> float:
+    """Memory of one rank, bytes: the libraries, the dense matrices, and the arrays of the result.
+
+    Measured 0.37, 1.10 and 2.72 GB at 48, 160 and 336 pairs with automatic harmonics: within a factor of 1.2.
+
+    n_unknowns: number of unknowns of the largest state. result_values: numbers in the result. automatic: whether the
+    largest state has `AUTOMATIC_HARMONICS`. built_with: memory that building the scene takes beside the libraries,
+    bytes.
+    """
+    grown = (2.0 * AUTOMATIC_HARMONICS_AT_MOST + 1.0) / (2.0 * AUTOMATIC_HARMONICS + 1.0) if automatic else 1.0
+    solved = _BASE_MEMORY + _MATRICES_A_RANK * 8.0 * (grown * n_unknowns) ** 2
+    built = _BASE_MEMORY + _NOTICED_MEMORY * math.floor(built_with / _NOTICED_MEMORY)
+    return max(solved, built) + 8.0 * result_values
+
+
+def largest_memory() -> float:
+    """Largest memory of this process so far, bytes; 0 where the system does not tell.
+
+    `getrusage` is not used: its value includes the memory of the process that has started this one.
+    """
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError:
+        return 0.0
+    return next((1024.0 * float(line.split()[1]) for line in lines if line.startswith("VmHWM:")), 0.0)
