@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from solver.continuation.arc_length import Arc, follow_arc
+from solver.continuation.arc_length import ARC_SPAN, Arc, follow_arc
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.continuation.static_state import predicted_at_rest, solve_static_state
@@ -95,7 +95,7 @@ def _ways(
         # the last way, within a budget of its own: where the joint has no grip arc length does not come to an end
         limit = run.budget.limit
         run.budget.limit = min(limit, run.budget.iterations + CONTINUATION.search_iterations)
-        reached = follow_arc(Arc(balance_at, raised, CONTINUATION.arc_span, run), 1.0, accepted)
+        reached = follow_arc(Arc(balance_at, raised, ARC_SPAN, run), 1.0, accepted)
         run.budget.limit = limit
         if reached.state is not None:
             yield reached.state
