@@ -150,8 +150,11 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
         raise ValueError("The results are of different scenes: name the key in which they differ by dim=.")
     first, axes = datasets[0], datasets[0]["outcome"].dims
     for other in datasets:
-        if other["outcome"].dims != axes or ("cycle_count" in other) != ("cycle_count" in first):
+        if other["outcome"].dims != axes:
             raise ValueError(f"The results have different axes: {axes} and {other['outcome'].dims}.")
+        n_outputs = [one.sizes["cycle"] for one in (first, other) if "cycle_count" in one]
+        if n_outputs and n_outputs != 2 * [first.sizes["cycle"]]:
+            raise ValueError("A result with slow_time.cycles = inf joins only those, and with as many outputs.")
         for each in _PAIRS:
             if not other[each].variable.equals(first[each].variable):  # type: ignore[no-untyped-call]
                 raise ValueError(f"The results have different contact pairs: see {each}.")

@@ -9,8 +9,7 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
-from studyrunner.mpi.launcher import launcher_size
-from studyrunner.mpi.ranks import Alone
+from studyrunner.mpi.ranks import Alone, launcher_size
 from studyrunner.result.creation_date import check_date
 from studyrunner.result.existing_result import Target, check_result
 from studyrunner.result.opening import open_result
@@ -99,7 +98,7 @@ def run_study(
             alone = Alone()
             scenes = build_scenes(alone, study, store, shown.say)
             given = RunOptions(fresh=fresh, retry_failed=retry_failed, date=checked)
-            serve_study(alone, study, scenes, target, shown, given)
+            serve_study(alone, study, scenes, store, target, shown, given)
     except Interrupted as ended:
         summary = ended.summary
         n_done = summary.n_points - summary.n_left

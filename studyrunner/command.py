@@ -10,8 +10,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studyrunner.mpi.launcher import LauncherError, job_size, launcher_rank
-from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, start_ranks
+from studyrunner.mpi.ranks import (
+    POLL_SECONDS,
+    LauncherError,
+    RankInterrupted,
+    Ranks,
+    check_software,
+    job_size,
+    launcher_rank,
+    start_ranks,
+)
 from studyrunner.options import Options, parse_options
 from studyrunner.system.endings import INTERRUPTED, begin_ending, is_ending, raise_ending, say_at_last
 from studyrunner.system.machine_faults import LEAST_ADDRESS_SPACE, address_space
@@ -63,7 +71,12 @@ def run_command(arguments: Sequence[str] | None) -> int:
     if ranks.rank == 0:
         say_at_last("run-study: ended at once: the same command goes on where it was")
     try:
-        status = _lead(ranks, sys.argv[1:] if arguments is None else arguments) if ranks.rank == 0 else _follow(ranks)
+        if ranks.rank == 0:
+            status = _lead(ranks, sys.argv[1:] if arguments is None else arguments)
+            for rank in range(1, ranks.size):
+                ranks.send(None, rank)
+        else:
+            status = _follow(ranks)
         if arguments is None:
             # it has come to its end: what comes while MPI and the interpreter end is of no use to anybody
             begin_ending()
@@ -99,8 +112,6 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 
     Returns whether rank 0 had already finished.
     """
-    from studyrunner.mpi.schedule import RankInterrupted
-
     ranks.send(RankInterrupted(), 0)
     latest = time.monotonic() + _SECONDS_FOR_RANK_0
     while time.monotonic() < latest:
@@ -113,11 +124,9 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 
 
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
-    """Rank 0. The other ranks get the model and tasks, or None where nothing has to be computed."""
+    """Rank 0: its exit status."""
     try:
-        from studyrunner.mpi.version_check import check_versions
-
-        check_versions(ranks)
+        check_software(ranks)
         options = parse_options(arguments)
         _check_memory()
         raise_ending()
@@ -126,26 +135,21 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
         study = read_study(options.study, options.overrides)
         raise_ending()
         if options.plan:
-            status = _show_plan(study)
-        elif options.check:
-            status = _check(study)
-        elif options.write_scene is not None:
-            status = _write_scene(study, options.write_scene)
-        else:
-            return _compute(ranks, study, options)
+            return _show_plan(study)
+        if options.check:
+            return _check(study)
+        if options.write_scene is not None:
+            return _write_scene(study, options.write_scene)
+        return _compute(ranks, study, options)
     except UserError as error:
         # Ctrl-C ends the processes that read files as well, which tells nothing of the files
         raise_ending()
         print(*(f"run-study: {line}" for line in str(error).splitlines()), sep="\n", file=sys.stderr)
-        status = BAD_INPUT
     except LauncherError as error:
         print(f"run-study: launcher: {error}", file=sys.stderr)
-        status = BAD_INPUT
     except SystemExit:
-        status = CONVERGED
-    for rank in range(1, ranks.size):
-        ranks.send(None, rank)
-    return status
+        return CONVERGED
+    return BAD_INPUT
 
 
 def _check_memory() -> None:
@@ -157,19 +161,10 @@ def _check_memory() -> None:
 
 def _follow(ranks: Ranks) -> int:
     """Any other rank. Only rank 0 has an exit status."""
-    from studyrunner.mpi.mapped_file import take_over
-    from studyrunner.mpi.version_check import report_version
+    from studyrunner.mpi.schedule import follow_rank_0
+    from studyrunner.task_runs import evaluator
 
-    report_version(ranks)
-    model = take_over(ranks)
-    if model is not None:
-        from studyrunner.run import work_on_job
-        from studyrunner.scene_building import SeveralScenes, help_to_build
-
-        if isinstance(model, SeveralScenes):
-            help_to_build(ranks)
-            model = None
-        work_on_job(ranks, model)
+    follow_rank_0(ranks, evaluator())
     return CONVERGED
 
 
@@ -178,8 +173,8 @@ def _show_plan(study: Study) -> int:
     from studyrunner.kinds.kind import build_tasks
     from studyrunner.plan.plan_text import format_plan
     from studyrunner.plan.plausibility import doubts_of_study
+    from studyrunner.scene.check_command import remarks_of_study
     from studyrunner.scene.drawn_contacts import contact_changes
-    from studyrunner.scene.model_remarks import remarks_of_study
     from studyrunner.scene.planned_scenes import plan_scenes
 
     before = largest_memory()
@@ -244,7 +239,7 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
                     progress.note(
                         f"one process, although the job has room for {announced}: srun or mpiexec starts them"
                     )
-                summary = serve_study(ranks, study, scenes, target, progress, given)
+                summary = serve_study(ranks, study, scenes, store, target, progress, given)
     except Interrupted as ended:
         done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"
         kept = f"{done} are kept, {path} is the finished result that it was"

@@ -6,18 +6,15 @@ import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from solver.outcome import COMPLETE, Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.checkpoint.database import NoLocksError, StoreInUseError
 from studyrunner.checkpoint.records import record_type
-from studyrunner.checkpoint.store import Store
+from studyrunner.checkpoint.store import Store, StoreInUseError
 from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import Identity, TaskPlan, digest
-from studyrunner.mpi.ranks import Ranks, wait_for_message
-from studyrunner.mpi.schedule import work_on_tasks
+from studyrunner.mpi.ranks import Ranks
 from studyrunner.plan.plausibility import doubts_of_study
 from studyrunner.result.arrays import SmallArray, coordinates, scene_arrays
 from studyrunner.result.creation_date import describe_date
@@ -26,22 +23,16 @@ from studyrunner.result.paths import older_folder, progress_file, remove_leftove
 from studyrunner.result.provenance import PACKAGES, describe_run
 from studyrunner.result.sample_coordinates import sample_coordinates, worn_coordinate
 from studyrunner.result.software import describe_software
+from studyrunner.scene.check_command import remarks_of_study
 from studyrunner.scene.drawn_contacts import contact_changes
-from studyrunner.scene.model_remarks import remarks_of_study
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import frequencies_of_ratios, merge_facts, pair_arrays, stuck_frequencies_of
 from studyrunner.scene_building import Scenes
 from studyrunner.study.study import Study
 from studyrunner.system.endings import begin_ending, is_ending
 from studyrunner.system.progress import ProgressDisplay, count
-from studyrunner.task_runs import evaluator, run_tasks
+from studyrunner.task_runs import StudyRun, run_tasks
 from studyrunner.user_error import UserError, Verbatim
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
-
-
-_GO = "go"  # rank 0 has something to compute
 
 
 class Interrupted(KeyboardInterrupt):
@@ -142,7 +133,7 @@ def open_progress(target: Target) -> Iterator[Store]:
     Raises
     ------
     UserError
-        Where another run uses the file, or its file system has no locks.
+        Where another run uses the file, or its disk has no locks.
     StorageError
         Where the file cannot be written.
     """
@@ -150,11 +141,8 @@ def open_progress(target: Target) -> Iterator[Store]:
     try:
         store = Store(path)
     except StoreInUseError as error:
-        remedy = "another run is writing there: wait for its end, or give another result file with -o"
+        remedy = "wait for its end, or give another result file with -o; where no run is at work the disk has no locks"
         raise UserError(str(path), "in use", Verbatim(f"by {error}"), remedy) from None
-    except NoLocksError:
-        remedy = "give a result file on another disk with -o: this file system has no locks"
-        raise UserError(str(path), "locks", Verbatim("none"), remedy) from None
     with contextlib.closing(store):
         remove_leftovers(path)
         try:
@@ -169,6 +157,7 @@ def serve_study(
     ranks: Ranks,
     study: Study,
     scenes: Scenes,
+    store: Store,
     target: Target,
     progress: ProgressDisplay,
     options: RunOptions,
@@ -182,7 +171,9 @@ def serve_study(
     ranks, study
         The ranks, and the study that they compute.
     scenes
-        The scenes of the study, as `build_scenes` gives them, with the open file of the progress.
+        The scenes of the study, as `build_scenes` gives them.
+    store
+        The open file of the progress.
     target
         The result file, as `check_result` gives it.
     progress
@@ -199,12 +190,10 @@ def serve_study(
     Interrupted
         Where the run is ended from outside; finished points have been written.
     """
-    completion, writer = _prepare(study, scenes, target, progress, options)
+    completion, writer = _prepare(study, scenes, store, target, progress, options)
     n_found = _begin(completion, writer.plan.n_points, options, progress)
     try:
-        for rank in range(1, ranks.size):
-            ranks.send(_GO, rank)
-        run_tasks(ranks, study, completion, evaluator(scenes.model), progress, scenes)
+        run_tasks(ranks, study, StudyRun(completion, scenes, progress), progress)
         progress.say("writing the result")
         summary = writer.write(completion, n_found)
     except BaseException as error:
@@ -213,15 +202,15 @@ def serve_study(
         begin_ending()
         raise Interrupted(writer.write(completion, n_found)) from None
     if summary.n_left == 0:
-        _tidy(completion)
+        completion.prune()
     return summary
 
 
 def _prepare(
-    study: Study, scenes: Scenes, target: Target, progress: ProgressDisplay, options: RunOptions
+    study: Study, scenes: Scenes, store: Store, target: Target, progress: ProgressDisplay, options: RunOptions
 ) -> tuple[CompletionIndex, _ResultWriter]:
     """The index of finished points, and the writer of the result."""
-    store, facts = scenes.store, merge_facts(scenes.facts)
+    facts = merge_facts(scenes.facts)
     contacts = contact_changes(study, scenes.scenes, scenes.facts)
     plan = build_tasks(study, [each.n_displacements for each in scenes.facts], contacts, scenes.scenes)
     # The software is described when the run begins: a checkout may have changed at the end of the run.
@@ -263,19 +252,3 @@ def _begin(completion: CompletionIndex, n_points: int, options: RunOptions, prog
     if n_found:
         progress.say(f"{n_found} of {count(n_points, 'point')} are there from an earlier run")
     return n_found
-
-
-def _tidy(completion: CompletionIndex) -> None:
-    """Removes what a finished study no longer needs."""
-    completion.prune()
-    # The result is written. The next run does what a signal interrupts.
-    try:
-        completion.store.shrink()
-    except KeyboardInterrupt:
-        begin_ending()
-
-
-def work_on_job(ranks: Ranks, model: ReducedModel | None) -> None:
-    """Any other rank after it has received the model, if there is only one: does tasks until there are none."""
-    if wait_for_message(ranks) == _GO:
-        work_on_tasks(ranks, evaluator(model))

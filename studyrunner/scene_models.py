@@ -1,7 +1,7 @@
-"""The models of several scenes on their way to the ranks: while they are in use, once in memory on each machine.
+"""The models of scenes on their way to the ranks: while they are in use, once in memory on each machine.
 
-Rank 0 keeps the models in the file of the run, and a task brings the model to a rank that does not have it: as a file
-that the ranks map (`mapped_file`), or the model itself where the rank does not see that file.
+A task brings the model to a rank that does not have it: as a file that the ranks map (`mapped_file`), or the model
+itself where the rank does not see that file.
 """
 
 from __future__ import annotations

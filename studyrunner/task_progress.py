@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.kinds.task import Result, StartResult, Task
 from studyrunner.mpi.cost_model import CostModel
+from studyrunner.mpi.schedule import Office
 from studyrunner.system.progress import Standing
 
 _TRIES_AGAIN = 1
@@ -19,7 +20,7 @@ uncertainty factor of two the mean further time is this fraction.
 """
 
 
-class TaskProgress:
+class TaskProgress(Office[Task, Result]):
     """State of the tasks of a study, and the tasks that results make possible.
 
     A wear history becomes possible with its start state, while the sweep goes on. Results of a task do not depend on
@@ -35,6 +36,7 @@ class TaskProgress:
         self._n_faults: Counter[str] = Counter()
         self._n_given: Counter[str] = Counter()
         self._words: dict[str, str] = {}
+        self._shares: dict[str, float] = {}
         self._suspects: list[Task] = []
         self._tried = ""  # key of the suspect that is under way
         self._left: dict[str, float] = {}
@@ -53,6 +55,7 @@ class TaskProgress:
         is_first, is_last = self._count(task)
         self._left[task.group] -= task.cost_of(first=is_first)
         self._words.pop(task.key, None)
+        self._shares.pop(task.key, None)
         new: Sequence[Task] = ()
         if not result.fault:
             self._completion.add(task, result)
@@ -67,9 +70,11 @@ class TaskProgress:
         return self._without_suspects(new)
 
     def keep(self, task: Task, progress: object) -> None:
-        """Takes the progress of a task: data to continue from, or words."""
+        """Takes the progress of a task as `Keep` does."""
         if isinstance(progress, str):
             self._words[task.key] = progress
+        elif isinstance(progress, float):
+            self._shares[task.key] = progress
         else:
             self._completion.keep(task, progress)
 
@@ -77,19 +82,31 @@ class TaskProgress:
         """State of the tasks. running: as `Dispatcher.running`."""
         factors = {group: self.costs.correction(((group,),)) for group in self._left}
         left = sum(max(0.0, seconds) * factors[group] for group, seconds in self._left.items())
+        done = sum(map(self.costs.measured, factors))
         longest = 0.0
         for task, n_left, elapsed in running:
             expected = task.cost_of(first=n_left == task.n_results) * factors[task.group]
-            # The time left of a task that takes longer than expected is a guess.
-            still = max(expected - elapsed, _LATE * elapsed)
+            still = self._still(task, expected, elapsed)
             left += still - expected
+            done += elapsed
             longest = max(longest, still)
         return Standing(
             n_done=self.n_points,
             n_points=self._completion.plan.n_points,
+            share=done / max(done + left, 1e-9),
             seconds_left=max(longest, left / max(1, len(running))),
             running=tuple(self._describe(task, n_left) for task, n_left, _ in running),
         )
+
+    def _still(self, task: Task, expected: float, elapsed: float) -> float:
+        """Time left, s, of a running task: by its expected time at first, then more and more by the share that is done.
+
+        What a task takes that is late already is a guess.
+        """
+        planned = max(expected - elapsed, _LATE * elapsed)
+        share = self._shares.get(task.key, 0.0)
+        weight = min(1.0, 2.0 * share)
+        return planned if share == 0.0 else (1.0 - weight) * planned + weight * elapsed * (1.0 - share) / share
 
     def _plan(self, task: Task, sign: float) -> None:
         """Adds a task to what is left, or takes it away."""
@@ -136,4 +153,6 @@ class TaskProgress:
     def _describe(self, task: Task, n_left: int) -> str:
         """A running task in words."""
         what = task.describe(task.places[task.n_results - n_left])
+        if task.key in self._shares:
+            return f"{what} ({100.0 * self._shares[task.key]:.0f} %)"
         return f"{what} ({self._words[task.key]})" if task.key in self._words else what

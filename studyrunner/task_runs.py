@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from solver.clock import n_compiled
 from solver.outcome import Outcome, describe_error
@@ -13,8 +13,8 @@ from studyrunner.kinds.kind import kind_of
 from studyrunner.kinds.task import Keep, Result, Task
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.ranks import Ranks
-from studyrunner.mpi.schedule import Handlers, serve_tasks
-from studyrunner.scene_building import Scenes
+from studyrunner.mpi.schedule import Run, serve_tasks
+from studyrunner.scene_building import SceneBuilt, Scenes, SceneTask, build_scene_task
 from studyrunner.scene_models import ModelCache
 from studyrunner.study.study import Study
 from studyrunner.system.endings import raise_ending
@@ -25,43 +25,37 @@ from studyrunner.task_progress import TaskProgress
 if TYPE_CHECKING:
     from solver.model import ReducedModel
 
-Evaluate = Callable[[Task, Keep], Iterator[Result]]
-"""Does a task: gives the results one by one and hands over the progress from time to time."""
+Models = Mapping[int, "ReducedModel"]
 
 
-def build_evaluator(model: ReducedModel | None) -> Evaluate:
-    """The function that does the tasks of a study.
+def compute_task(task: Task, models: Models, keep: Keep) -> Iterator[Result]:
+    """The results of a task, one by one. models: by number of the scene."""
+    return task.compute(models, keep)
 
-    model: of the only scene; None where there are several scenes, whose models come with tasks.
+
+def evaluator() -> Run[Any, Any]:
+    """The function that does tasks on a rank, and builds scenes.
+
+    A task that breaks off gives failed results; the other tasks go on. A fault of the machine is no result.
     """
     models: ModelCache[tuple[ReducedModel, ...]] = ModelCache()
-    if model is not None:
-        models.add((0,), (model,))
 
-    def evaluate(task: Task, keep: Keep) -> Iterator[Result]:
+    def own_models(task: Task) -> Models:
         # first of all: rank 0 sends the models once, also where the task breaks off
         if task.models:
             given = (open_mapped(each) if isinstance(each, MappedFile) else each for each in task.models)
             models.add(task.scenes, tuple(given))
         elif not models.use(task.scenes):
             raise RuntimeError(f"no model of scene {task.scenes} for {task}")
-        own = dict(zip(task.scenes, models[task.scenes], strict=True))
-        yield from replace(task, models=()).compute(own, keep)
+        return dict(zip(task.scenes, models[task.scenes], strict=True))
 
-    return evaluate
-
-
-def evaluator(model: ReducedModel | None) -> Evaluate:
-    """The function that does tasks on a rank. A task that breaks off gives failed results; the other tasks go on.
-
-    A fault of the machine is no result of the task: it may be tried again.
-    """
-    compute = build_evaluator(model)
-
-    def evaluate(task: Task, keep: Keep) -> Iterator[Result]:
+    def evaluate(task: Task | SceneTask, keep: Callable[[object], None]) -> Iterator[Result | SceneBuilt]:
+        if isinstance(task, SceneTask):
+            yield from build_scene_task(task, keep)
+            return
         left = dict.fromkeys(task.places)
         try:
-            for result in compute(task, keep):
+            for result in compute_task(replace(task, models=()), own_models(task), keep):
                 left.pop(result.place, None)
                 yield result
         except Exception as error:
@@ -75,44 +69,43 @@ def evaluator(model: ReducedModel | None) -> Evaluate:
     return evaluate
 
 
-def run_tasks(
-    ranks: Ranks,
-    study: Study,
-    completion: CompletionIndex,
-    evaluate: Evaluate,
-    progress: ProgressDisplay,
-    scenes: Scenes,
-) -> None:
-    """Rank 0: has the remaining tasks done and their results saved."""
-    tasks = TaskProgress(completion)
-    said: set[tuple[int, str]] = set()
+class StudyRun(TaskProgress):
+    """Rank 0 while the tasks of a study are done: results are saved, and the user sees how far they are."""
 
-    def is_sick(rank: int, result: Result) -> bool:
-        if result.fault and (rank, result.fault) not in said:
-            said.add((rank, result.fault))
-            progress.note(
+    def __init__(self, completion: CompletionIndex, scenes: Scenes, display: ProgressDisplay) -> None:
+        super().__init__(completion)
+        self._store = completion.store
+        self._scenes = scenes
+        self._display = display
+        self._said: set[tuple[int, str]] = set()
+        self._n_compiled: int | None = n_compiled()
+
+    def prepare(self, rank: int, task: Task) -> Task:
+        """The task with the models that the rank does not have."""
+        self._store.note_begin(task.key)
+        return self._scenes.models.with_model(rank, task)
+
+    def is_sick(self, rank: int, result: Result) -> bool:
+        """Whether the result is a fault of the machine."""
+        if result.fault and (rank, result.fault) not in self._said:
+            self._said.add((rank, result.fault))
+            self._display.note(
                 f"rank {rank}: {result.fault}: a fault of the machine; the task is tried once more, by another rank"
                 " where there is one"
             )
         return bool(result.fault)
 
-    known: int | None = n_compiled()
+    def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
+        """Writes and shows what is due."""
+        if self._n_compiled is not None and n_compiled() > self._n_compiled:
+            self._n_compiled = None
+            self._display.note("the solver is compiled for this machine, once after an installation")
+        self._store.tick()
+        self._display.tick(lambda: self.look(running()))
 
-    def tick(running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
-        nonlocal known
-        if known is not None and n_compiled() > known:
-            known = None
-            progress.note("the solver is compiled for this machine, once after an installation")
-        completion.store.tick()
-        progress.tick(lambda: tasks.look(running()))
 
-    def prepare(rank: int, task: Task) -> Task:
-        completion.store.note_begin(task.key)
-        return scenes.with_model(rank, task)
-
-    if tasks.tasks:
-        progress.say(f"computing {kind_of(study).describe_tasks(tasks.tasks)}")
-    progress.begin_tasks()
-    handlers: Handlers[Task, Result] = Handlers(tasks.take, tick, tasks.keep, is_sick, prepare)
-    serve_tasks(ranks, tasks.begin(), evaluate, handlers, tasks.costs)
-    completion.store.flush()
+def run_tasks(ranks: Ranks, study: Study, run: StudyRun, display: ProgressDisplay) -> None:
+    """Rank 0: has the remaining tasks done and their results saved."""
+    if run.tasks:
+        display.say(f"computing {kind_of(study).describe_tasks(run.tasks)}")
+    serve_tasks(ranks, run, evaluator(), run.costs)

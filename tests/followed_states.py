@@ -21,7 +21,7 @@ from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
 from solver.wear.check import Checked, FullCheck
 from solver.wear.control import Given
-from solver.wear.integrate import Integration, Progress
+from solver.wear.integrate import Integration
 from solver.wear.output import DenseOutput
 from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
@@ -63,14 +63,14 @@ def followed_states(
             errors.append(checked[1].excitation_frequency_error)
         return checked
 
-    output = DenseOutput(work.area, cycles, smooth=False)
+    output = DenseOutput(work.area, smooth=False)
     steps = Given(work, "implicit", float(cycles[1] - cycles[0]), float(cycles[-1]))
-    integration = Integration(steps, recorded, output, lambda _: None, 1e4, float(cycles[-1]))
+    integration = Integration(steps, recorded, output, lambda *_: None, 1e4, float(cycles[-1]))
     estimate = Estimate(start.response_error, start.wear_rate_error)
     first = work.begin(start.state, start.resolution, estimate, accurate=True)
-    progress = integration.begin(first)
-    assert isinstance(progress, Progress), progress
-    integration.run(progress)
+    begun = integration.begin(first)
+    assert isinstance(begun, WearState), begun
+    integration.run(begun)
     return FollowedStates(work, tuple(states), tuple(errors))
 
 

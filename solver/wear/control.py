@@ -15,6 +15,7 @@ import numpy as np
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.march.steps import Lengths, take_step
+from solver.model import FloatArray
 from solver.newton.iteration import SHORTEST_STEP
 from solver.outcome import Outcome
 from solver.settings import Scheme
@@ -62,6 +63,8 @@ class Given:
     length: float
     end: float
 
+    bounded = True
+
     def begin(self, state: WearState) -> WearState:
         """The unworn state with the length of its first step."""
         return replace(state, first_length=self.length)
@@ -86,16 +89,7 @@ class Given:
 
     def rescue(self, state: WearState, length: float) -> Step | Failure:
         """As in Line."""
-        return step_behind(self.work, state, min(2.0 * length, self.end - state.cycle), bounded=True)
-
-    def taken(self, state: WearState, length: float, lengths: Lengths) -> tuple[Step, float] | Failure:
-        """As `take_step`; a step whose wear would move many times the normal forces is a failure."""
-        taken = take_step(self, state, length, lengths)
-        if isinstance(taken, Failure):
-            return taken
-        after, joint = taken[0].state, self.work.at(state)
-        said = too_long(joint, state.point.evaluation, after.depth, state.cycle, after.cycle - state.cycle)
-        return taken if said is None else Failure(Outcome.STEP_TOO_LONG, said)
+        return step_behind(self, state, length)
 
 
 @dataclass(frozen=True)
@@ -126,7 +120,7 @@ class Adaptive:
     end: cycle count beyond which no step goes; inf for steps that go beyond the last count. At least two steps lead
         there, where the first one has its usual length.
     first: length of the first step over its usual length.
-    bounded: whether a jump that moves many times the normal forces is refused.
+    bounded: whether a step or a jump that moves many times the normal forces is a failure.
     """
 
     work: WearingJoint
@@ -166,11 +160,7 @@ class Adaptive:
         euler = attempt_step(work, state, length, "implicit")
         if euler is None or not (work.where.follows or work.is_stable(work.at(state), euler.state.point.evaluation)):
             euler = step_across(work, state, length, self.end)
-        return euler or step_behind(work, state, min(2.0 * length, self.end - state.cycle), bounded=self.bounded)
-
-    def taken(self, state: WearState, length: float, lengths: Lengths) -> tuple[Step, float] | Failure:
-        """As `take_step`."""
-        return take_step(self, state, length, lengths)
+        return euler or step_behind(self, state, length)
 
 
 Steps = Given | Adaptive
@@ -187,20 +177,34 @@ def one_step(steps: Steps, state: WearState) -> Step | Failure:
     if state.cycle + length >= steps.end * (1.0 - 1e-12):
         length = steps.end - state.cycle
     shortest = min(shortest, length)
-    taken = steps.taken(state, length, replace(SECOND_ORDER, shortest=shortest, rescue=shortest))
+    taken = take_step(steps, state, length, replace(SECOND_ORDER, shortest=shortest, rescue=shortest))
     if isinstance(taken, Failure):
         return taken
     step, ahead = taken
-    return replace(step, state=step.state.planned(ahead))
+    failure = refused(steps, state, step.state.depth, step.state.cycle - state.cycle)
+    return failure or replace(step, state=replace(step.state, length=ahead))
 
 
-def step_behind(work: WearingJoint, state: WearState, beyond: float, *, bounded: bool) -> Step | Failure:
-    """A jump as a step, at the frequency that is followed; arguments as of `jump`."""
-    behind = jump(work, state, beyond, bounded=bounded)
+def step_behind(steps: Steps, state: WearState, length: float) -> Step | Failure:
+    """A jump as a step, at the frequency that is followed; length: of the shortest step, cycles."""
+    work, beyond = steps.work, min(2.0 * length, steps.end - state.cycle)
+    worn = state.depth + beyond * work.rate(state.point.evaluation)
+    if (failure := refused(steps, state, worn, beyond)) is not None:
+        return failure
+    behind = jump(work, state, worn, state.cycle + beyond)
     if isinstance(behind, Failure):
         return work.where.lost(state) or behind
     behind = work.at_followed(behind)
     return behind if isinstance(behind, Failure) else Step(behind, np.zeros_like(behind.depth))
+
+
+def refused(steps: Steps, state: WearState, wear_depth: FloatArray, length: float) -> Failure | None:
+    """Why a step or a jump to depths (n_contact,), m, after so many cycles is no result; None if it is."""
+    if not steps.bounded:
+        return None
+    joint = steps.work.at(state)
+    said = too_long(joint, state.point.evaluation, wear_depth, state.cycle, length)
+    return None if said is None else Failure(Outcome.STEP_TOO_LONG, said)
 
 
 def step_across(work: WearingJoint, state: WearState, shortest: float, end: float) -> Step | None:

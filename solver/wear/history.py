@@ -98,10 +98,10 @@ def _assembled(solutions: Solutions, fine: Ended, state: WearState, reference: E
     """The result, from the outputs of a history, with its last state, and of its reference solution."""
     start, asked, model = solutions.start, solutions.asked, solutions.case.model
     counts, area, output = solutions.counts(fine), model.contact.area, solutions.output_of(fine)
-    own, course = output.read(counts), fine.output.course
+    own = output.read(counts)
     coarse = None if reference is None else solutions.output_of_reference(reference)
-    other, at_steps = _read_or_nan(coarse, counts, own), np.array(course.cycles)
-    steps = Both(at_steps, course.values(), _read_or_nan(coarse, at_steps, own))
+    other, at_steps = _read_or_nan(coarse, counts, own), fine.output.cycles
+    steps = Both(at_steps, output.values(), _read_or_nan(coarse, at_steps, own))
     error = history_error(Both(counts, own, other), steps, area, asked.scheme)
     target = fine.output.reached
     ends_at_target = target <= asked.end
@@ -116,7 +116,7 @@ def _assembled(solutions: Solutions, fine: Ended, state: WearState, reference: E
         error_estimate=math.nan,
         newton_iterations=start.newton_iterations + fine.iterations + (reference.iterations if reference else 0),
         run_time=start.run_time + solutions.spent,
-        last_cycle=min(course.ends[-1], float(counts[-1])),
+        last_cycle=min(fine.output.course.ends[-1], float(counts[-1])),
         branch=start.branch,
         fold_frequency=start.fold_frequency,
         # adaptive steps go beyond the last count

@@ -20,7 +20,7 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.state import Failure
 from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, describe_error
-from solver.packing import in_rows, packable
+from solver.packing import in_rows
 from solver.settings import ROUND_OFF
 from solver.wear.check import Checked
 from solver.wear.control import Steps, one_step
@@ -63,15 +63,6 @@ def guarded(compute: Callable[[], T]) -> T | Failure:
         return Failure(Outcome.EXCEPTION, describe_error(error))
 
 
-@packable
-@dataclass(frozen=True)
-class Progress:
-    """Progress of an integration, from which the integration goes on. n_steps: steps so far."""
-
-    state: WearState
-    n_steps: int
-
-
 @dataclass(frozen=True)
 class Integration:
     """An integration over the slow time, and its parts.
@@ -79,7 +70,7 @@ class Integration:
     steps: lengths and scheme of the steps of the joint.
     check: gives a state with its report, or the reason of its rejection.
     output: stores the states.
-    save: called from time to time with the progress.
+    save: called from time to time with the state and the number of steps so far, from which the integration goes on.
     most_iterations: most Newton iterations, in addition to `near_iterations` for each step.
     end: last count; inf for a history to the steady state.
     share: `settings.ToTheEnd.final_share` of such a history.
@@ -88,21 +79,21 @@ class Integration:
     steps: Steps
     check: Callable[[WearingJoint, WearState], Checked | Failure]
     output: DenseOutput
-    save: Callable[[Progress], None]
+    save: Callable[[WearState, int], None]
     most_iterations: float
     end: float
     share: float = 0.0
 
-    def begin(self, state: WearState) -> Progress | Failure:
+    def begin(self, state: WearState) -> WearState | Failure:
         """Check and store the first state."""
         first = self.steps.work.at_followed(state)
         stored = first if isinstance(first, Failure) else self._stored(first, 0.0)
-        return stored if isinstance(stored, Failure) else Progress(self.steps.begin(stored), 0)
+        return stored if isinstance(stored, Failure) else self.steps.begin(stored)
 
-    def run(self, progress: Progress) -> tuple[WearState, Failure]:
-        """Integrate to the end: last state and reason of the end."""
+    def run(self, state: WearState, n_steps: int = 0) -> tuple[WearState, Failure]:
+        """Integrate from a state after some steps to the end: last state and reason of the end."""
         work, budget = self.steps.work, self.steps.work.run.budget
-        state, n_steps, saved = progress.state, progress.n_steps, budget.iterations
+        saved = budget.iterations
         while (ended := self._ended(state)) is None:
             n_steps += 1
             if budget.iterations > self.most_iterations + CONTINUATION.near_iterations * n_steps:
@@ -115,7 +106,7 @@ class Integration:
                 # done in every history, so that an interrupted one gives equal numbers
                 state, saved = in_rows(state), budget.iterations
                 work.drop_factor()
-                self.save(Progress(state, n_steps))
+                self.save(state, n_steps)
         return state, ended
 
     def _one(self, state: WearState) -> WearState | Failure:
@@ -168,8 +159,8 @@ def is_steady(work: WearingJoint, state: WearState, output: DenseOutput) -> bool
     pressed = normal > ROUND_OFF * float(normal.max(initial=0.0))
     if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():
         return False
-    course = output.taken.course
-    volumes, rates = np.array(course.depths) @ work.area, np.array(course.rates)
+    values = output.values()
+    volumes, rates = values["wear_depth"] @ work.area, values["wear_rate"]
     # over the last nine tenths of the worn volume, to the accuracy of a rate
     first = max(int(np.searchsorted(volumes, 0.1 * volumes[-1], "right")) - 1, 0)
     varies = np.abs(rates[first:] - rates[-1]) > work.case.settings.rtol * rates[-1]

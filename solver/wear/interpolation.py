@@ -17,7 +17,7 @@ from solver.model import FloatArray
 from solver.settings import WearTarget
 
 if TYPE_CHECKING:
-    from solver.wear.output import Course, Node
+    from solver.wear.output import Node
 
 
 def depth_within(
@@ -62,40 +62,37 @@ class TargetSearch:
     area: FloatArray
     smooth: bool
 
-    def within(self, start: Node, end: Node, course: Course, *, straight: bool = False) -> float:
-        """Count at which a step reaches the target, NaN where it does not.
+    def within(self, nodes: Sequence[Node], *, straight: bool = False) -> float:
+        """Count at which the last step of some reaches the target, NaN where it does not.
 
         The resonance is a parabola in the worn volume through both ends of the step and the end before, or straight.
-
-        course: of all steps before this one.
         """
+        start, end = nodes[-2:]
         wanted = self.target.value
         if self._shifts:
-            if not abs(_shift(end, course)) >= wanted:
+            if not abs(_shift(end, nodes)) >= wanted:
                 return math.nan
-            wanted = self._volume_at_shift(start, end, course, straight=straight)
-        if self._worn(end.report.wear_depth) < wanted:
+            wanted = self._volume_at_shift(nodes, straight=straight)
+        if self._worn(end) < wanted:
             return math.nan
         length = end.cycle - start.cycle
         ends = [(node.report.wear_depth, node.rate) for node in (start, end)]
 
         def worn_at(fraction: float) -> float:
-            return self._worn(depth_within(np.array([fraction]), length, ends[0], ends[1], self.smooth)[0])
+            return self._worn_to(depth_within(np.array([fraction]), length, ends[0], ends[1], self.smooth)[0])
 
         return start.cycle + fraction_where(wanted, worn_at) * length
 
-    def count(self, nodes: Sequence[Node], course: Course) -> float:
+    def count(self, nodes: Sequence[Node]) -> float:
         """Count at which some steps reach the target; if they do not, extrapolated by the mean rate of the last one,
         inf where this rate is 0.
         """
-        for start, end in pairwise(nodes):
-            if not math.isnan(found := self.within(start, end, course)):
+        for end in range(2, len(nodes) + 1):
+            if not math.isnan(found := self.within(nodes[:end])):
                 return found
         if len(nodes) < 2:
             return math.inf
-        first, last = (
-            abs(_shift(node, course)) if self._shifts else self._worn(node.report.wear_depth) for node in nodes[-2:]
-        )
+        first, last = (abs(_shift(node, nodes)) if self._shifts else self._worn(node) for node in nodes[-2:])
         grown, length = last - first, nodes[-1].cycle - nodes[-2].cycle
         return nodes[-1].cycle + (self.target.value - last) * length / grown if grown > 0.0 else math.inf
 
@@ -114,34 +111,32 @@ class TargetSearch:
     def _shifts(self) -> bool:
         return self.target.quantity == "frequency_shift"
 
-    def _volume_at_shift(self, start: Node, end: Node, course: Course, *, straight: bool) -> float:
+    def _volume_at_shift(self, nodes: Sequence[Node], *, straight: bool) -> float:
         """Worn volume, m3, at which the resonance has shifted to the target, within a step whose end has reached it."""
-        wanted, way = self.target.value, math.copysign(1.0, _shift(end, course))
-        volumes = [self._worn(node.report.wear_depth) for node in (start, end)]
-        shifts = [way * _shift(node, course) for node in (start, end)]
-        if not shifts[1] > shifts[0]:
-            return volumes[0]
-        slope = (volumes[1] - volumes[0]) / (shifts[1] - shifts[0])
-        line = volumes[0] + max(wanted - shifts[0], 0.0) * slope
-        place = int(np.searchsorted(course.cycles, start.cycle)) - 1
-        if straight or place < 0:
-            return line
-        volume = self._worn(course.depths[place])
-        shift = way * (course.resonances[place] / course.resonances[0] - 1.0)
-        if not (volume < volumes[0] < volumes[1] and shift < shifts[0] < wanted):
+        wanted, way = self.target.value, math.copysign(1.0, _shift(nodes[-1], nodes))
+        *before, volume, end_volume = (self._worn(node) for node in nodes[-3:])
+        *earlier, shift, end_shift = (way * _shift(node, nodes) for node in nodes[-3:])
+        if not end_shift > shift:
+            return volume
+        slope = (end_volume - volume) / (end_shift - shift)
+        line = volume + max(wanted - shift, 0.0) * slope
+        if straight or not before or not (before[0] < volume < end_volume and earlier[0] < shift < wanted):
             return line
         # Newton's form of the volume as a function of the shift, which has to rise
-        bend = (slope - (volumes[0] - volume) / (shifts[0] - shift)) / (shifts[1] - shift)
-        found = line + bend * (wanted - shifts[0]) * (wanted - shifts[1])
-        return found if volumes[0] < found < volumes[1] else line
+        bend = (slope - (volume - before[0]) / (shift - earlier[0])) / (end_shift - earlier[0])
+        found = line + bend * (wanted - shift) * (wanted - end_shift)
+        return found if volume < found < end_volume else line
 
-    def _worn(self, depth: FloatArray) -> float:
+    def _worn(self, node: Node) -> float:
+        return self._worn_to(node.report.wear_depth)
+
+    def _worn_to(self, depth: FloatArray) -> float:
         """Wear to compare with the target, from depths (n_contact,), m: the largest depth, m, or the volume, m3."""
         if self.target.quantity == "wear_depth":
             return float(depth.max(initial=0.0))
         return float(depth @ self.area)
 
 
-def _shift(node: Node, course: Course) -> float:
-    """Relative change of the resonance since the first state of a course; above 0 where it rises."""
-    return node.report.resonance / course.resonances[0] - 1.0
+def _shift(node: Node, nodes: Sequence[Node]) -> float:
+    """Relative change of the resonance since the first of some states; above 0 where it rises."""
+    return node.report.resonance / nodes[0].report.resonance - 1.0

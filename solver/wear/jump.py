@@ -35,26 +35,21 @@ from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
 from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
-from solver.wear.rate_slope import too_long
 from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
 
 
-def jump(work: WearingJoint, state: WearState, beyond: float, *, bounded: bool) -> WearState | Failure:
-    """A stable state `beyond` cycles behind the last state of a branch: with a hold, or of another branch.
+def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
+    """A stable state behind the last state of a branch: with a hold, or of another branch.
 
-    bounded: whether a jump that moves many times the normal forces is refused.
+    worn (n_contact,): depth of the new state, m. cycle: its count.
     """
-    joint, at = work.at(state), state.point.evaluation
-    worn = state.depth + beyond * work.rate(at)
-    if bounded and (said := too_long(joint, at, worn, state.cycle, beyond)) is not None:
-        return Failure(Outcome.STEP_TOO_LONG, said)
     work.run.budget.limit = work.run.budget.iterations + CONTINUATION.search_iterations
     reached = _held(work, state, worn) or _on_another_branch(work, state, worn)
     work.run.budget.limit = float("inf")
     if isinstance(reached, Failure):
         return reached
-    return work.noted(replace(reached, cycle=state.cycle + beyond, change=None, previous=None))
+    return work.noted(replace(reached, cycle=cycle, change=None, previous=None))
 
 
 def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | None:

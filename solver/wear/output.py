@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.model import BoolArray, ComplexArray, FloatArray
+from solver.model import BoolArray, FloatArray
 from solver.packing import packable
 from solver.results.loops import LOOP_PHASES
 from solver.results.state_report import StateReport
@@ -18,8 +17,8 @@ from solver.settings import Resolution, WearTarget
 from solver.wear.interpolation import TargetSearch, depth_within, fraction_where
 
 KEPT_STEPS = 800
-"""Most stored steps of a history to the steady state; half as many after the steps with the least progress are dropped.
-Most ends of steps at which a history is compared with its reference solution. A result has 101 outputs by default, an
+"""Most stored steps of a history beside those with an output, and most at whose ends it is compared with its reference
+solution; half as many after the steps with the least progress are dropped. A result has 101 outputs by default, an
 adaptive history of 1e5 cycles about 100 steps."""
 
 INTERPOLATED = (
@@ -68,45 +67,20 @@ class Node:
 @packable
 @dataclass(frozen=True)
 class Course:
-    """The course of a history over its steps.
+    """The steps of a history.
 
-    ends (n_steps,): counts at the first state and at the ends of all steps.
-    cycles (n,): counts at the ends of steps, thinned where the steps are many.
-    depths (n, n_contact): depths at these counts, m.
-    rates (n,): wear rates of the joint at these counts, m3 per cycle.
-    responses, peaks (n, n_response): complex first harmonic and largest magnitude at these counts, m.
-    resonances (n,): resonance of the vibration at these counts, rad/s; NaN where it was not asked for.
+    ends (n_steps + 1,): counts at the first state and at the ends of all steps.
     resolutions: cycle count from which on a resolution holds, and this resolution.
     """
 
     ends: tuple[float, ...] = ()
-    cycles: tuple[float, ...] = ()
-    depths: tuple[FloatArray, ...] = ()
-    rates: tuple[float, ...] = ()
-    responses: tuple[ComplexArray, ...] = ()
-    peaks: tuple[FloatArray, ...] = ()
-    resonances: tuple[float, ...] = ()
     resolutions: tuple[tuple[float, Resolution], ...] = ()
 
-    def after(self, cycle: float, report: StateReport, rate: float) -> Course:
-        """The course with the end of another step; rate: wear rate of the joint, m3 per cycle."""
-        kept = slice(0, None, 2 if len(self.cycles) >= KEPT_STEPS else 1)
-        changed = not self.resolutions or self.resolutions[-1][1] != report.resolution
-        return Course(
-            ends=(*self.ends, cycle),
-            cycles=(*self.cycles[kept], cycle),
-            depths=(*self.depths[kept], report.wear_depth),
-            rates=(*self.rates[kept], rate),
-            responses=(*self.responses[kept], report.response),
-            peaks=(*self.peaks[kept], report.response_peak),
-            resonances=(*self.resonances[kept], report.resonance),
-            resolutions=(*self.resolutions, (cycle, report.resolution)) if changed else self.resolutions,
-        )
-
-    def values(self) -> dict[str, Any]:
-        """Values at `cycles`, by their names in `DenseOutput.read`; the first axis is that of the counts."""
-        names = {"wear_depth": self.depths, "wear_rate": self.rates, "response": self.responses}
-        return {name: np.array(found) for name, found in (names | {"response_peak": self.peaks}).items()}
+    def after(self, cycle: float, resolution: Resolution) -> Course:
+        """The course with the end of another step."""
+        changed = not self.resolutions or self.resolutions[-1][1] != resolution
+        resolutions = (*self.resolutions, (cycle, resolution)) if changed else self.resolutions
+        return Course((*self.ends, cycle), resolutions)
 
 
 @packable
@@ -114,7 +88,7 @@ class Course:
 class OutputState:
     """Data of a dense output.
 
-    nodes: ends of the stored steps, ascending; the counts to be read lie within these steps.
+    nodes: first state and ends of the steps, ascending, thinned where the steps are many.
     course: course of all steps.
     reached: count at which the target was reached, NaN until then.
     reached_within: estimated error of this count by the interpolation within the step.
@@ -124,6 +98,11 @@ class OutputState:
     course: Course = Course()
     reached: float = math.nan
     reached_within: float = 0.0
+
+    @property
+    def cycles(self) -> FloatArray:
+        """Counts (n,) of the nodes."""
+        return np.array([node.cycle for node in self.nodes])
 
 
 @dataclass
@@ -136,16 +115,15 @@ class DenseOutput:
     pressure.
 
     area (n_contact,): m2.
-    counts (n_output,): ascending counts to be read; only steps that contain one of them are stored. None for counts not
-        known beforehand: then steps are stored evenly along the history.
     smooth: whether the depth is a cubic within a step.
+    counts (n_output,): ascending counts to be read, whose steps are stored; empty for counts not known beforehand.
     target: wear whose count is sought within the steps; None for none.
     taken: data stored so far.
     """
 
     area: FloatArray
-    counts: FloatArray | None
     smooth: bool
+    counts: FloatArray = field(default_factory=lambda: np.zeros(0))
     target: WearTarget | None = None
     taken: OutputState = OutputState()
 
@@ -165,28 +143,35 @@ class DenseOutput:
         cycle: count at the end of the step, never lower than the last one. report: of the state.
         rate (n_contact,): wear rates, m per cycle. error: estimated local error of the step, as worn volume, m3.
         """
-        last, nodes, reached, within = self.last, list(self.taken.nodes), self.taken.reached, self.taken.reached_within
-        node = Node(cycle, report, rate, error + (0.0 if last is None else last.local))
-        if last is not None:
-            if math.isnan(reached) and self._search is not None:
-                reached = self._search.within(last, node, self.taken.course)
-                within = abs(reached - self._search.within(last, node, self.taken.course, straight=True))
-            before = nodes[-2].cycle if len(nodes) > 1 else -math.inf
-            read = self._is_read(before, last.cycle) or self._is_read(last.cycle, cycle)
-            if not read and not before < reached <= cycle:
-                del nodes[-1]
-        nodes.append(node)
-        if self.counts is None and len(nodes) > KEPT_STEPS:
-            nodes = self._thinned(nodes)
-        course = self.taken.course.after(cycle, report, float(rate @ self.area))
-        self.taken = OutputState(tuple(nodes), course, reached, within)
+        last, reached, within = self.last, self.taken.reached, self.taken.reached_within
+        nodes = (*self.taken.nodes, Node(cycle, report, rate, error + (0.0 if last is None else last.local)))
+        if math.isnan(reached) and last is not None and self._search is not None:
+            reached = self._search.within(nodes)
+            within = abs(reached - self._search.within(nodes, straight=True))
+        course = self.taken.course.after(cycle, report.resolution)
+        self.taken = OutputState(nodes, course, reached, within)
+        if len(nodes) > KEPT_STEPS + 2 * self.counts.size:
+            self.taken = replace(self.taken, nodes=self._thinned())
 
-    def _is_read(self, before: float, cycle: float) -> bool:
-        """Whether a count to be read is larger than `before` and at most `cycle`."""
-        if self.counts is None:
-            return True
-        place = int(np.searchsorted(self.counts, before, "right"))
-        return place < self.counts.size and bool(self.counts[place] <= cycle)
+    def _thinned(self) -> tuple[Node, ...]:
+        """The nodes without those of little progress, see `even_counts`, between which nothing is read."""
+        nodes, at = self.taken.nodes, self.taken.cycles
+        read = np.append(self.counts, self.taken.reached)
+        ends = np.searchsorted(at, read[read <= at[-1]])
+        needed = {0, len(nodes) - 1, *ends, *(ends - 1)}
+        volumes = self.values()["wear_depth"] @ self.area
+        way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
+        least, kept = 2.0 * way[-1] / KEPT_STEPS, [0]
+        for place in range(1, len(nodes)):
+            if place in needed or way[place + 1] - way[kept[-1]] > least:
+                kept.append(place)
+        return tuple(nodes[place] for place in kept)
+
+    def values(self) -> dict[str, Any]:
+        """Values at the nodes, by their names in `read`; the first axis is that of the counts."""
+        nodes, names = self.taken.nodes, ("wear_depth", "response", "response_peak")
+        found = {name: np.array([getattr(node.report, name) for node in nodes]) for name in names}
+        return found | {"wear_rate": np.array([node.rate @ self.area for node in nodes])}
 
     @property
     def _search(self) -> TargetSearch | None:
@@ -196,7 +181,7 @@ class DenseOutput:
         """Count at which the stored steps reach the target; if they do not, extrapolated by the mean rate of the last
         one, inf where this rate is 0.
         """
-        return math.inf if self._search is None else self._search.count(self.taken.nodes, self.taken.course)
+        return math.inf if self._search is None else self._search.count(self.taken.nodes)
 
     def target_within(self) -> float:
         """Error, cycles, of the count at which the target was reached by the interpolation within the step, and by the
@@ -215,8 +200,7 @@ class DenseOutput:
 
         Values beyond the last step are NaN, whole numbers 0; empty before the first state.
         """
-        nodes = self.taken.nodes
-        cycles = np.array([node.cycle for node in nodes])
+        nodes, cycles = self.taken.nodes, self.taken.cycles
         reached = counts <= (cycles[-1] if nodes else -math.inf)
         places = np.searchsorted(cycles, counts[reached], "left")
         rows = [
@@ -263,7 +247,7 @@ class DenseOutput:
         end = self.taken.reached if self.reached_target else nodes[-1].cycle
         found = np.zeros(n_outputs)
         found[-1] = end
-        at, volumes = self._progress(nodes)
+        at, volumes = self.taken.cycles, self.values()["wear_depth"] @ self.area
         if len(nodes) < 2 or volumes[-1] <= 0.0:
             return found
         last = int(np.clip(np.searchsorted(at, end), 1, len(nodes) - 1))
@@ -285,22 +269,6 @@ class DenseOutput:
     def _volume_at(self, start: Node, end: Node, count: float) -> float:
         """Worn volume at a count within a step, m3."""
         return float(self._depth(start, end, (count - start.cycle) / (end.cycle - start.cycle)) @ self.area)
-
-    def _progress(self, nodes: Sequence[Node]) -> tuple[FloatArray, FloatArray]:
-        """Counts (n,) and worn volumes (n,), m3, of nodes."""
-        return np.array([node.cycle for node in nodes]), np.array(
-            [node.report.wear_depth @ self.area for node in nodes]
-        )
-
-    def _thinned(self, nodes: list[Node]) -> list[Node]:
-        """The nodes without those of little progress, see `even_counts`."""
-        at, volumes = self._progress(nodes)
-        way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
-        least, kept = 2.0 * way[-1] / KEPT_STEPS, [0]
-        for place in range(1, len(nodes) - 1):
-            if way[place + 1] - way[kept[-1]] > least:
-                kept.append(place)
-        return [nodes[place] for place in (*kept, len(nodes) - 1)]
 
 
 def _column(values: list[Any], reached: BoolArray) -> NDArray[np.generic]:

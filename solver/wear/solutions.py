@@ -23,7 +23,7 @@ from solver.settings import FollowedFrequency, Resolution, Scheme, ToTheEnd, Wea
 from solver.structure.joint import Case
 from solver.wear.check import FullCheck, PlainCheck, unstable_at_end
 from solver.wear.control import Adaptive, Given, Growing, LargestDepth, Steps
-from solver.wear.integrate import HISTORY_ITERATIONS, Integration, Progress, guarded
+from solver.wear.integrate import HISTORY_ITERATIONS, Integration, guarded
 from solver.wear.output import DenseOutput, OutputState
 from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
@@ -122,12 +122,13 @@ class Like:
 class Saved:
     """The progress of the computation of a history, from which the computation goes on.
 
-    progress, output, iterations: state of the present integration.
+    state, n_steps, output, iterations: of the present integration.
     fine: the finished history, while its reference solution is integrated; else None.
     spent: CPU seconds so far.
     """
 
-    progress: Progress
+    state: WearState
+    n_steps: int
     output: OutputState
     iterations: int
     fine: Ended | None
@@ -163,27 +164,26 @@ class Solutions:
         """CPU seconds so far, those before an interruption included."""
         return computing_time() - self.began
 
-    def history(self) -> Ended:
-        """Integrate the history."""
+    def history(self, *, stable_end: bool = True) -> Ended:
+        """Integrate the history. stable_end: whether the stability of its last state is tested."""
         if self.fine is not None:
             return self.fine
         asked, start = self.asked, self.start
-        counts, share = (None, asked.cycles.final_share) if isinstance(asked.cycles, ToTheEnd) else (asked.cycles, 0.0)
         work = self._joint()
         integration = Integration(
             asked.steps(work),
             FullCheck(asked.loops, with_resonance=self._shifts),
-            DenseOutput(work.area, counts, smooth=asked.scheme == "adaptive", target=asked.until),
-            lambda progress: self._save(integration, progress, None),
+            DenseOutput(work.area, asked.scheme == "adaptive", self._given_counts, asked.until),
+            lambda state, n_steps: self._save(integration, state, n_steps, None),
             HISTORY_ITERATIONS,
             asked.end,
-            share,
+            asked.cycles.final_share if isinstance(asked.cycles, ToTheEnd) else 0.0,
         )
         estimate, accurate = Estimate(start.response_error, start.wear_rate_error), start.outcome is Outcome.CONVERGED
         first = start.state
         assert first is not None
         ended = self._run(integration, lambda: work.begin(first, start.resolution, estimate, accurate=accurate))
-        if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
+        if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED or not stable_end:
             return ended
         state = ended.state
         unstable = guarded(lambda: unstable_at_end(work, state))
@@ -195,7 +195,7 @@ class Solutions:
         like = Like(fine.output.course.resolutions, fine.state.step_limit, fine.iterations)
         reached = min(fine.output.course.ends[-1], self.asked.end)
         # NaN where no target was reached
-        counts = np.concatenate([[0.0, fine.output.reached], self.counts(fine), fine.output.course.cycles])
+        counts = np.concatenate([[0.0, fine.output.reached], self.counts(fine), fine.output.cycles])
         return self.follow(like, np.unique(counts[counts <= reached]), fine)
 
     def follow(self, like: Like, compared: FloatArray, fine: Ended | None = None) -> Ended:
@@ -212,8 +212,8 @@ class Solutions:
         integration = Integration(
             Adaptive(work, ratio * self.case.settings.rtol, asked.last_step_end(end), first, bounded=False),
             PlainCheck(resolutions, with_resonance=self._shifts),
-            DenseOutput(work.area, compared, smooth=True),
-            lambda progress: self._save(integration, progress, fine),
+            DenseOutput(work.area, smooth=True, counts=compared),
+            lambda state, n_steps: self._save(integration, state, n_steps, fine),
             like.iterations + HISTORY_ITERATIONS,
             end,
         )
@@ -232,6 +232,10 @@ class Solutions:
             return np.zeros(self.asked.cycles.n_outputs)
         return self.output_of(fine).even_counts(self.asked.cycles.n_outputs)
 
+    @property
+    def _given_counts(self) -> FloatArray:
+        return np.zeros(0) if isinstance(self.asked.cycles, ToTheEnd) else self.asked.cycles
+
     def output_of(self, fine: Ended) -> DenseOutput:
         """The output of the history, to be read."""
         return self._output(fine, smooth=self.asked.scheme == "adaptive")
@@ -241,7 +245,7 @@ class Solutions:
         return self._output(ended, smooth=True)
 
     def _output(self, ended: Ended, *, smooth: bool) -> DenseOutput:
-        return DenseOutput(self.case.model.contact.area, None, smooth, self.asked.until, ended.output)
+        return DenseOutput(self.case.model.contact.area, smooth, np.zeros(0), self.asked.until, ended.output)
 
     def _joint(self) -> WearingJoint:
         """The joint, with the rest of the time limit."""
@@ -254,28 +258,27 @@ class Solutions:
     def _run(self, integration: Integration, begin: Callable[[], WearState]) -> Ended:
         """Run an integration from its first or its saved state."""
         output, budget = integration.output, integration.steps.work.run.budget
-        progress: Progress | Failure
-        if self.saved is not None:
-            budget.iterations, output.taken = self.saved.iterations, self.saved.output
-            progress, self.saved = self.saved.progress, None
+        n_steps, saved, self.saved = 0, self.saved, None
+        first: WearState | Failure
+        if saved is not None:
+            budget.iterations, output.taken = saved.iterations, saved.output
+            first, n_steps = saved.state, saved.n_steps
         else:
-            progress = guarded(lambda: integration.begin(begin()))
-        if isinstance(progress, Failure):
-            return Ended(None, progress, output.taken, budget.iterations)
-        state, failure = integration.run(progress)
+            first = guarded(lambda: integration.begin(begin()))
+        if isinstance(first, Failure):
+            return Ended(None, first, output.taken, budget.iterations)
+        state, failure = integration.run(first, n_steps)
         last, over = output.last, state.cycle < integration.end < math.inf and not state.wears
         if failure.outcome is Outcome.CONVERGED and last is not None and over:
             # nothing wears any more: the state holds for all later counts
             output.add(integration.end, last.report, last.rate, 0.0)
         return Ended(state, failure, output.taken, budget.iterations)
 
-    def _save(self, integration: Integration, progress: Progress, fine: Ended | None) -> None:
+    def _save(self, integration: Integration, state: WearState, n_steps: int, fine: Ended | None) -> None:
         """Pass the progress of an integration to `keep`."""
         if self.keep is not None:
-            saved = Saved(
-                progress, integration.output.taken, integration.steps.work.run.budget.iterations, fine, self.spent
-            )
-            self.keep(pack(saved))
+            iterations = integration.steps.work.run.budget.iterations
+            self.keep(pack(Saved(state, n_steps, integration.output.taken, iterations, fine, self.spent)))
 
 
 def begin_reference(work: WearingJoint, start: StartState, step_limit: float) -> WearState:

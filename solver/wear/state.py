@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.harmonic_balance.state import State
@@ -95,10 +95,6 @@ class WearState:
     def wears(self) -> bool:
         """Whether the wear rate is above the round-off of the slip by the static load."""
         return bool(self.rates[-1] > self.least_rate)
-
-    def planned(self, length: float) -> WearState:
-        """The state with another length of the next step, cycles."""
-        return replace(self, length=length)
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,7 @@ class CompletionIndex:
         """Adds the progress of a task."""
         if not isinstance(progress, Packed):
             raise TypeError(f"{progress!r} is no progress of {task}")
-        self.store.put_if_small(PROGRESS, task.key, progress)
+        self.store.put(PROGRESS, task.key, progress)
         self.store.note_life(task.key)
 
     def forget_failed(self, complete: Collection[int]) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, cast
 from solver.contact.wear_law import WearLaw
 from solver.packing import Packed
 from solver.settings import WearTarget
-from studyrunner.kinds.estimate import iterations_of_missions, seconds_an_iteration
+from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_an_iteration
 from studyrunner.kinds.task import (
     Identity,
     Index,
@@ -44,6 +44,9 @@ if TYPE_CHECKING:
 
 _OF_ONE_PAIR = 3
 """Relative displacements of one contact pair, at most."""
+
+_MOST = 0.95
+"""Largest share of a history that is said to be done before all of it is: the number of blocks is an estimate."""
 
 _POINT = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
 _FOR_THE_TABLE = ("worn_volume", "block_worn_volume")
@@ -126,11 +129,12 @@ class Mission(PointTask):
             for block in self.blocks
         )
         reached, n_computed = Reached(self, keep), itertools.count(1)
+        # as many again for the reference solution
+        n_planned = 2 * len(blocks) * missions_computed(self.missions[-1])
 
-        def note(progress: Packed | str) -> None:
+        def note(progress: Packed) -> None:
             reached(progress)
-            if len(blocks) > 1 and not isinstance(progress, str):
-                keep(f"{count(next(n_computed), 'block')} computed")
+            keep(min(next(n_computed) / n_planned, _MOST))
 
         mission = solver_blocks.Mission(
             blocks,

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 Index = tuple[int, ...]
 """Index of a point along the dimensions of the study."""
 
-Keep = Callable[[Packed | str], None]
-"""Takes the progress of a task: data to continue from, or words."""
+Keep = Callable[[Packed | str | float], None]
+"""Takes the progress of a task: data to continue from, words, or the share that is done, 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -356,9 +356,9 @@ class Reached:
         self.last = task.resume
         self._keep = keep
 
-    def __call__(self, progress: Packed | str) -> None:
+    def __call__(self, progress: Packed | str | float) -> None:
         """Takes progress as `Keep` does."""
-        self.last = self.last if isinstance(progress, str) else progress
+        self.last = progress if isinstance(progress, Packed) else self.last
         self._keep(progress)
 
     def after(self, outcome: Outcome) -> Packed | None:

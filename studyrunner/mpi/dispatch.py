@@ -51,7 +51,7 @@ class Work(Protocol):
 
     @property
     def gives_starts(self) -> bool:
-        """Whether results of the task make other tasks possible."""
+        """Whether other tasks wait for the results."""
 
 
 Task = TypeVar("Task", bound=Work)

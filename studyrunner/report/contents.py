@@ -146,5 +146,6 @@ def draw_report(result: Result) -> Iterator[Item]:
 
 def list_figures() -> str:
     """The table of figures for the page REPORT."""
-    rows = [f"| `{entry.name}` | {entry.shows} | {', '.join(entry.kinds)} |" for entry in FIGURES]
-    return "\n".join(("| file | shows | results of |", "|---|---|---|", *rows))
+    only: dict[tuple[str, ...], str] = {(MISSIONS,): f" ({MISSIONS})", (MODES,): f" ({MODES})"}
+    rows = [f"| `{entry.name}` | {entry.shows}{only.get(entry.kinds, '')} |" for entry in FIGURES]
+    return "\n".join(("| file | shows |", "|---|---|", *rows))

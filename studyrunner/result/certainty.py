@@ -61,8 +61,9 @@ class Certainty:
         text += f", {self.n_unknown} without an estimate" if self.n_unknown else ""
         if not self.worst > 0.0:
             return text
-        at = f" at {self.where}" if self.where else ""
-        return f"{text}; the least certain is {known}{at}{advice}"
+        where = f"{self.where}, " if self.where else ""
+        advice = f"; {self.advice}" if self.advice else ""
+        return f"{text}; least certain: {where}{known.removeprefix('known ')}{advice}"
 
 
 def certainty_of(result: Result, *, wore: bool = True) -> Certainty | None:
@@ -123,7 +124,7 @@ def tell_ends(result: Result) -> str:
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
     n_early = int(np.count_nonzero(result.held & ~result.computed))
     text = f"{count(n_points, 'point')}, {n_computed} computed to the end"
-    text += f", {n_early} ended early and hold what was computed until then" if n_early else ""
+    text += f", {n_early} ended early with values up to there" if n_early else ""
     n_without = n_points - n_computed - n_early
     return f"{text}, {n_without} without a result." if n_without else f"{text}."
 

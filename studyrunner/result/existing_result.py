@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from studies.hdf5 import is_hdf5, open_hdf5, read_attribute
 from studies.scene_error import SceneError
 from studies.scene_file import has_mesh
-from studyrunner.checkpoint.database import read_study
+from studyrunner.checkpoint.store import read_study
 from studyrunner.result.paths import progress_file
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.study.toml_text import read_toml

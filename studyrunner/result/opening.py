@@ -66,10 +66,10 @@ def open_result(path: str | Path) -> xr.Dataset:
     """
     opened = _open(path)[0]
     loops = [name for name in LOOPS if name in opened]
-    if not loops:
-        return opened
     asked = study_tables(opened.attrs).get("outputs", {}).get("loops")
     pairs = [pair for pair in opened["contact"].values.tolist() if isinstance(asked, list) and pair in asked]
+    if not loops or not pairs:
+        return opened
     others = [name for name, array in opened.coords.items() if "contact" in array.dims and name != "contact"]
     own = opened[loops].drop_vars(others).sel(contact=pairs).rename(contact="loop_contact")
     own["loop_contact"].attrs["long_name"] = "index of a contact pair whose loops are kept, see outputs.loops"

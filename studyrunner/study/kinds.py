@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import ValidationError
+
+from solver.settings import FOLLOWED, FollowedFrequency
 from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS, OF_MISSIONS_BY_DEFAULT, OF_SAMPLED_MISSIONS
 from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.study.mistakes import Mistakes
-from studyrunner.study.sections import SOLVER_AXES, AxesSection, SlowTimeSection, WearSection
+from studyrunner.study.sections import SOLVER_AXES, AxesSection, LoadingSection, SlowTimeSection, WearSection
 from studyrunner.values import listed
 from studyrunner.variables import ASKED, KEPT, OF_SAMPLES, USUAL, Variable
 
@@ -106,6 +109,30 @@ def take_ratio(tables: Tables, found: Mistakes) -> dict[str, str]:
         found.add("scatter.frequency", tables["scatter"].pop("frequency"), remedy)
     axes["frequency"] = axes["frequency_ratio"]
     return {"axes.frequency": "axes.frequency_ratio"}
+
+
+def take_followed(tables: Tables, found: Mistakes) -> FollowedFrequency | None:
+    """What the frequency follows, None where it is given; the axis then gets the middle of the range."""
+    given, loading = tables["axes"].get("frequency"), tables.get("loading")
+    words = [each for each in listed(given) if isinstance(each, str)]
+    if not words and loading is not None:
+        remedy = 'leave it out, or give axes.frequency = "resonance" or "peak", which is followed in this range'
+        found.add("loading", tables.pop("loading"), remedy)
+    if not words or words[0] not in FOLLOWED:
+        return None
+    if len(words) > 1:
+        found.add("axes.frequency", given, f'give "{words[0]}" alone, and another study for the other')
+    elif given not in (words[0], words):
+        found.add("axes.frequency", given, f'give "{words[0]}" alone: every point has the frequency that it finds')
+    tables["axes"] = {**tables["axes"], "frequency": IDLE_FREQUENCY}
+    tables.setdefault("loading", {})
+    try:
+        low, high = LoadingSection.model_validate(tables["loading"]).between
+    except ValidationError:
+        # said with the other tables
+        return None
+    tables["axes"]["frequency"] = 0.5 * low + 0.5 * high
+    return FollowedFrequency(words[0], low, high)
 
 
 def take_unused(tables: Tables, found: Mistakes) -> None:

@@ -8,9 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
-from solver.settings import FOLLOWED, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter.section import flat_table
 from studyrunner.study.kinds import (
@@ -18,6 +17,7 @@ from studyrunner.study.kinds import (
     MODES,
     Tables,
     kind_of,
+    take_followed,
     take_ratio,
     take_unused,
     with_idle_values,
@@ -45,7 +45,6 @@ from studyrunner.study.sections import (
     SOLVER_AXES,
     VARIABLES,
     AxesSection,
-    LoadingSection,
     OutputsSection,
     WearSection,
 )
@@ -55,7 +54,6 @@ from studyrunner.study.toml_text import format_toml, read_toml, read_toml_file
 from studyrunner.study.worn import AXIS as WORN_AXIS
 from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError
-from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
 _MOST_WRONG_PARTS = 20
@@ -243,7 +241,7 @@ def _check_part(
             parts["scene"] = check_scene(tables["scene"], origin)
     if "mission" in tables and (of_blocks := _block_studies(tables, blocks, origin, before, found)):
         parts |= {"mission": blocks, "block_studies": of_blocks}
-    parts["follow"] = _take_followed(tables, found)
+    parts["follow"] = take_followed(tables, found)
     filled = with_idle_values(tables)
     for name, kind in SECTIONS.items():
         if name in filled and name not in before:
@@ -292,30 +290,6 @@ def _block_studies(
                 study = study.model_copy(update={"axes": study.axes.model_copy(update={"frequency": (frequency,)})})
             studies.append(study)
     return tuple(studies) if len(studies) == len(blocks) else ()
-
-
-def _take_followed(tables: Tables, found: Mistakes) -> FollowedFrequency | None:
-    """What the frequency follows, None where it is given; the axis then gets the middle of the range."""
-    given, loading = tables["axes"].get("frequency"), tables.get("loading")
-    words = [each for each in listed(given) if isinstance(each, str)]
-    if not words and loading is not None:
-        remedy = 'leave it out, or give axes.frequency = "resonance" or "peak", which is followed in this range'
-        found.add("loading", tables.pop("loading"), remedy)
-    if not words or words[0] not in FOLLOWED:
-        return None
-    if len(words) > 1:
-        found.add("axes.frequency", given, f'give "{words[0]}" alone, and another study for the other')
-    elif given not in (words[0], words):
-        found.add("axes.frequency", given, f'give "{words[0]}" alone: every point has the frequency that it finds')
-    tables["axes"] = {**tables["axes"], "frequency": IDLE_FREQUENCY}
-    tables.setdefault("loading", {})
-    try:
-        low, high = LoadingSection.model_validate(tables["loading"]).between
-    except ValidationError:
-        # said with the other tables
-        return None
-    tables["axes"]["frequency"] = 0.5 * low + 0.5 * high
-    return FollowedFrequency(words[0], low, high)
 
 
 def _with_usual_variables(parts: Mapping[str, Any], tables: Tables) -> OutputsSection:

@@ -18,7 +18,6 @@ from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
-from studyrunner.task_runs import build_evaluator
 
 STUDY = (
     "axes.frequency={start = 209.5, stop = 213.5, num = 100}",
@@ -33,12 +32,12 @@ def record_line() -> None:
     study = read_study("dovetail", STUDY)
     model = build_study_scene(study)
     plan = build_tasks(study, describe_scene(model).n_displacements)
-    evaluate = build_evaluator(model)
-    next(iter(evaluate(plan.sweeps[0], _forget)))  # compiles
+    models = {0: model}
+    next(iter(plan.sweeps[0].compute(models, _forget)))  # compiles
     print("frequency,wear_coefficient,seconds,n_unknowns,moves")
     (sweep,) = plan.sweeps
     began = time.thread_time()
-    for started in evaluate(sweep, _forget):
+    for started in sweep.compute(models, _forget):
         spent = time.thread_time() - began
         assert isinstance(started, StartResult)
         place, kind = f"{sweep.frequencies[started.place]:.4f}", f"{started.n_unknowns},{int(started.moves)}"
@@ -46,7 +45,7 @@ def record_line() -> None:
         for planned in plan.waiting[0, started.place] if started.place % EVERY == 0 else ():
             history = planned.from_start(started)
             began = time.thread_time()
-            list(evaluate(history, _forget))
+            list(history.compute(models, _forget))
             print(f"{place},{history.wear_coefficient:g},{time.thread_time() - began:.4f},{kind}")
         sys.stdout.flush()
         began = time.thread_time()
@@ -58,12 +57,12 @@ def record_samples() -> None:
     model, scenes = build_study_scene(study), find_scenes(study)
     facts = describe_scene(model)
     plan = build_tasks(study, facts.n_displacements, contact_changes(study, scenes, [facts]), scenes)
-    evaluate = build_evaluator(model)
-    next(iter(evaluate(plan.sweeps[0], _forget)))  # compiles
+    models = {0: model}
+    next(iter(plan.sweeps[0].compute(models, _forget)))  # compiles
 
     def timed(task: Task) -> tuple[object, float]:
         began = time.thread_time()
-        (result,) = evaluate(task, _forget)
+        (result,) = task.compute(models, _forget)
         return result, time.thread_time() - began
 
     print("start_seconds,n_unknowns,moves,seconds")

@@ -199,11 +199,11 @@ def run_here(arguments: Sequence[str], folder: Path) -> xr.Dataset:
 
 def fake_here(arguments: Sequence[str], folder: Path, environment: dict[str, str] | None = None) -> int:
     """Exit status of a run with the stand-in for the solver, in this process. arguments: FAKED first, as elsewhere."""
-    from tests.mpi.run_faked import build_fake
+    from tests.mpi.run_faked import compute_fake
 
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setattr(task_runs, "build_evaluator", build_fake)
+        patch.setattr(task_runs, "compute_task", compute_fake)
         for name, value in (environment or {}).items():
             patch.setenv(name, value)
         return main(arguments[1:])
@@ -233,19 +233,6 @@ def _parent(pid: int) -> int:
 
 def _same_rank(one: dict[bytes, bytes], other: dict[bytes, bytes]) -> bool:
     return any(name in one and one[name] == other.get(name) for name in (b"PMI_RANK", b"OMPI_COMM_WORLD_RANK"))
-
-
-def memory_of_mapping(name: str) -> dict[str, int]:
-    """What this process has of a mapped file: all of it, and what it has copied for itself, kB."""
-    found = {"Rss": 0, "Anonymous": 0}
-    inside = False
-    for line in Path("/proc/self/smaps").read_text(encoding="utf-8", errors="replace").splitlines():
-        head, *rest = line.split()
-        if not head.endswith(":"):
-            inside = name in line
-        elif inside and head[:-1] in found:
-            found[head[:-1]] += int(rest[0])
-    return found
 
 
 def count_entries(kind: str, result: Path = Path("out.nc")) -> int:

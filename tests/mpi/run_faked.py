@@ -20,7 +20,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,8 +34,8 @@ from studyrunner.cli import main
 from studyrunner.kinds.task import Keep, PointResult, Result, Task
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi import schedule
-from studyrunner.mpi.launcher import launcher_rank
-from studyrunner.scene.scene import describe_scene
+from studyrunner.mpi.ranks import launcher_rank
+from studyrunner.scene.scene import SceneFacts, describe_scene
 from studyrunner.system import progress
 from tests.mpi.losses import DONE
 from tests.studyrunner.fakes import changed, fake_evaluate, fake_sweep
@@ -47,63 +47,82 @@ PATIENCE = 200.0
 """Seconds: less than the tests have."""
 
 
-def build_fake(model: object, *_: object) -> Callable[..., Iterator[Result]]:
-    facts = describe_scene(model)
+def compute_fake(task: Task, models: Mapping[int, object], keep: Keep) -> Iterator[Result]:
+    """Stands for `task_runs.compute_task`."""
+    facts = facts_of(models[task.scenes[0]])
     seconds = float(os.environ.get("FAKE_SECONDS", "0.0" if "FAKE_NOTHING" in os.environ else "0.002"))
-    failing = int(os.environ.get("FAKE_FAILURE", "-1"))
     n_steps = int(os.environ.get("FAKE_STEPS", "0"))
+    if isinstance(task, Sweep):
+        yield from compute_sweep(task, n_steps, seconds, keep)
+    else:
+        assert isinstance(task, History)
+        yield from compute_history(task, facts, n_steps, seconds, keep)
+
+
+FACTS: dict[int, tuple[object, SceneFacts]] = {}
+
+
+def facts_of(model: object) -> SceneFacts:
+    """Facts of a model, found once."""
+    if id(model) not in FACTS:
+        FACTS[id(model)] = model, describe_scene(model)
+    return FACTS[id(model)][1]
+
+
+def crash_in(kind: str) -> str:
+    """How tasks of a kind are to crash; empty for not at all."""
     crash, _, in_sweep = os.environ.get("FAKE_CRASH", "").partition(" ")
+    return crash if (kind == "sweep") == bool(in_sweep) else ""
 
-    def evaluate(task: Task, keep: Keep) -> Iterator[Result]:
-        if isinstance(task, Sweep):
-            left = list(task.places)
-            for place, started in enumerate(fake_sweep(replace(task, known=frozenset()))):
-                if not left:
-                    return
-                if in_sweep and started.place == 3:
-                    # what was given before is on the disk by then
-                    time.sleep(1.0)
-                    end_process(crash)
-                if place < gone_on_from(task):
-                    continue
-                if n_steps:
-                    time.sleep(2.0 * seconds)
-                    note_step(task, place)
-                if started.place in left:
-                    left.remove(started.place)
-                    if n_steps:
-                        note_done("result", task, started.place)
-                    yield replace(started, start=replace(started.start, arrays=(*started.start.arrays, BULK)))
-                if n_steps:
-                    keep(Packed("sweep", (np.array([place + 1.0]),)))
-                if "FAKE_PATIENCE" in os.environ:
-                    wait_until(Path(f"sweep{task.number}.txt").exists, float(os.environ["FAKE_PATIENCE"]))
-        else:
-            assert isinstance(task, History)
-            yield from integrate(task, keep)
 
-    def integrate(task: History, keep: Keep) -> Iterator[PointResult]:
-        if crash and not in_sweep and task.position == 1:
-            end_process(crash)
-        if launcher_rank() == failing:
-            # not the task, but what is around it
-            yield from fake_evaluate(task, facts=facts)
-        elif failing >= 0:
-            time.sleep(PATIENCE)
-        if "FAKE_TOGETHER" in os.environ:
-            meet(int(os.environ["FAKE_TOGETHER"]))
-        carried = walk(task, n_steps, seconds, keep) if n_steps else 0.0
-        for result in fake_evaluate(task, facts=facts, seconds=0.0 if n_steps else seconds):
-            assert isinstance(result, PointResult)
-            if "FAKE_SECONDS" in os.environ and not n_steps:
-                for name in (f"rank{launcher_rank()}.txt", f"sweep{task.sweep}.txt"):
-                    with Path(name).open("a", encoding="utf-8") as file:
-                        file.write(f"{result.values['run_time']}\n")
+def compute_sweep(task: Sweep, n_steps: int, seconds: float, keep: Keep) -> Iterator[Result]:
+    left = list(task.places)
+    for number, started in enumerate(fake_sweep(replace(task, known=frozenset()))):
+        if not left:
+            return
+        if crash_in("sweep") and started.place == 3:
+            # what was given before is on the disk by then
+            time.sleep(1.0)
+            end_process(crash_in("sweep"))
+        if number < gone_on_from(task):
+            continue
+        if n_steps:
+            time.sleep(2.0 * seconds)
+            note_step(task, number)
+        if started.place in left:
+            left.remove(started.place)
             if n_steps:
-                note_done("result", task, result.place)
-            yield changed(result, error_estimate=carried)
+                note_done("result", task, started.place)
+            yield replace(started, start=replace(started.start, arrays=(*started.start.arrays, BULK)))
+        if n_steps:
+            keep(Packed("sweep", (np.array([number + 1.0]),)))
+        if "FAKE_PATIENCE" in os.environ:
+            wait_until(Path(f"sweep{task.number}.txt").exists, float(os.environ["FAKE_PATIENCE"]))
 
-    return evaluate
+
+def compute_history(
+    task: History, facts: SceneFacts, n_steps: int, seconds: float, keep: Keep
+) -> Iterator[PointResult]:
+    failing = int(os.environ.get("FAKE_FAILURE", "-1"))
+    if crash_in("history") and task.position == 1:
+        end_process(crash_in("history"))
+    if launcher_rank() == failing:
+        # not the task, but what is around it
+        yield from fake_evaluate(task, facts=facts)
+    elif failing >= 0:
+        time.sleep(PATIENCE)
+    if "FAKE_TOGETHER" in os.environ:
+        meet(int(os.environ["FAKE_TOGETHER"]))
+    carried = walk(task, n_steps, seconds, keep) if n_steps else 0.0
+    for result in fake_evaluate(task, facts=facts, seconds=0.0 if n_steps else seconds):
+        assert isinstance(result, PointResult)
+        if "FAKE_SECONDS" in os.environ and not n_steps:
+            for name in (f"rank{launcher_rank()}.txt", f"sweep{task.sweep}.txt"):
+                with Path(name).open("a", encoding="utf-8") as file:
+                    file.write(f"{result.values['run_time']}\n")
+        if n_steps:
+            note_done("result", task, result.place)
+        yield changed(result, error_estimate=carried)
 
 
 def gone_on_from(task: Task) -> int:
@@ -184,7 +203,7 @@ def wait_until(condition: Callable[[], bool], patience: float) -> None:
 
 
 if __name__ == "__main__":
-    task_runs.build_evaluator = build_fake
+    task_runs.compute_task = compute_fake
     schedule.SECONDS_TO_PROGRESS = float(os.environ.get("FAKE_PROGRESS", "0.03"))
     if "FAKE_TELLING" in os.environ:
         progress.FIRST_LINE = progress.LONGEST_SILENCE = float(os.environ["FAKE_TELLING"])

@@ -15,9 +15,10 @@ STUDY = ["sdof_slider", "-o", "out.nc", "--set", "axes.frequency={start = 100, s
 OTHER_VERSION = """\
 import os, runpy, sys
 sys.path.insert(0, {root!r})
-from studyrunner.mpi import version_check
+from studyrunner.mpi import ranks, schedule
+ranks._SECONDS_TO_ANSWER = 3.0
 if os.environ["PMI_RANK"] == "1":
-    version_check.{change}
+    {change}
 sys.argv = [{faked!r}, *sys.argv[1:]]
 runpy.run_path({faked!r}, run_name="__main__")
 """
@@ -49,20 +50,16 @@ def test_launcher_of_mpich_and_library_of_open_mpi(open_mpi, tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ("_SOURCES = ('solver',)", ["runs source of run-study "]),
-        ("report_version = lambda ranks: None", ["rank 1 has not said within 1 s what it runs"]),
+        ("schedule.describe_software = lambda: ('elsewhere', 'other')", "rank 1 on elsewhere runs other versions"),
+        ("schedule.follow_rank_0 = lambda *_: None", "rank 1 has not said within 3 s what it runs"),
     ],
     ids=["another source", "one that does not answer"],
 )
 def test_ranks_with_different_software(change, said, tmp_path):
     program = tmp_path / "other.py"
     program.write_text(OTHER_VERSION.format(root=str(ROOT), faked=FAKED, change=change), encoding="utf-8")
-    if "report" in change:
-        change = "check_versions.__defaults__ = (1.0,)"
-        lines = program.read_text(encoding="utf-8").replace("sys.argv =", f"version_check.{change}\nsys.argv =")
-        program.write_text(lines, encoding="utf-8")
     done = run_command([*launcher(2), sys.executable, str(program), *STUDY], tmp_path)
-    assert_refused(done, *said, "install the same software for all ranks")
+    assert_refused(done, said, "install the same software for all ranks")
     assert [path.name for path in tmp_path.iterdir()] == ["other.py"]
 
 

@@ -1,6 +1,5 @@
 """run-study under mpiexec: the same result for any number of ranks, and an end in good order for all of them."""
 
-import json
 import re
 import signal
 import sys
@@ -11,7 +10,7 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from tests.benchmarks.overhead import run
-from tests.mpi.launching import CHEAP, FAKED, ROOT, SOON, launcher, run_command, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, SOON, launcher, run_command, run_to_end
 from tests.studyrunner.test_progress import LINE
 
 GRID = [
@@ -137,26 +136,6 @@ def test_a_run_on_two_ranks_says_how_far_it_is(tmp_path):
     assert done[0] < done[-1]
     assert int(found[0]["percent"]) < int(found[-1]["percent"])
     assert max(len(match["running"].split(", ")) for match in found if match["running"]) == 2, ended.said
-
-
-SCRIPT = str(ROOT / "tests/mpi/share_arrays.py")
-N_BYTES = 64_000_000
-
-
-def test_ranks_of_a_machine_share_what_is_handed_out(tmp_path):
-    """But the last one, which does not see the file."""
-    refused = 2
-    environment = {"SHARED_BYTES": str(N_BYTES), "CANNOT_MAP": str(refused)}
-    done = start(3, [SCRIPT], tmp_path, environment)
-    assert done.returncode == 0, done.stderr
-    for rank in range(3):
-        said = json.loads((tmp_path / f"{rank}.json").read_text(encoding="utf-8"))
-        assert said["sum"] == N_BYTES // 8
-        assert said["Anonymous"] == 0
-        if rank == refused:
-            assert said["Rss"] == 0
-        else:
-            assert said["Rss"] * 1024 >= N_BYTES
 
 
 def test_rank_0_does_not_hold_results(tmp_path):

@@ -92,5 +92,5 @@ def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch):
     monkeypatch.setattr(integrate, "ITERATIONS_PER_SAVE", 30)
     settings = SolverSettings(11, 128)
     whole, kept = from_every_stop(worn_wall(1.0), 1e-3, impacting_start(), 1e-7, 100.0, "implicit", 1000.0, settings)
-    cycles = [at.progress.state.cycle for at in kept if at.fine is None]
+    cycles = [at.state.cycle for at in kept if at.fine is None]
     assert min(cycles) < whole.jump_cycle < max(cycles)

@@ -141,8 +141,11 @@ def test_notebook_uses_what_users_have(path):
             imported.add(node.module)
     own = {name for name in imported if name.split(".")[0] in ("solver", "studies", "studyrunner", "tests")}
     doors = {"solver", "studies"} if path.stem in ("python_api", "modes", "followed_resonance") else set()
-    doors |= set() if path.stem in READ_A_RESULT else {"studyrunner"}
+    doors |= set() if path.stem in ("read_a_result", "wear_maps") else {"studyrunner"}
     assert all(
-        name in doors or name == "studyrunner.accessor" or name.startswith("studyrunner.report.") for name in own
+        name in doors
+        or name == "studyrunner.accessor"
+        or name.startswith(("studyrunner.report.", "studyrunner.result."))
+        for name in own
     ), own
     assert own

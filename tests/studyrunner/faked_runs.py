@@ -27,10 +27,9 @@ class Solver:
         self.n_results = 0
         self.disturb: Callable[[Task, int], None] = lambda *_: None
 
-        def build_fake(model: object, *_: object) -> Callable[..., Iterator[Result]]:
-            return lambda task, keep: self.evaluate(model, task, keep)
-
-        monkeypatch.setattr(task_runs, "build_evaluator", build_fake)
+        monkeypatch.setattr(
+            task_runs, "compute_task", lambda task, models, keep: self.evaluate(models[task.scenes[0]], task, keep)
+        )
 
     def evaluate(self, model: object, task: Task, keep: Keep) -> Iterator[Result]:
         self.tasks.append(task)

@@ -1,4 +1,4 @@
-"""File systems without locks, and faults of a disk: the run says so, with the words of the system."""
+"""Faults of a disk: the run says so, with the words of the system."""
 
 import errno
 import os
@@ -20,12 +20,9 @@ SHIM = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
-#include <fcntl.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 static int wanted(const char *variable) {
@@ -45,19 +42,6 @@ static int fails(int file) {
     static int n_writes = 0;
     return ++n_writes > 25 || strstr(path, ".partial") ? wanted("SHIM_PROGRESS") : 0;
 }
-
-#define LOCKING(name) \
-int name(int file, int command, ...) { \
-    int (*own)(int, int, void *) = dlsym(RTLD_NEXT, #name); \
-    va_list arguments; \
-    va_start(arguments, command); \
-    void *argument = va_arg(arguments, void *); \
-    va_end(arguments); \
-    if (wanted("SHIM_LOCK") && command == F_SETLK) { errno = wanted("SHIM_LOCK"); return -1; } \
-    return own(file, command, argument); \
-}
-LOCKING(fcntl)
-LOCKING(fcntl64)
 
 #define FAILING(name) \
 ssize_t name(int file, const void *data, size_t count, off_t place) { \
@@ -100,17 +84,6 @@ def run_with(shim, folder, **failing):
     environment = {f"SHIM_{name.upper()}": str(number) for name, number in failing.items()}
     command = ["env", "-u", "HDF5_USE_FILE_LOCKING", sys.executable, *STUDY]
     return run_command(command, folder, {"LD_PRELOAD": str(shim), **environment})
-
-
-@pytest.mark.slow
-def test_a_disk_without_locks_is_refused(shim, tmp_path):
-    """Two runs could write one file there."""
-    ended = run_with(shim, tmp_path, lock=errno.ENOLCK)
-    assert ended.returncode == 2
-    where = f"{tmp_path}/out.nc.progress: locks = none: "
-    remedy = "give a result file on another disk with -o: this file system has no locks"
-    assert ended.stderr.splitlines() == [f"run-study: {where}{remedy}"]
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow

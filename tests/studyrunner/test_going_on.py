@@ -134,13 +134,13 @@ def test_a_second_run_of_the_same_study_is_refused(solver, capsys, monkeypatch):
             second.append(main(TWO_WAYS))
 
     monkeypatch.setattr("studyrunner.cli.take_endings", lambda: None)
-    monkeypatch.setattr("studyrunner.checkpoint.database._SECONDS_TO_DIE", 0.1)
+    monkeypatch.setattr("studyrunner.checkpoint.store._SECONDS_TO_DIE", 0.1)
     solver.disturb = run_again
     assert main(TWO_WAYS) == 0
     assert second == [2]
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study:")]
     assert "out.nc.progress: in use: by process" in line
-    assert "another run is writing there: wait for its end, or give another result file with -o" in line
+    assert "wait for its end, or give another result file with -o" in line
 
 
 @pytest.mark.slow

@@ -47,11 +47,10 @@ def test_a_line_every_half_minute_at_least(clock, capsys):
 
     def look():
         looks.append(clock.now)
-        return Standing(5, 20, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
+        return Standing(5, 20, 0.25, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
 
     with ProgressDisplay() as shown:
         shown.say("computing")
-        shown.begin_tasks()
         for tenth in range(36_000):
             clock.now = 1000.0 + 0.1 * tenth
             shown.tick(look)
@@ -81,11 +80,10 @@ def test_a_bar_on_a_terminal(clock, monkeypatch):
 
     def look():
         looks.append(clock.now)
-        return Standing(5, 20, 30.0, ("210 Hz implicit",))
+        return Standing(5, 20, 0.25, 30.0, ("210 Hz implicit",))
 
     with ProgressDisplay() as shown:
         shown.say("computing")
-        shown.begin_tasks()
         for _ in range(1000):
             clock.now += 0.01
             shown.tick(look)
@@ -98,21 +96,16 @@ def test_a_bar_on_a_terminal(clock, monkeypatch):
     assert 90 <= len(looks) <= 101
 
 
-def build_slow(model, *_):
+def compute_slowly(task, models, keep):
     """The stand-in for the solver; each start state and each history takes a while."""
-    facts = describe_scene(model)
-
-    def evaluate(task, keep):
-        for result in fake_evaluate(task, keep, facts):
-            time.sleep(0.15)
-            yield result
-
-    return evaluate
+    for result in fake_evaluate(task, keep, describe_scene(models[0])):
+        time.sleep(0.15)
+        yield result
 
 
 @pytest.mark.parametrize("compiles", [True, False])
 def test_a_run_that_has_to_compile_says_so_once(compiles, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(task_runs, "build_evaluator", build_slow)
+    monkeypatch.setattr(task_runs, "compute_task", compute_slowly)
     numbers = itertools.count(3) if compiles else itertools.repeat(3)
     monkeypatch.setattr(task_runs, "n_compiled", lambda: next(numbers))
     assert main(["sdof_slider", "--set", "axes.frequency=100", "-o", str(tmp_path / "out.nc")]) == 0

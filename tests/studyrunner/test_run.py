@@ -26,16 +26,11 @@ SMALL = ["sdof_slider", "--set", "axes.frequency=[100, 110, 120]", "--set", "axe
 def use_fake(monkeypatch, change):
     """Puts the stand-in in place of the solver; `change` has the last word on every history."""
 
-    def build_fake(model, *_):
-        facts = describe_scene(model)
+    def compute(task, models, keep):
+        for result in fake_evaluate(task, keep, describe_scene(models[0])):
+            yield result if isinstance(result, StartResult) else change(task, result)
 
-        def evaluate(task, keep):
-            for result in fake_evaluate(task, keep, facts):
-                yield result if isinstance(result, StartResult) else change(task, result)
-
-        return evaluate
-
-    monkeypatch.setattr(task_runs, "build_evaluator", build_fake)
+    monkeypatch.setattr(task_runs, "compute_task", compute)
 
 
 def test_points_that_failed(monkeypatch, capsys):
@@ -89,7 +84,7 @@ def test_unexpected_failure_keeps_the_old_file(folder, monkeypatch, capsys):
     earlier = (folder / "out.nc").read_bytes()
     (folder / "out.nc.progress").unlink()
     with monkeypatch.context() as broken:
-        broken.setattr(task_runs.TaskProgress, "take", fail)
+        broken.setattr(task_runs.StudyRun, "take", fail)
         assert main(SMALL) == 1
     assert "ZeroDivisionError: a bug" in capsys.readouterr().err
     assert (folder / "out.nc").read_bytes() == earlier

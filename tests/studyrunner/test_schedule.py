@@ -9,19 +9,18 @@ import pytest
 from studyrunner.mpi import dispatch
 from studyrunner.mpi.cost_model import CostModel
 from studyrunner.mpi.dispatch import Dispatcher
-from studyrunner.mpi.launcher import LauncherError, launcher_rank, launcher_size
-from studyrunner.mpi.ranks import Alone, start_ranks
-from studyrunner.mpi.schedule import Handlers, serve_tasks
+from studyrunner.mpi.ranks import Alone, LauncherError, launcher_rank, launcher_size, start_ranks
+from studyrunner.mpi.schedule import Office, serve_tasks
 
 
-def take_nothing(job, result):
-    return []
+class Tasks(Office):
+    def __init__(self, tasks, take):
+        self.begin = lambda: tasks
+        self.take = take
 
 
-def serve(tasks, run, take=take_nothing):
-    costs = CostModel()
-    serve_tasks(Alone(), tasks, lambda job, _: run(job), Handlers(take), costs)
-    return costs
+def serve(tasks, run, take=lambda *_: []):
+    serve_tasks(Alone(), Tasks(tasks, take), lambda job, _: run(job))
 
 
 def test_long_tasks_go_first_and_results_make_new_ones():

@@ -119,7 +119,7 @@ def _solved(work: WearingJoint, state: WearState, check: FullCheck, share: float
     first = check(work, state)
     if isinstance(first, Failure):
         raise NoActiveSetError(f"{first.outcome.meaning} at the unworn state")
-    (unworn, report), output = first, DenseOutput(work.area, None, smooth=False)
+    (unworn, report), output = first, DenseOutput(work.area, smooth=False)
     output.add(0.0, report, work.rate(unworn.point.evaluation), 0.0)
     # the wear rate of the final state is round-off: its error is relative to the unworn state
     work.usual_work = float(unworn.point.evaluation.slip_work.sum())

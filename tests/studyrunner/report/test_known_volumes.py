@@ -26,7 +26,7 @@ def test_sentences_begin_with_the_worn_volume(tmp_path):
     assert (known.worst, known.where) == (0.02, "202 Hz, implicit scheme")
     assert "solver.rtol = 0.005" in known.advice
     assert tell_ends(result) == (
-        "8 points, 6 computed to the end, 1 ended early and hold what was computed until then, 1 without a result."
+        "8 points, 6 computed to the end, 1 ended early with values up to there, 1 without a result."
     )
     write_page(result, [], tmp_path / "index.html")
     html = (tmp_path / "index.html").read_text(encoding="utf-8")

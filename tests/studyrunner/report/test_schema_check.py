@@ -15,10 +15,24 @@ from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
 from studyrunner.result.opening import check_dataset, check_numbers
 from studyrunner.result.view import open_for_report
 from studyrunner.user_error import UserError
-from tests.studyrunner.result_mutations import replace_variable
 from tests.studyrunner.results import build_file, sample_file
 
 MARKUP = "$\\bad{$ <b>bold</b> [red]&amp;"
+
+
+def replace_variable(file, name, content, n_told):
+    """Another content of a variable, of whose dimensions the first are told."""
+    old = file[name]
+    scales = [list(dimension.values()) for dimension in old.dims]
+    kept = {key: old.attrs[key] for key in ("_Netcdf4Coordinates", "units", "flag_values") if key in old.attrs}
+    if content.dtype.kind == "U":
+        content = content.astype(object)
+    del file[name]
+    new = file.create_dataset(name, data=content)
+    new.attrs.update(kept)
+    for number in range(min(n_told, len(scales))):
+        for scale in scales[number]:
+            new.dims[number].attach_scale(scale)
 
 
 @pytest.fixture(scope="module")
