@@ -37,16 +37,15 @@ class Marched:
 
     - predicted_t (n_contact, 3, N): predicted force, N; tangential ones of inertial pairs as means over the steps.
     - force_t (n_contact, 3, N): contact force, N, compression positive; means for inertial pairs as in predicted_t.
-    - force_h (n_contact, 3, m): harmonics of the contact force, N.
-    - state_t (n_contact, 2, N+1): tangential state, N, beginning with the start of the period; for inertial pairs the
-      displacement, m.
+    - force_h (n_contact, 3, m): its harmonics, N.
+    - state_t (n_contact, 2, N+1): tangential state, N, from the start of the period on; of inertial pairs displacement,
+      m.
     - start (n_contact, 2): tangential state at the start of the first period, N; for inertial pairs the velocity at the
       start of the last period, m/s.
     - status_t (n_contact, N): SEPARATED, STICK or SLIP.
     - periods (n_contact,): number of periods that were marched.
     - periodicity_error: change of the tangential state over the last period, N.
-    - slip_work (n_contact,): integral of normal force times slip distance over a period, J. Archard's wear is
-      proportional to this integral, which is no work of a force (`solver.contact.archard`).
+    - slip_work (n_contact,): integral of normal force times slip distance over a period, J (`solver.contact.wear_law`).
     """
 
     predicted_t: FloatArray
@@ -186,9 +185,7 @@ class ContactLaw:
             )
         normal = np.flatnonzero(contact.has_normal & switching)
         if normal.size:
-            tangent[normal, :m, :m] = mean_normal_tangent(
-                at.predicted_t[normal], basis.synthesis, basis.analysis, contact.has_normal[normal]
-            )
+            tangent[normal, :m, :m] = mean_normal_tangent(at.predicted_t[normal], basis.synthesis, basis.analysis)
         passes = stuck[:, None] | (contact.dofs < 0)
         passes[:, 0] = stuck & contact.has_normal
         pair, component = np.nonzero(passes)

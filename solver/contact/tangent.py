@@ -73,8 +73,7 @@ def march_tangent(
 def pair_columns(m: int, line: int, has_normal: bool) -> tuple[IntArray, IntArray, int]:
     """Columns of the derivatives of a pair: first column of each component (3,), -1 for none; its tangents; number.
 
-    A pair with one tangent (`line` as in `rigid_slider.step_mass`) has the columns of its components alone; a pair with
-    both tangents has 3m columns.
+    A pair with one tangent has the columns of its components alone; a pair with both tangents has 3m columns.
     """
     columns = np.array([0 if has_normal else -1, m, 2 * m])
     if line < 0:
@@ -97,8 +96,7 @@ def _add_slip_work(
 ) -> None:
     """Add the derivative of the slip work of sample n to `work` (width + 2,).
 
-    normal_t (N,), state_t (2, N + 1): predicted normal force and state of the pair, N. before, after (2, width + 2):
-    derivatives of the state before and after the sample.
+    normal_t (N,): predicted normal force, N. before, after (2, width + 2): derivatives of the state around the sample.
     """
     step_1 = state_t[0, n + 1] - state_t[0, n]
     step_2 = state_t[1, n + 1] - state_t[1, n]
@@ -137,7 +135,6 @@ def _assemble(
     - dforce_t (N, n_tangents, width + 2 or more), work (width + 2,): derivatives with the start of the period held; the
       last two of width + 2 columns by the start.
     - dstart (2, width): derivative of the start.
-    - tangents, columns: as `pair_columns` returns them.
     """
     (m, n_samples), width = analysis_t.shape, dstart.shape[1]
     dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, tangents.size, -1)
@@ -172,8 +169,7 @@ def _start_tangent(
     """Derivative of the start of the last period, into `dstart` (2, width).
 
     - dstate (2, width + 2): derivative of the end of the last period.
-    - periods: number of periods before the last one, which give the derivative where the periodicity does not; 0 where
-      the start is given.
+    - periods: those before the last one, which give the derivative where the periodicity does not; 0: start given.
     """
     width = dstart.shape[1]
     dstart[:, :] = 0.0
@@ -211,11 +207,10 @@ def mass_tangent(
     has_normal: BoolArray,
     series: tuple[FloatArray, FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """Exact derivative of the periodic motion of `march_masses` with respect to the harmonics of the predicted force.
+    """Exact derivative of the periodic motion of `march_masses` by the harmonics of the predicted force.
 
     - predicted_t, friction, masses, step: arguments of `march_masses`.
     - start (n_contact, 2): velocity at the start of the period, m/s.
-    - has_normal (n_contact,): as in `model.ContactInterface`.
     - series (m, N), (m, N), (N, m): from the harmonics to the normal force at the samples and to the means of the
       tangential forces over the steps, and from these means back to their harmonics.
 
@@ -272,11 +267,9 @@ def _leave(
     mean: FloatArray,
     limit: FloatArray,
 ) -> None:
-    """Derivatives (5, width + 2) of the results of a step of a mass with respect to all columns, into `leave`.
+    """Derivatives (5, width + 2) of the results of a step of a mass by all columns, into `leave`.
 
-    - local (5, 5): derivatives of the step, as of `rigid_slider.step_plane`.
-    - entry (2, width + 2): derivatives of the velocities before the step.
-    - tangents, columns: as `pair_columns` returns them.
+    - local (5, 5): derivatives of the step. entry (2, width + 2): of the velocities before the step.
     - mean, limit (m,): derivatives of a force, and of the friction limit by the normal force, by their harmonics.
     """
     for row in range(5):

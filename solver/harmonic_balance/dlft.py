@@ -42,7 +42,7 @@ class Balance:
     - joint: the joint.
     - history (n_contact, 2): corrected slip X_T at the start of the period, m.
     - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6).
-    - wear_gain (n_contact,): `archard.wear_gain` of the step, m/J; 0 where W is given.
+    - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given.
     - wearing: wearing work of the wear law.
     """
 

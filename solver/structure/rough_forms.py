@@ -30,6 +30,7 @@ ROUGH_DIRECTIONS = 48
 ROUGH = 1e-3
 """Part of the stiffness that a rough product may leave out. Does not change results."""
 
+_NO_MATRICES = np.empty((0, 0, 0), np.complex64)
 SingleArray = NDArray[np.float32]
 SingleComplex = NDArray[np.complex64]
 
@@ -55,14 +56,7 @@ class RoughStiffness(NamedTuple):
 def rough_of_each(dense: ComplexArray) -> RoughStiffness:
     """Rough form with a matrix for each harmonic, from `dense` (H, n_rel, n_rel), N/m."""
     none = np.empty((0, 0), np.float32)
-    return RoughStiffness(
-        np.ascontiguousarray(dense, np.complex64),
-        none,
-        np.empty(0, np.float32),
-        none,
-        none,
-        np.empty((0, 0, 0), np.complex64),
-    )
+    return RoughStiffness(np.ascontiguousarray(dense, np.complex64), none, none.ravel(), none, none, _NO_MATRICES)
 
 
 def rough_of_shared(
@@ -78,21 +72,15 @@ def rough_of_shared(
     if left_out > ROUGH * common.size:
         return None
     rate = rates[:, None, None]
-    behind = [
-        common.basis.T @ np.real(part)[relative[:, None], internal]
-        for part in (linear.stiffness, linear.mass, linear.damping)
-    ]
-    coupling = behind[0] - rate**2 * behind[1] + 1j * rate * behind[2]
+    parts = (linear.stiffness, linear.mass, linear.damping)
+    spring, inertia, drag = (common.basis.T @ np.real(part)[relative[:, None], internal] for part in parts)
+    coupling = spring - rate**2 * inertia + 1j * rate * drag
     core = 1j * rate * common.drag - rate**2 * common.mass
     core = core - coupling @ held_compliance @ coupling.transpose(0, 2, 1)
     basis = np.ascontiguousarray(common.basis, np.float32)
+    slope, basis_t = (rates * common.slope).astype(np.float32), np.ascontiguousarray(basis.T)
     return RoughStiffness(
-        np.empty((0, 0, 0), np.complex64),
-        common.stiffness,
-        (rates * common.slope).astype(np.float32),
-        basis,
-        np.ascontiguousarray(basis.T),
-        np.ascontiguousarray(core, np.complex64),
+        _NO_MATRICES, common.stiffness, slope, basis, basis_t, np.ascontiguousarray(core, np.complex64)
     )
 
 
@@ -126,11 +114,9 @@ def _common_form(linear: LinearModel, relative: tuple[int, ...]) -> _CommonForm:
     norm = float(np.linalg.norm(stiffness))
     slope = float(np.vdot(stiffness, damping)) / norm**2 if norm > 0.0 else 0.0
     drag = damping - slope * stiffness
-    few = ROUGH_DIRECTIONS
-    directions = [
-        _leading(mass, few),
-        _leading(drag, few) if np.linalg.norm(drag) > 1e-6 * slope * norm else mass[:, :0],
-    ]
+    directions = [_leading(mass, ROUGH_DIRECTIONS)]
+    if np.linalg.norm(drag) > 1e-6 * slope * norm:
+        directions.append(_leading(drag, ROUGH_DIRECTIONS))
     directions += [_leading(part[rows[:, None], internal], internal.size) for part in parts]
     left, sizes, _ = np.linalg.svd(np.hstack(directions), full_matrices=False)
     basis = left[:, sizes > 1e-6]

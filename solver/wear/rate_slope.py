@@ -45,7 +45,7 @@ def rate_changes(
     """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths.
 
     joint, at: the joint and its converged state, whose tangential history is given.
-    gain (n_contact,): `archard.wear_gain` of one cycle, m/J.
+    gain (n_contact,): growth of the depth over wearing work in one cycle, m/J.
     wearing: part of the slip work that wears.
     depths (k, n_contact): changes of the depths, m.
     run, rtol: solves with the Jacobian of the state, and their relative residual.

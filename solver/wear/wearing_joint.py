@@ -8,7 +8,6 @@ import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.period_events import left_out
-from solver.contact.archard import volume_rate, wear_gain, wear_rate
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, final_history
@@ -93,11 +92,11 @@ class WearingJoint:
 
     def rate(self, at: Evaluation) -> FloatArray:
         """Wear rate (n_contact,), m per cycle, Eqs. (7), (21), (25)."""
-        return wear_rate(self.wear_coefficient, self.area, self.wearing.work(*worn_by(at)))
+        return self.gain(1.0) * self.wearing.work(*worn_by(at))
 
     def gain(self, cycles: float) -> FloatArray:
-        """Growth of the depth over wearing work (n_contact,), m/J, in a number of cycles."""
-        return wear_gain(self.wear_coefficient, self.area, cycles)
+        """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
+        return cycles * self.wear_coefficient / self.area
 
     def begin(
         self,
@@ -150,7 +149,7 @@ class WearingJoint:
         # the static slip included: where all pairs stick, the vibration alone is round-off
         pressed = np.abs(at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(at.displacement_h[:, 1:], axis=(1, 2)))
-        most = volume_rate(self.wear_coefficient, self.wearing.largest_factor * moved)
+        most = self.wear_coefficient * (self.wearing.largest_factor * moved)
         rates = np.append(volumes, volumes.sum())
         largest = np.maximum(state.largest_rates, np.abs(rates))
         state = replace(state, rates=rates, largest_rates=largest, most_rate=max(state.most_rate, most))

@@ -134,7 +134,7 @@ def kernel_results() -> dict[str, FloatArray]:
         "error": error,
         "wear": integrate_slip_work(force_t, state_t),
         "mean_normal": mean_normal_force(case.predicted_t),
-        "normal_tangent": mean_normal_tangent(case.predicted_t, BASIS.synthesis, BASIS.analysis, case.has_normal),
+        "normal_tangent": mean_normal_tangent(case.predicted_t, BASIS.synthesis, BASIS.analysis),
         "force_tangent": force_tangent,
         "wear_tangent": wear_tangent,
         "mass_force": mass_force_t,
