@@ -98,7 +98,7 @@ def frequencies_of_ratios(
 
 def check_blocks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> None:
     """Raises UserError where the blocks of a mission do not have equal pairs. facts: of each scene."""
-    for numbers in scenes.of_blocks if study.has_missions else ():
+    for numbers in scenes.of_blocks:
         for block, number in zip(study.mission, numbers, strict=True):
             if not _same_pairs(facts[numbers[0]], facts[number]):
                 remedy = (
