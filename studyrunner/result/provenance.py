@@ -31,10 +31,9 @@ _COMMENT = (
 
 
 def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
-    """Attributes of the file. They do not depend on time, place or number of ranks.
+    """Attributes of the file: not of time, place or number of ranks, so that equal runs have equal files.
 
-    Therefore there is no date_created without request: equal runs have equal files except for the run times. The id is
-    a hash of all inputs of the result.
+    The id is a hash of all inputs of the result.
     """
     text, solver = format_study(study), solver_digest()
     own = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"
@@ -81,10 +80,8 @@ def describe_versions() -> str:
 def compare_with_archived(study: Study, scene_sha256: str) -> tuple[str, ...]:
     """Reasons why a study from a result file may now have another result, as lines; none for other studies.
 
-    scene_sha256: digest of the scene built now. Only the scene of the file is compared: with other parameters the study
-    is another one.
+    scene_sha256: digest of the scene built now.
     """
-    archived = study.archived
-    if archived is None:
+    if study.archived is None:
         return ()
-    return archived.differences(scene_sha256, solver_digest(), describe_versions())
+    return study.archived.differences(scene_sha256, solver_digest(), describe_versions())

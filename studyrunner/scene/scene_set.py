@@ -89,11 +89,11 @@ def at_ratios(scenes: SceneSet, facts: Mapping[int, SceneFacts]) -> SceneSet:
 def frequencies_of_ratios(
     study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
 ) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
-    """Excitation frequencies, Hz: their dimensions, the last one frequency_ratio; None where the study gives Hz."""
+    """Excitation frequencies, Hz: their dimensions, the first one frequency_ratio; None where the study gives Hz."""
     if study.axes.frequency_ratio is None:
         return None
     names, stuck = stuck_frequencies_of(study, facts, scenes)
-    return (*names, "frequency_ratio"), np.multiply.outer(stuck, study.axes.frequency_ratio)
+    return ("frequency_ratio", *names), np.multiply.outer(study.axes.frequency_ratio, stuck)
 
 
 def check_blocks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> None:
