@@ -148,7 +148,7 @@ class MpiRanks(Ranks):
         self._mpi.Finalize()
 
     def abort(self, status: int) -> None:  # noqa: D102
-        # The launcher passes on what a rank prints; what it has not passed on when it is told to end all is lost.
+        # The launcher passes on what a rank prints; what it has not passed on when it ends all is lost.
         sys.stderr.flush()
         time.sleep(_SECONDS_TO_PRINT)
         self._world.Abort(status)
