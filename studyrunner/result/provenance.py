@@ -68,13 +68,7 @@ def _summarise(study: Study, facts: SceneFacts) -> str:
         if len(values) > 1
     ]
     over = f", over {'; '.join(ranges)}" if ranges else ""
-    what = "Fretting wear of a joint under vibration"
-    if study.has_modes:
-        what = "Nonlinear modes of a joint"
-    elif study.has_missions:
-        blocks = ", ".join(block.name for block in study.mission)
-        what = f"Fretting wear of a joint over {study.slow_time.missions} missions of {blocks}"
-    return f"{what}: scene {study.scene.model} with {pairs}{over}."
+    return study.kind.about.format(scene=f"{study.scene.model} with {pairs}{over}")
 
 
 def describe_versions() -> str:
