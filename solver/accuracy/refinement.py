@@ -184,7 +184,7 @@ class _Search:
             return None
         for known in (finer, richer):
             if known is not None and known.case.resolution == wanted:
-                return known
+                return known.solve_at(wanted, self.run)
         found = here.solve_at(wanted, self.run)
         if found is None and richer is not None and richer.case.resolution.highest > wanted.highest:
             # from a state with more harmonics instead of fewer

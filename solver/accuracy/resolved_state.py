@@ -22,7 +22,7 @@ from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.harmonic_balance.state import State
 from solver.model import ComplexArray, FloatArray
-from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS
+from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, FORCING
 from solver.newton.run import Run
 from solver.settings import FINE_SAMPLES, NEGLIGIBLE, ROUND_OFF, Resolution, all_orders
 from solver.structure.fourier import to_complex
@@ -44,6 +44,10 @@ class ResolvedState:
     def solve_at(self, resolution: Resolution, run: Run) -> ResolvedState | None:
         """The state with other harmonics and samples; None where it is not found."""
         return self._transferred(self.case, self.point.evaluation, resolution, run)
+
+    def compared_at(self, resolution: Resolution, run: Run) -> ResolvedState | None:
+        """As `solve_at`, as accurately as a comparison needs."""
+        return self.solve_at(resolution, run.to(max(run.tolerance, FORCING * self.case.settings.rtol)))
 
     def unknowns(self, resolution: Resolution) -> int:
         """Number of unknowns of the balance with other harmonics."""
@@ -153,11 +157,11 @@ class ResolvedState:
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
         few = self.unknowns(self.case.resolution) <= EXPENSIVE_UNKNOWNS
-        finer = self.solve_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), run)
+        finer = self.compared_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), run)
         if finer is not None:
             safety = ACCURACY.triple_samples_safety if few else ACCURACY.two_levels_safety
             return self.difference(finer).times(safety), finer
-        coarser = self.solve_at(Resolution(orders, samples // 2), run) if samples // 2 > 2 * orders[-1] else None
+        coarser = self.compared_at(Resolution(orders, samples // 2), run) if samples // 2 > 2 * orders[-1] else None
         return (UNKNOWN if coarser is None else coarser.difference(self)), None
 
     def harmonics_error(self, run: Run, known: ResolvedState | None = None) -> tuple[Estimate, ResolvedState | None]:
@@ -196,7 +200,7 @@ class ResolvedState:
             affordable = self.unknowns(other) <= room_for(ACCURACY.compared_unknowns, self.joint.component_index.size)
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
                 level = known if 2 < levels <= reaching and known is not None and known.covers(other) else None
-                level = level or self.solve_at(other, run)
+                level = level or self.compared_at(other, run)
                 if level is None and 2 < levels <= reaching:
                     level = self.level_by_level(levels, run)
                 if level is not None:

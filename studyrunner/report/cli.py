@@ -158,7 +158,7 @@ def _report(options: argparse.Namespace) -> int:
         from studyrunner.report.contents import draw_report
         from studyrunner.report.page.page import write_page
         from studyrunner.report.root.vtu import find_writer
-        from studyrunner.result.schema_check import check_numbers, reading_errors
+        from studyrunner.result.opening import check_numbers, reading_errors
         from studyrunner.result.view import open_for_report
         from studyrunner.system.progress import count, format_seconds
 

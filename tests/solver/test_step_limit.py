@@ -10,8 +10,7 @@ from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.options import WEAR
-from solver.wear.step_limit import moved_fraction, too_long
+from solver.wear.rate_slope import LARGEST_MOVED_LOAD, moved_fraction, too_long
 from tests.solver.models import branch_states, dovetail, march_wear
 
 SETTINGS = SolverSettings(harmonics=3, samples=64)
@@ -50,7 +49,7 @@ def test_the_reason_names_the_step_and_one_that_would_do():
     one = np.zeros(16)
     one[0] = 1e-9
     unit = moved_fraction(joint, point.evaluation, one)
-    short = 0.9 * WEAR.largest_moved_load / unit * one
+    short = 0.9 * LARGEST_MOVED_LOAD / unit * one
     assert too_long(joint, point.evaluation, short, 3000.0, 1000.0) is None
     said = too_long(joint, point.evaluation, 20.0 / unit * one, 3000.0, 1000.0)
     assert said is not None

@@ -75,6 +75,12 @@ def test_a_new_study_is_planned_and_its_comments_are_its_defaults(folder, capsys
     assert format_study(read_study("shown.toml")) == format_study(study)
     Path("scatter.toml").write_text(body + ("[scatter]" + scatter).replace("\n# ", "\n"), encoding="utf-8")
     assert read_study("scatter.toml").dimensions["sample"] == tuple(range(16))
+    shutil.copy(SECTOR, "sector.inp")
+    assert main(["--new", "root", "--from", "sector.inp"]) == 0
+    assert read_study("root.toml").axes.frequency_ratio == (0.99, 1.0)
+    assert main(["root.toml", "--plan"]) == 0
+    assert main(["--new", "none", "--from", "none.inp"]) == 2
+    assert "none.inp: model: none.inp: there is no such file" in capsys.readouterr().err
     for name, words in (("wear", "there is such a file"), ("a/b", "without a slash")):
         assert main(["--new", name]) == 2
         assert re.fullmatch(f'run-study: command line: --new = "{name}": .*{words}.*\n', capsys.readouterr().err)

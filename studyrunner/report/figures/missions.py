@@ -97,7 +97,7 @@ def draw_shares(result: Result) -> Drawing | Missing | None:
     _draw_lines(below, result.cycles, scale(worn), errors, names)
     below.set_ylabel(scale.label("worn volume"))
     below.set_xlabel("missions")
-    add_legend(figure)
+    add_legend(figure, below.get_lines())
     known = np.flatnonzero(np.isfinite(shares).all(axis=1))
     ends = []
     for place, name in enumerate(names if known.size else []):

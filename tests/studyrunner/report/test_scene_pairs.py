@@ -14,8 +14,8 @@ from studyrunner.report.page.root import build_root_numbers
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.vtu import find_writer
 from studyrunner.result.choice import choose
+from studyrunner.result.opening import check_dataset
 from studyrunner.result.scene_pairs import last_depth, of_scene, of_shown_scene
-from studyrunner.result.schema_check import check_dataset
 from studyrunner.result.view import Result
 from tests.studyrunner.report.test_page import decode
 from tests.studyrunner.results import mesh_file, sample_file
