@@ -130,7 +130,8 @@ def _sliding_start(balance: Balance, rest: State) -> FloatArray | None:
         return None
     friction, moved = np.zeros((limit.size, 3), complex), load.astype(np.complex128)
     for _ in range(LINEARISATIONS):
-        moved = np.linalg.solve(stiffness, load - friction.ravel()[joint.component_index]).astype(np.complex128)
+        left = load - friction.ravel()[joint.component_index]
+        moved = np.asarray(np.linalg.solve(stiffness, left), dtype=np.complex128)
         velocity = 1j * of_pairs(moved)[:, 1:]
         size = np.maximum(np.linalg.norm(velocity, axis=1), 1e-300)
         friction[:, 1:] = (4.0 / np.pi * limit / size)[:, None] * velocity

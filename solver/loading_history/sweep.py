@@ -78,6 +78,7 @@ class Sweep(Generic[S]):
 
     state: at the current node. saved: at the last saved node; a sweep resumed from there is equal to the last bit.
     ahead: the next node, where it is known. last: the last node of a lost sweep.
+    passed: parameters of the nodes so far.
     save: called where the sweep was saved.
     wider: factor on the steps, 2 for a reference sweep. reference: the reference sweep, led from node to node.
     """
@@ -91,6 +92,7 @@ class Sweep(Generic[S]):
         self.saved: SweepState | None = None
         self.ahead: Step[S] | None = None
         self.last: S | None = None
+        self.passed: list[float] = []
         self.save: Callable[[], None] = lambda: None
         # counts of its own: when the sweep is saved must not depend on the points that are asked for
         own = Budget(deadline=budget.deadline)
@@ -232,6 +234,7 @@ class Sweep(Generic[S]):
     def _advance(self, step: Step[S]) -> None:
         """Make the next node the current one."""
         before, self.ahead = self.here, None
+        self.passed.append(step.state.parameter)
         self.state = replace(
             self.state,
             states=(step.state,) if step.folds else (before, step.state),
@@ -274,7 +277,7 @@ class Sweep(Generic[S]):
     def place_at(self, path: Path[S], state: S, length: float = np.inf) -> None:
         """Put the sweep at a first node; length: of the first step."""
         self.forget()
-        self.path, length = path, min(length, path.steps[1])
+        self.path, self.passed, length = path, [state.parameter], min(length, path.steps[1])
         self.state = replace(self.state, states=(state,), resolution=path.case.resolution, length=length)
 
     def _choose_resolution(self) -> float:
