@@ -218,36 +218,21 @@ def _write_scene(study: Study, path: Path) -> int:
 def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     from studyrunner.result.existing_result import check_result
     from studyrunner.result.paths import check_output
-    from studyrunner.result.provenance import compare_with_archived
-    from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
-    from studyrunner.scene.scene_set import merge_facts
-    from studyrunner.scene_building import build_scenes
+    from studyrunner.run import Interrupted, RunOptions, compute_study
     from studyrunner.system.progress import ProgressDisplay, count, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
-    progress = ProgressDisplay()
-    given = RunOptions(fresh=options.fresh, retry_failed=options.retry_failed, date=options.date)
+    display, announced = ProgressDisplay(), job_size() if ranks.size == 1 else 0
+    idle = f"one process, although the job has room for {announced}: srun or mpiexec starts them"
+    given = RunOptions(options.fresh, options.retry_failed, options.date)
     try:
-        with open_progress(target) as store:
-            # Before anything is said: a wrong scene is bad input, which ends with one line.
-            scenes = build_scenes(ranks, study, store, _SlowSteps().say)
-            for line in compare_with_archived(study, merge_facts(scenes.facts).digest):
-                print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
-            with progress:
-                if ranks.size == 1 and (announced := job_size()) > 1:
-                    progress.note(
-                        f"one process, although the job has room for {announced}: srun or mpiexec starts them"
-                    )
-                summary = serve_study(ranks, study, scenes, store, target, progress, given)
+        summary = compute_study(ranks, study, target, given, display, _SlowSteps().say, [idle] if announced > 1 else [])
     except Interrupted as ended:
-        done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"
-        kept = f"{done} are kept, {path} is the finished result that it was"
-        what = f"{path} holds {done}" if ended.summary.written else kept
-        raise KeyboardInterrupt(f"interrupted: {what}, the same command goes on") from None
+        raise KeyboardInterrupt(ended.summary.describe_end(path, "the same command")) from None
     failed = summary.n_points - summary.n_complete
     counts = f"{count(summary.n_points, 'point')}, {summary.n_complete} computed, {failed} failed"
-    print(f"{path}: {counts}, {format_seconds(progress.seconds)}", *_answer(study, target.path), sep="\n", flush=True)
+    print(f"{path}: {counts}, {format_seconds(display.seconds)}", *_answer(study, target.path), sep="\n", flush=True)
     return SOME_FAILED if failed else CONVERGED
 
 

@@ -136,6 +136,8 @@ def parse_options(arguments: Sequence[str]) -> Options:
     )
     found = vars(parser.parse_args(list(arguments)))
     new, deck = found.pop("new"), found.pop("deck")
+    if deck is not None and new is None:
+        raise UserError("command line", "--from", str(deck), "give --new NAME beside it: the name of the new study")
     if new is not None:
         from studyrunner.study.keys import write_new_study
 

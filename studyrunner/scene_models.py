@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from studyrunner.kinds.task import Task
 from studyrunner.mpi.mapped_file import MappedFile, write_mapped
@@ -26,32 +26,23 @@ MODELS_A_RANK = 2
 Models = TypeVar("Models")
 
 
-class ModelCache(Generic[Models]):
+class ModelCache(OrderedDict[tuple[int, ...], Models]):
     """The models that a rank has computed with last, by the numbers of the scenes that a task needs.
 
     Rank 0 keeps such a list for each rank, without models, and so knows which models the rank has.
     """
 
-    def __init__(self) -> None:
-        self._models: OrderedDict[tuple[int, ...], Models] = OrderedDict()
-
     def use(self, scenes: tuple[int, ...]) -> bool:
         """Whether the models are there; they are then the last to be removed."""
-        if scenes in self._models:
-            self._models.move_to_end(scenes)
-        return scenes in self._models
+        if scenes in self:
+            self.move_to_end(scenes)
+        return scenes in self
 
     def add(self, scenes: tuple[int, ...], models: Models) -> None:
         """Adds models; removes those that were not used for longest where there are too many."""
-        self._models[scenes] = models
-        if len(self._models) > MODELS_A_RANK:
-            self._models.popitem(last=False)
-
-    def __iter__(self) -> Iterator[tuple[int, ...]]:
-        return iter(self._models)
-
-    def __getitem__(self, scenes: tuple[int, ...]) -> Models:
-        return self._models[scenes]
+        self[scenes] = models
+        if len(self) > MODELS_A_RANK:
+            self.popitem(last=False)
 
 
 class SceneModels:
@@ -66,27 +57,26 @@ class SceneModels:
         self._read = read
         self._seeing = seeing
         self._beside = beside
-        self._held: dict[int, ModelCache[None]] = {}
+        self._of_ranks: dict[int, ModelCache[None]] = {}
         self._files: dict[int, MappedFile] = {}
 
     def with_model(self, rank: int, task: Task) -> Task:
         """The task as a rank gets it: with the models that the rank does not have."""
-        held = self._held.setdefault(rank, ModelCache())
-        if held.use(task.scenes):
+        own = self._of_ranks.setdefault(rank, ModelCache())
+        if own.use(task.scenes):
             return task
-        held.add(task.scenes, None)
-        self._remove_unused()
+        own.add(task.scenes, None)
+        used = {number for each in self._of_ranks.values() for scenes in each for number in scenes}
+        for number in self._files.keys() - used:
+            self._files.pop(number).remove()
         return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
 
     def _hand(self, rank: int, number: int) -> ReducedModel | MappedFile:
         """The model of a scene as a rank gets it."""
-        if rank in self._seeing and number not in self._files:
+        if rank not in self._seeing:
+            return self._read(number)
+        if number not in self._files:
             # a full disk costs memory: each rank gets the model itself
             with contextlib.suppress(OSError):
                 self._files[number] = write_mapped(self._read(number), new_partial(self._beside))
-        return self._files[number] if rank in self._seeing and number in self._files else self._read(number)
-
-    def _remove_unused(self) -> None:
-        used = {number for held in self._held.values() for scenes in held for number in scenes}
-        for number in self._files.keys() - used:
-            self._files.pop(number).remove()
+        return self._files[number] if number in self._files else self._read(number)

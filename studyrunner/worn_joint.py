@@ -76,7 +76,8 @@ def compute_worn_joint(
             states = _run(result, asked, folder / "worn_joint_loops.nc", progress)
             found["loops"] = states.sel(contact=list(loops))[["loop_displacement", "loop_force"]]
         if response:
-            frequencies = result.dataset["frequency"].values.tolist()
+            others = {name: at for name, at in shown.items() if name not in ("frequency", "frequency_ratio")}
+            frequencies = result.dataset["frequency"].isel(others, missing_dims="ignore").values.tolist()
             if result.followed:
                 low, high = map(float, cast("list[float]", result.study["loading"]["between"]))
                 frequencies = np.linspace(low, high, _N_FREQUENCIES).tolist()

@@ -256,15 +256,17 @@ def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
 
 
 @njit(cache=True)
-def mean_normal_tangent(predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray) -> FloatArray:
-    """Derivative (n_contact, m, m) of `mean_normal_force` in harmonics, by the predicted normal force."""
-    n_contact, _, n_samples = predicted_t.shape
-    m = synthesis.shape[0]
-    basis_t = np.ascontiguousarray(synthesis.T)
-    tangent = np.zeros((n_contact, m, m))
-    analysis_t = np.ascontiguousarray(analysis.T)
+def mean_normal_tangent(
+    pairs: IntArray, predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, out: FloatArray
+) -> None:
+    """Derivative of the harmonics of `mean_normal_force` of some pairs (n,) by those of the predicted normal force.
+
+    out (n_contact, 3m, 3m): receives the derivative in the first m rows and columns.
+    """
+    m, n_samples = synthesis.shape
+    basis_t, analysis_t = np.ascontiguousarray(synthesis.T), np.ascontiguousarray(analysis.T)
     rows = np.empty((n_samples, m))
-    for pair in range(n_contact):
+    for pair in pairs:
         for n in range(n_samples):
             force = predicted_t[pair, 0, n]
             rows[n] = 0.0
@@ -279,5 +281,4 @@ def mean_normal_tangent(predicted_t: FloatArray, synthesis: FloatArray, analysis
                     + other_before * basis_t[n - 1, j]
                     + other_after * basis_t[ahead, j]
                 )
-        np.dot(analysis_t, rows, tangent[pair])
-    return tangent
+        out[pair, :m, :m] = np.dot(analysis_t, rows)

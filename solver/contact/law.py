@@ -152,40 +152,29 @@ class ContactLaw:
         Returns the derivatives of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the
         slip work (n_contact, 3m), m. Tangential displacements that do not exist count as sticking.
         """
-        contact, basis, m = self.contact, self.basis, self.basis.synthesis.shape[0]
-        n_contact, masses = contact.n_contact, self.penalty.inertial
+        contact, basis, masses = self.contact, self.basis, self.penalty.inertial
+        n_contact, m = contact.n_contact, basis.synthesis.shape[0]
         tangent, work_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
         # a pair that sticks during the whole period transmits the predicted force, an open pair transmits nothing; but
         # the start of a period that was marched more than once may depend on the force
         stuck = (at.status_t == STICK).all(axis=1) & (at.periods == 1)
         switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
         slides = switching & (contact.dofs[:, 1:] >= 0).any(axis=1)
-        elastic, inertial = np.flatnonzero(slides & ~masses), np.flatnonzero(slides & masses)
-        if elastic.size:
-            tangent[elastic], work_tangent[elastic] = march_tangent(
-                at.predicted_t[elastic],
-                self.friction_coefficient[elastic],
-                at.start[elastic],
-                at.state_t[elastic],
-                at.periods[elastic],
-                contact.line[elastic],
-                contact.has_normal[elastic],
-                (basis.synthesis, basis.analysis),
+        march_tangent(
+            np.flatnonzero(slides & ~masses),
+            *(at.predicted_t, self.friction_coefficient, at.start, at.state_t, at.periods),
+            *(contact.line, contact.has_normal, (basis.synthesis, basis.analysis), (tangent, work_tangent)),
+        )
+        work_tangent /= self.penalty.tangential[:, None]
+        if self.rate_dependent:
+            means = basis.synthesis * basis.step_mean[:, None], basis.analysis / basis.step_mean
+            mass_tangent(
+                np.flatnonzero(slides & masses),
+                *(at.predicted_t, self.friction_coefficient, self._masses(slice(None)), self.sample_step),
+                *(at.start, contact.has_normal, (basis.synthesis, *means), (tangent, work_tangent)),
             )
-            work_tangent[elastic] /= self.penalty.tangential[elastic, None]
-        if inertial.size:
-            tangent[inertial], work_tangent[inertial] = mass_tangent(
-                at.predicted_t[inertial],
-                self.friction_coefficient[inertial],
-                self._masses(inertial),
-                self.sample_step,
-                at.start[inertial],
-                contact.has_normal[inertial],
-                (basis.synthesis, basis.synthesis * basis.step_mean[:, None], basis.analysis / basis.step_mean),
-            )
-        normal = np.flatnonzero(contact.has_normal & switching)
-        if normal.size:
-            tangent[normal, :m, :m] = mean_normal_tangent(at.predicted_t[normal], basis.synthesis, basis.analysis)
+        closing = np.flatnonzero(contact.has_normal & switching)
+        mean_normal_tangent(closing, at.predicted_t, basis.synthesis, basis.analysis, tangent)
         passes = stuck[:, None] | (contact.dofs < 0)
         passes[:, 0] = stuck & contact.has_normal
         pair, component = np.nonzero(passes)

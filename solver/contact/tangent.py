@@ -18,6 +18,7 @@ from solver.model import BoolArray, FloatArray, IntArray
 
 @njit(cache=True)
 def march_tangent(
+    pairs: IntArray,
     predicted_t: FloatArray,
     friction: FloatArray,
     start: FloatArray,
@@ -26,8 +27,9 @@ def march_tangent(
     line: IntArray,
     has_normal: BoolArray,
     series: tuple[FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the results of `march_period` and `integrate_slip_work`, including the periodicity.
+    out: tuple[FloatArray, FloatArray],
+) -> None:
+    """Derivatives of the results of `march_period` and `integrate_slip_work` of some pairs (n,), with the periodicity.
 
     Where the periodicity does not determine the start of the last period (the pair has come to stick), the derivative
     of the start follows from the periods before.
@@ -35,16 +37,13 @@ def march_tangent(
     - predicted_t, friction, start: arguments of `march_period`; state_t, periods: its results.
     - line, has_normal (n_contact,): as in `model.ContactInterface`.
     - series (m, N), (N, m): synthesis and analysis of the Fourier basis.
-
-    Returns the derivatives of the harmonics of the friction force (n_contact, 3m, 3m), dimensionless, where the rows of
-    the normal force and of tangents that do not exist are zero, and of the slip work (N * N), (n_contact, 3m), N.
+    - out: receives the derivatives of the harmonics of the friction force (n_contact, 3m, 3m), dimensionless, in the
+      rows of the tangents that exist, and of the slip work (N * N), (n_contact, 3m), N.
     """
     # rows of the transposes are contiguous, as the loops over columns need
     basis_t, analysis_t = np.ascontiguousarray(series[0].T), np.ascontiguousarray(series[1].T)
-    (n_contact, _, n_samples), m = predicted_t.shape, basis_t.shape[1]
-    force_tangent = np.zeros((n_contact, 3 * m, 3 * m))
-    slip_work_tangent = np.zeros((n_contact, 3 * m))
-    for pair in range(n_contact):
+    n_samples, m = basis_t.shape
+    for pair in pairs:
         columns, tangents, width = pair_columns(m, line[pair], has_normal[pair])
         dforce_t = np.empty((n_samples, tangents.size, width + 2))
         dforce, before, dstart = np.empty((2, width + 2)), np.empty((2, width + 2)), np.empty((2, width))
@@ -65,8 +64,7 @@ def march_tangent(
             _add_slip_work(work, n, predicted_t[pair, 0], state_t[pair], before, dstate, basis_t, has_normal[pair])
         plain = min(periods[pair] - 1, PLAIN_PERIODS)
         _start_tangent(dstart, dstate, predicted_t[pair], friction[pair], start[pair], plain, basis_t, columns)
-        _assemble(force_tangent[pair], slip_work_tangent[pair], dforce_t, work, dstart, analysis_t, tangents, columns)
-    return force_tangent, slip_work_tangent
+        _assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_t, tangents, columns)
 
 
 @njit(cache=True)
@@ -199,6 +197,7 @@ def _start_tangent(
 
 @njit(cache=True)
 def mass_tangent(
+    pairs: IntArray,
     predicted_t: FloatArray,
     friction: FloatArray,
     masses: Masses,
@@ -206,23 +205,22 @@ def mass_tangent(
     start: FloatArray,
     has_normal: BoolArray,
     series: tuple[FloatArray, FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray]:
-    """Exact derivative of the periodic motion of `march_masses` by the harmonics of the predicted force.
+    out: tuple[FloatArray, FloatArray],
+) -> None:
+    """Exact derivative of the periodic motion of `march_masses` of some pairs (n,) by the harmonics of the predicted
+    force.
 
     - predicted_t, friction, masses, step: arguments of `march_masses`.
     - start (n_contact, 2): velocity at the start of the period, m/s.
     - series (m, N), (m, N), (N, m): from the harmonics to the normal force at the samples and to the means of the
       tangential forces over the steps, and from these means back to their harmonics.
-
-    Returns what `march_tangent` returns; the derivative of the slip work is in m.
+    - out: receives what that of `march_tangent` receives; the derivative of the slip work is in m.
     """
     point_t, mean_t = np.ascontiguousarray(series[0].T), np.ascontiguousarray(series[1].T)
     analysis_t = np.ascontiguousarray(series[2].T)
-    (n_contact, _, n_samples), m = predicted_t.shape, point_t.shape[1]
-    force_tangent = np.zeros((n_contact, 3 * m, 3 * m))
-    slip_work_tangent = np.zeros((n_contact, 3 * m))
-    out, local = np.empty(7), np.empty((5, 5))
-    for pair in range(n_contact):
+    n_samples, m = point_t.shape
+    ahead, local = np.empty(7), np.empty((5, 5))
+    for pair in pairs:
         line = masses[2][pair]
         columns, tangents, width = pair_columns(m, line, has_normal[pair])
         leave = np.empty((5, width + 2))
@@ -238,23 +236,22 @@ def mass_tangent(
         for n in range(n_samples):
             normal = max(predicted_t[pair, 0, n], 0.0)
             limit = friction_limit(friction[pair], normal)
-            step_mass(predicted_t[pair, 1:, n], velocity, limit, gain, loss, line, out, local)
+            step_mass(predicted_t[pair, 1:, n], velocity, limit, gain, loss, line, ahead, local)
             by_limit = friction[pair] if normal > 0.0 and has_normal[pair] else 0.0
             _leave(leave, local, entry, tangents, columns, mean_t[n], by_limit * point_t[n])
             for place, tangent in enumerate(tangents):
                 dforce_t[n, place, : width + 2] = leave[tangent]
-            by_normal, by_speed = slip_work_slopes(normal, out[6])
+            by_normal, by_speed = slip_work_slopes(normal, ahead[6])
             work += by_speed * step * leave[4]
             if normal > 0.0 and has_normal[pair]:
                 work[:m] += by_normal * step * point_t[n]
-            velocity[:] = out[2:4]
+            velocity[:] = ahead[2:4]
             entry[:, :] = leave[2:4]
         dstart = np.empty((2, width))
         for column in range(width):
             first, second, _ = solve_periodicity(entry[:, width:], entry[0, column], entry[1, column])
             dstart[0, column], dstart[1, column] = first, second
-        _assemble(force_tangent[pair], slip_work_tangent[pair], dforce_t, work, dstart, analysis_t, tangents, columns)
-    return force_tangent, slip_work_tangent
+        _assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_t, tangents, columns)
 
 
 @njit(cache=True)

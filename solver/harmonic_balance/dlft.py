@@ -200,8 +200,8 @@ class Linearisation:
     def apply_roughly(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step to at least three digits in less time, for directions of Newton's method."""
         joint = self.joint
-        pairs, held_back = self._held_back
-        held, motion = hold_back(step, self._rows_of_pairs, pairs, held_back, *self._compliance, self.growth_tangent)
+        rows, compliance = joint.pair_rows, joint.pair_compliance
+        held, motion = hold_back(step, rows, self.active, self._held_back, *compliance, self.growth_tangent)
         if joint.law.rate_dependent:
             # masses move by Newton's law
             motion_h = joint.law.motion(joint.to_pairs(held))
@@ -210,22 +210,9 @@ class Linearisation:
         return joint.structure.apply_roughly(motion) + step - held
 
     @cached_property
-    def _held_back(self) -> tuple[IntArray, SingleArray]:
-        """Active pairs, and the part `1 - d lambda/dp` that they do not transmit, in single precision."""
-        pairs = self.active
-        return pairs, (np.eye(self.force_tangent.shape[1]) - self.force_tangent[pairs]).astype(np.float32)
-
-    @cached_property
-    def _rows_of_pairs(self) -> IntArray:
-        """Row of each component of the pairs (n_contact, 3); -1 where a component does not exist."""
-        rows = np.full(3 * self.joint.contact.n_contact, -1)
-        rows[self.joint.component_index] = np.arange(self.joint.component_index.size)
-        return rows.reshape(-1, 3)
-
-    @property
-    def _compliance(self) -> tuple[FloatArray, FloatArray]:
-        """Motion over force (n_contact,), m/N, of elastic pairs: normal and tangential."""
-        return 1.0 / self.joint.penalty.normal, 1.0 / self.joint.penalty.tangential
+    def _held_back(self) -> SingleArray:
+        """Part `1 - d lambda/dp` (n, 3m, 3m) that the active pairs do not transmit, in single precision."""
+        return identity_less(self.force_tangent, self.active)
 
     def dense(self, pairs: IntArray, n_harmonics: int | None = None) -> FloatArray:
         """Rows and columns of the Jacobian for some pairs, in the order (relative displacement, harmonic).
@@ -275,6 +262,19 @@ def differs_from_identity(matrices: FloatArray, by: float) -> BoolArray:
             if differs[place]:
                 break
     return differs
+
+
+@njit(cache=True)
+def identity_less(matrices: FloatArray, chosen: IntArray) -> SingleArray:
+    """The identity less some of the matrices (n, k, k), in single precision."""
+    k = matrices.shape[1]
+    found = np.empty((chosen.size, k, k), np.float32)
+    for place, which in enumerate(chosen):
+        for row in range(k):
+            for column in range(k):
+                found[place, row, column] = -matrices[which, row, column]
+            found[place, row, row] = 1.0 - matrices[which, row, row]
+    return found
 
 
 @njit(cache=True)

@@ -17,7 +17,7 @@ from solver.accuracy.period_events import nothing_happens
 from solver.accuracy.refinement import Refined, refine
 from solver.accuracy.resolved_state import ResolvedState
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
-from solver.continuation.arc_length import Arc, follow_arc
+from solver.continuation.arc_length import ARC_SPAN, Arc, follow_arc
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.continuation.transient import relax_to_periodic
@@ -146,7 +146,7 @@ class LoadingPath:
                 return Step(state, tuple(folds))
             # natural steps may have passed the unknown start of an unstable part: then the search begins before them
             end = start if arrived else state
-            arc = Arc(self.balance_at, end, CONTINUATION.arc_span * self.scale(target), run)
+            arc = Arc(self.balance_at, end, ARC_SPAN * self.scale(target), run)
             found = follow_arc(arc, target, accepted, beyond=False)
             if found.state is not None:
                 return Step(found.state, (*folds, *found.jumps))

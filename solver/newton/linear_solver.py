@@ -76,7 +76,7 @@ class JacobianSolver:
         elif rows.size:
             for step, right in zip(steps, rights, strict=True):
                 step[rows] = self._solve_kept(tangent, right, rtol)[rows]
-        for step, right in zip(steps, rights, strict=True):
+        for step, right in zip(steps, rights, strict=True) if rest.size else ():
             # the columns of all other unknowns are those of the identity
             step[rest] = (right - tangent.apply_roughly(step))[rest]
         return steps

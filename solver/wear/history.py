@@ -99,20 +99,21 @@ def _assembled(solutions: Solutions, fine: Ended, state: WearState, reference: E
     start, asked, model = solutions.start, solutions.asked, solutions.case.model
     counts, area, output = solutions.counts(fine), model.contact.area, solutions.output_of(fine)
     own = output.read(counts)
-    coarse = None if reference is None else solutions.output_of_reference(reference)
-    other, at_steps = _read_or_nan(coarse, counts, own), fine.output.cycles
-    steps = Both(at_steps, output.values(), _read_or_nan(coarse, at_steps, own))
-    error = history_error(Both(counts, own, other), steps, area, asked.scheme)
+    other = None if reference is None else solutions.output_of_reference(reference)
+    both = Both(counts, own, other.read(counts) if other else {})
+    at_steps = fine.output.cycles
+    steps = Both(at_steps, output.values(), other.read(at_steps) if other else {})
+    error = history_error(both, steps, area, asked.scheme)
     target = fine.output.reached
     ends_at_target = target <= asked.end
     return WearHistory(
-        **reported(own) | _errors(own, other, error, follows=asked.follow is not None),
+        **reported(own) | _errors(both, error, follows=asked.follow is not None),
         **of_state(state),
         outcome=fine.failure.outcome,
         message=fine.failure.message,
         cycles=counts,
         worn_volume=own["wear_depth"] @ area,
-        reference_volume=other["wear_depth"] @ area,
+        reference_volume=both.other("wear_depth") @ area,
         error_estimate=math.nan,
         newton_iterations=start.newton_iterations + fine.iterations + (reference.iterations if reference else 0),
         run_time=start.run_time + solutions.spent,
@@ -122,17 +123,17 @@ def _assembled(solutions: Solutions, fine: Ended, state: WearState, reference: E
         # adaptive steps go beyond the last count
         jump_cycle=state.jump_cycle if state.jump_cycle <= asked.end else math.nan,
         cycles_to_target=target if ends_at_target else math.nan,
-        cycles_to_target_error=_target_error(output, coarse, steps, asked) if ends_at_target else math.nan,
+        cycles_to_target_error=_target_error(output, other, steps, asked) if ends_at_target else math.nan,
         cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
     )
 
 
-def _errors(own: dict[str, Any], other: dict[str, Any], error: HistoryError, *, follows: bool) -> dict[str, Any]:
-    """Errors of a history; own, other: its values and those of its reference solution. follows: its frequency."""
-    frequency = own["excitation_frequency_error"]
+def _errors(both: Both, error: HistoryError, *, follows: bool) -> dict[str, Any]:
+    """Errors of a history at its outputs; follows: whether its frequency follows the structure."""
+    frequency = both.fine["excitation_frequency_error"]
     if follows:
-        apart = ACCURACY.history_safety * np.abs(own["excitation_frequency"] - other["excitation_frequency"])
-        whole = np.maximum(frequency, apart)
+        apart = np.abs(both.fine["excitation_frequency"] - both.other("excitation_frequency"))
+        whole = np.maximum(frequency, ACCURACY.history_safety * apart)
         frequency = np.where(np.isfinite(error.worn_volume) & np.isnan(whole), math.inf, whole)
     return {
         "response_error": error.response,
@@ -143,36 +144,24 @@ def _errors(own: dict[str, Any], other: dict[str, Any], error: HistoryError, *, 
     }
 
 
-def _target_error(output: DenseOutput, coarse: DenseOutput | None, steps: Both, asked: SlowTime) -> float:
+def _target_error(output: DenseOutput, other: DenseOutput | None, steps: Both, asked: SlowTime) -> float:
     """Estimated error, cycles, of the count at which a history has reached its target.
 
-    output, coarse: of the history and of its reference solution, None if there is none; steps: both at the ends of the
+    output, other: of the history and of its reference solution, None if there is none; steps: both at the ends of the
     steps.
     """
-    if coarse is None or asked.until is None:
+    if other is None or asked.until is None:
         return math.inf
     area, at, quantity = output.area, output.taken.reached, asked.until.quantity
     counts = np.array([0.0, at])
     own = output.read(counts)
-    error = history_error(Both(counts, own, _read_or_nan(coarse, counts, own)), steps, area, asked.scheme)
+    error = history_error(Both(counts, own, other.read(counts)), steps, area, asked.scheme)
     depth = own["wear_depth"][1]
     known_to = error_of_wear(quantity, depth, error.wear_depth[1], float(error.worn_volume[1] * (depth @ area)))
     deepest = np.arange(area.size) == depth.argmax()
     weights = deepest if quantity == "wear_depth" else area
     rate = min(float(rates @ weights) for rates in (own["depth_rate"][1], output.taken.nodes[-1].rate))
-    return target_error(at, coarse.target_count(), known_to, rate) + output.target_within()
-
-
-def _read_or_nan(output: DenseOutput | None, counts: FloatArray, like: dict[str, Any]) -> dict[str, Any]:
-    """Values of the reference solution at counts, NaN where there is none; like: values of the history."""
-    found = {} if output is None else output.read(counts)
-    if found:
-        return found
-    return {
-        name: np.full((counts.size, *value.shape[1:]), np.nan)
-        for name, value in like.items()
-        if value.dtype.kind in "fc"
-    }
+    return target_error(at, other.target_count(), known_to, rate) + output.target_within()
 
 
 def without_state(model: ReducedModel, start: StartState, asked: SlowTime) -> WearHistory:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.records import empty_record, pack_record, record_in, record_of
+from studyrunner.checkpoint.records import empty_record, record_of
 from studyrunner.checkpoint.store import PROGRESS, RESULTS, STARTS, Store
 from studyrunner.kinds.task import Identity, Result, StartResult, Task, TaskPlan, digest, unpack_start
 
@@ -61,9 +61,11 @@ class CompletionIndex:
 
         Raises StorageError where the disk fails.
         """
-        found = [record_in(self.store.read(RESULTS, name), self.kind) for name in names]
+        found = [self.store.read(RESULTS, name) for name in names]
+        # the data type of a record is part of its name
         empty = empty_record(self.kind).tobytes()
-        records = np.frombuffer(bytearray(b"".join(empty if each is None else each for each in found)), self.kind)
+        contents = [empty if each is None else each.arrays[0].tobytes() for each in found]
+        records = np.frombuffer(bytearray(b"".join(contents)), self.kind)
         return records, np.array([each is not None for each in found], np.bool_)
 
     @property
@@ -112,7 +114,7 @@ class CompletionIndex:
         if isinstance(result, StartResult):
             self.store.put(STARTS, name, result.pack())
         else:
-            self.store.put(RESULTS, name, pack_record(record_of(self.kind, result)))
+            self.store.put(RESULTS, name, Packed("", (record_of(self.kind, result).view(np.uint8),)))
             if result.progress is not None:
                 self.keep(task, result.progress)
             elif self.is_finished(task):

@@ -8,7 +8,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.packing import Packed
 from studyrunner.kinds.kind import kind_of
 from studyrunner.kinds.task import PointResult
 from studyrunner.scene.scene import SceneFacts
@@ -45,18 +44,6 @@ def record_of(kind: np.dtype[np.void], result: PointResult) -> NDArray[np.void]:
         own = tuple(slice(size) for size in np.shape(values))
         records[name][0:1][(slice(None), *own)] = values
     return records
-
-
-def pack_record(record: NDArray[np.void]) -> Packed:
-    """The bytes of a record (1,), whose data type is part of its key."""
-    return Packed("", (np.frombuffer(record.tobytes(), np.uint8),))
-
-
-def record_in(packed: Packed | None, kind: np.dtype[np.void]) -> bytes | None:
-    """The bytes of the record (1,) in an entry; None where there is none of `kind`."""
-    if packed is None or len(packed.arrays) != 1 or packed.arrays[0].nbytes != kind.itemsize:
-        return None
-    return packed.arrays[0].tobytes()
 
 
 def empty_record(kind: np.dtype[np.void]) -> NDArray[np.void]:

@@ -14,7 +14,7 @@ import time
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from studyrunner.system.endings import uninterrupted
 from studyrunner.system.source_digest import package_digest
@@ -63,20 +63,18 @@ def _largest(environment: Mapping[str, str], names: tuple[str, ...]) -> int:
     return max((int(text) for text in texts if text.isdecimal()), default=0)
 
 
-class Ranks(Protocol):
-    """Processes that send each other Python objects. Messages between two ranks arrive in the order of sending.
+class Ranks:
+    """Processes that send each other Python objects, in the order of sending; this class: one process, without MPI.
 
     rank: number of this process; process 0 hands out the work. size: number of processes.
     """
 
-    @property
-    def rank(self) -> int: ...  # noqa: D102
-
-    @property
-    def size(self) -> int: ...  # noqa: D102
+    rank = 0
+    size = 1
 
     def send(self, message: object, rank: int) -> None:
         """Sends without waiting for the receiver."""
+        raise ValueError(f"no rank {rank} for {message!r} in a run of one process")
 
     def flush(self) -> None:
         """Waits until all messages are received, or need this process no more; called before a rank goes on computing.
@@ -86,6 +84,7 @@ class Ranks(Protocol):
 
     def receive(self) -> tuple[int, object] | None:
         """Sender and content of the next message, or None where there is none yet."""
+        return None
 
     def close(self) -> None:
         """Ends the communication; every rank calls this once."""
@@ -94,35 +93,8 @@ class Ranks(Protocol):
         """Ends all ranks at once; returns only where there is no other rank."""
 
 
-class Alone:
-    """A run of one process, without MPI; methods as in `Ranks`."""
-
-    rank = 0
-    size = 1
-
-    def send(self, message: object, rank: int) -> None:
-        """There is no receiver: a call is a bug."""
-        raise ValueError(f"no rank {rank} for {message!r} in a run of one process")
-
-    def receive(self) -> tuple[int, object] | None:
-        """There is no sender."""
-        return None
-
-    def flush(self) -> None:  # noqa: D102
-        pass
-
-    def close(self) -> None:  # noqa: D102
-        pass
-
-    def abort(self, status: int) -> None:  # noqa: D102
-        pass
-
-
-class MpiRanks:
-    """All ranks of MPI's world; methods as in `Ranks`.
-
-    Raises ImportError or RuntimeError where mpi4py or an MPI library is missing.
-    """
+class MpiRanks(Ranks):
+    """All ranks of MPI's world. Raises ImportError or RuntimeError where mpi4py or an MPI library is missing."""
 
     def __init__(self) -> None:
         import mpi4py
@@ -142,8 +114,8 @@ class MpiRanks:
         self._world = MPI.COMM_WORLD
         self._sent: list[MPI.Request] = []
         self._many = _MANY_SENT
-        self.rank: int = self._world.Get_rank()
-        self.size: int = self._world.Get_size()
+        self.rank = self._world.Get_rank()
+        self.size = self._world.Get_size()
         if library == "MPICH":
             # behind the barrier all ranks have mapped the memory
             self._world.Barrier()
@@ -204,13 +176,13 @@ def start_ranks() -> Ranks:
         Where the launcher started more processes than the MPI library knows of.
     """
     if not any(name in os.environ for name in _SIGNS):
-        return Alone()
+        return Ranks()
     announced = launcher_size()
     try:
         ranks = MpiRanks()
     except (ImportError, RuntimeError, LauncherError) as error:
         if announced <= 1:
-            return Alone()
+            return Ranks()
         raise LauncherError(f"{announced} processes were started that cannot talk ({error}): {_REMEDY}") from error
     if announced > ranks.size:
         ranks.close()

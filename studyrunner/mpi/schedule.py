@@ -105,23 +105,20 @@ def _work(
 
 
 class _LocalWorker(Generic[Task, Result]):
-    """The computing thread of rank 0."""
+    """The computing thread of rank 0. assign: takes tasks. given_up: the thread ends at the next step of its task."""
 
     def __init__(self, run: Run[Task, Result], seconds_to_progress: float) -> None:
         self._run = run
-        self._ended = False
         self._seconds_to_progress = seconds_to_progress
-        self._waiting: queue.SimpleQueue[Assignment[Task] | None] = queue.SimpleQueue()
+        self._tasks: queue.SimpleQueue[Assignment[Task] | None] = queue.SimpleQueue()
         self._sent: Mailbox[object] = Mailbox()
+        self.given_up = False
+        self.assign = self._tasks.put
         # A daemon: an exception in the main thread ends the process although a task still runs.
         self._thread = threading.Thread(target=self._compute, name="tasks of rank 0", daemon=True)
         self._thread.start()
 
-    def assign(self, assignment: Assignment[Task]) -> None:
-        """Puts a task behind those that wait."""
-        self._waiting.put(assignment)
-
-    def receive(self, seconds: float) -> object:
+    def receive(self, seconds: float = 0.0) -> object:
         """The next message; None where none comes within `seconds`. Raises the exception of a task."""
         if seconds:
             self._sent.wait(seconds)
@@ -132,24 +129,20 @@ class _LocalWorker(Generic[Task, Result]):
 
     def stop(self) -> None:
         """Ends the thread after its last task. Raises an exception that the last task raised after its last result."""
-        self._waiting.put(None)
+        self._tasks.put(None)
         with uninterrupted():
             self._thread.join()
-        self.receive(0.0)
-
-    def give_up(self) -> None:
-        """Ends the thread without its results, at the next step of its task."""
-        self._ended = True
+        self.receive()
 
     def _compute(self) -> None:
         try:
-            while (assignment := self._waiting.get()) is not None:
+            while (assignment := self._tasks.get()) is not None:
                 _work(assignment, self._run, self._send, self._seconds_to_progress, self._check)
         except BaseException as error:  # handed to the main thread, which raises it
             self._sent.put(error)
 
     def _check(self) -> None:
-        if self._ended:
+        if self.given_up:
             raise KeyboardInterrupt
 
     def _send(self, message: object) -> None:
@@ -200,7 +193,7 @@ def serve_tasks(
             with uninterrupted():
                 server.look()
     except BaseException:
-        server.local.give_up()
+        server.local.given_up = True
         raise
     server.local.stop()
 
@@ -224,7 +217,7 @@ class _Server(Generic[Task, Result]):
         """Receives what there is; waits a moment where there is nothing."""
         quiet = False
         for _ in range(_LOOKS_A_TICK):
-            received, message = self._ranks.receive(), self.local.receive(0.0)
+            received, message = self._ranks.receive(), self.local.receive()
             if received is not None:
                 self._accept(*received)
             if message is not None:

@@ -53,7 +53,7 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
     if name == "cycle" and study.to_the_end:
         comment = "Spaced evenly in worn volume and cycles, to the last; cycle_count has the counts of each point."
         return Variable((), "1", "number of the output", comment=comment)
-    if name == "sweep" and study.has_modes:
+    if name == "sweep" and not study.kind.counted:
         comment = "up: the modal amplitude is raised from zero; down: raised to a larger one, then lowered."
         return Variable((), "1", "how the amplitude is reached", comment=comment)
     for axis in study.scene_axes:
@@ -65,10 +65,9 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
 def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[SmallArray]:
     """Coordinates of the file."""
     along: dict[str, Sequence[object] | NDArray[np.generic]] = dict(study.dimensions)
-    if study.has_missions:
-        along |= {"mission": [int(count) for count in study.missions_kept], "block": [b.name for b in study.mission]}
-    else:
-        along.setdefault("cycle", np.array(study.cycles_kept))
+    counted = study.missions_kept if study.mission else np.array(study.cycles_kept)
+    along.setdefault(study.kind.counted or "cycle", counted)
+    along |= {"block": [block.name for block in study.mission]} if study.mission else {}
     along |= {"contact": range(len(facts.area)), "response": facts.response_names}
     if study.outputs.loops:
         along |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}

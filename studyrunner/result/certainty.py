@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from studyrunner.advice import Used, advise, advise_error
 from studyrunner.percent import show_percent, show_rtol
+from studyrunner.result.points import WELL_ENOUGH
 from studyrunner.result.units import show_cycles
-from studyrunner.result.view import WELL_ENOUGH, Result
+from studyrunner.result.view import Result
 from studyrunner.system.progress import count
 
 _MOST_NAMED = 10
@@ -24,22 +25,17 @@ _OF_ADVICE = ("scheme", "sweep", "harmonics", "samples", "rtol")
 
 @dataclass(frozen=True)
 class Certainty:
-    """How well the numbers of a result are known.
+    """How well the numbers of a result are known. n_known, n_less, n_unknown: of points computed to the end."""
 
-    of: what, as "worn volume". n_points: of the study. n_known, n_less, n_unknown: computed to the end and known to
-    `rtol`, less well, never estimated. rtol: NaN where it is an axis. worst: largest relative error, NaN without one.
-    where: its point in words. advice: what would make it smaller; empty where all are known to `rtol`.
-    """
-
-    of: str
-    n_points: int
-    n_known: int
+    of: str  # what, as "worn volume"
+    n_points: int  # of the study
+    n_known: int  # known to rtol
     n_less: int
-    n_unknown: int
-    rtol: float
-    worst: float
-    where: str
-    advice: str
+    n_unknown: int  # never estimated
+    rtol: float  # NaN where it is an axis
+    worst: float  # largest relative error, NaN without one
+    where: str  # its point in words
+    advice: str  # what would make it smaller; empty where all are known to rtol
 
     @property
     def n_short(self) -> int:

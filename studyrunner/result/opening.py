@@ -129,6 +129,7 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
         others = (name for name, entry in COORDINATES.items() if not entry.dimensions and name in dataset.variables)
         coordinates = {name: _checked_axis(dataset, name) for name in (*axes, *others) if name in dataset.dims}
         drawn = [str(name) for name in dataset.variables if str(name).startswith(DRAWN)]
+        drawn += ["frequency"] * ("frequency_ratio" in axes and "frequency" in dataset.variables)
         coordinates |= {name: _checked_draws(dataset.variables[name], name, axes) for name in drawn}
         kept = _checked_variables(dataset, axes, slow)
         coordinates |= {name: kept.pop(name) for name in _OF_CONTACTS if name in kept}
@@ -206,9 +207,13 @@ def _is_choice(text: str) -> bool:
 
 
 def _checked_draws(variable: xr.Variable, name: str, axes: Sequence[str]) -> xr.Variable:
-    """What the samples draw of an input, along axes in their order, and along the pairs where they differ in it."""
+    """What the samples draw of an input, along axes in their order, and along the pairs where they differ in it.
+
+    Or excitation frequencies, Hz, where an axis gives their ratios.
+    """
     along = [axis for axis in (*axes, "contact") if axis in variable.dims]
-    _need(list(variable.dims) == along and SAMPLE in along, name, f"dimensions {', '.join(map(str, variable.dims))}")
+    needed = "frequency_ratio" if name == "frequency" else SAMPLE
+    _need(list(variable.dims) == along and needed in along, name, f"dimensions {', '.join(map(str, variable.dims))}")
     right_type = variable.dtype.kind == "f" and variable.size <= _MOST_VALUES and name.isidentifier()
     _need(right_type and len(name) <= _LONGEST_NAME, name, f"type {variable.dtype} of shape {variable.shape}")
     # NaN of pairs that a scene does not have

@@ -123,7 +123,7 @@ def _create_all(
         dimensions = (*study.dimensions, *entry.dimensions)
         # a chunk of loops holds a single pair: then pairs without loops take no room
         own = (1 if name in LOOPS and each == "contact" else sizes[each] for each in entry.dimensions)
-        variable = _create(file, name, entry, dimensions, (*slab, *own), of_modes=study.has_modes)
+        variable = _create(file, name, entry, dimensions, (*slab, *own), of_modes=not study.kind.counted)
         named = [each.name for each in drawn if set(each.dimensions) <= set(dimensions)]
         named = of_pairs * ("contact" in entry.dimensions) + named
         if named and not entry.is_text:

@@ -89,16 +89,16 @@ def at_ratios(scenes: SceneSet, facts: Mapping[int, SceneFacts]) -> SceneSet:
 def frequencies_of_ratios(
     study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
 ) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
-    """Excitation frequencies, Hz: their dimensions, the last one frequency_ratio; None where the study gives Hz."""
+    """Excitation frequencies, Hz: their dimensions, the first one frequency_ratio; None where the study gives Hz."""
     if study.axes.frequency_ratio is None:
         return None
     names, stuck = stuck_frequencies_of(study, facts, scenes)
-    return (*names, "frequency_ratio"), np.multiply.outer(stuck, study.axes.frequency_ratio)
+    return ("frequency_ratio", *names), np.multiply.outer(study.axes.frequency_ratio, stuck)
 
 
 def check_blocks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> None:
     """Raises UserError where the blocks of a mission do not have equal pairs. facts: of each scene."""
-    for numbers in scenes.of_blocks if study.has_missions else ():
+    for numbers in scenes.of_blocks:
         for block, number in zip(study.mission, numbers, strict=True):
             if not _same_pairs(facts[numbers[0]], facts[number]):
                 remedy = (

@@ -31,6 +31,7 @@ class Kind:
     asked, kept: variables that its points may have, and that its result always holds.
     usual, of_samples: variables where the study names none, and where samples are drawn.
     unused: keys without a use, by table. why: the remedy where one is given.
+    counted: what the slow time counts; empty where nothing wears. about: what a result holds, of a {scene}.
     """
 
     name: str
@@ -41,6 +42,8 @@ class Kind:
     of_samples: tuple[str, ...]
     unused: Mapping[str, tuple[str, ...]]
     why: str
+    counted: str
+    about: str
 
 
 def _other_axes(*axes: str) -> tuple[str, ...]:
@@ -54,7 +57,19 @@ _OF_MISSIONS = _other_axes("frequency_ratio", "modal_amplitude", "mode", "step",
 NUMBERS = tuple(name for name in _OF_MISSIONS if name != "sweep")
 """Axes that hold numbers of the joint and of its excitation, which may scatter."""
 
-WEAR = Kind("wear histories", _AXES, ASKED, KEPT, USUAL, OF_SAMPLES, {}, "")
+WEAR = Kind(
+    "wear histories",
+    _AXES,
+    ASKED,
+    KEPT,
+    USUAL,
+    OF_SAMPLES,
+    {},
+    "",
+    "cycle",
+    "Fretting wear of a joint under vibration: wear histories of the scene {scene}. Wear depths and worn volume,"
+    " contact pressures and slip, vibration, and the errors of each.",
+)
 MODES = Kind(
     "nonlinear modes",
     _OF_MODES,
@@ -69,6 +84,8 @@ MODES = Kind(
         "outputs": ("loops",),
     },
     "leave it out: with axes.modal_amplitude nothing is excited and nothing wears",
+    "",
+    "Nonlinear modes of a joint: natural frequency and damping over the amplitude, scene {scene}.",
 )
 MISSIONS = Kind(
     "missions",
@@ -83,6 +100,9 @@ MISSIONS = Kind(
         "outputs": ("loops",),
     },
     "leave it out: slow_time.missions counts in place of cycles, and missions choose their own steps",
+    "mission",
+    "Fretting wear of a joint over missions: scene {scene}. Worn volume by block, wear depths, vibration, and the"
+    " errors of each.",
 )
 
 

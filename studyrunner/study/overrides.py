@@ -16,6 +16,9 @@ from studyrunner.user_error import UserError
 
 Table = dict[str, Any]
 
+_INSTEAD = {"axes.frequency": "frequency_ratio", "axes.frequency_ratio": "frequency"}
+"""Keys under [axes] that stand in each other's place."""
+
 _BARE_WORD = re.compile(r"[^\s\"'\[\]{}=,#]+")
 
 
@@ -47,6 +50,8 @@ def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> 
         place.pop(names[-1], None)
         return
     place[names[-1]] = value
+    if key in _INSTEAD:
+        place.pop(_INSTEAD[key], None)
     # the last place where a key is given counts, here or under [axes]
     tables = ("solver",) if names[-1] in AxesSection.model_fields else ("scene", "wear")
     others = {"axes": tables, **dict.fromkeys(tables, ("axes",))}

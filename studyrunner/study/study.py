@@ -69,16 +69,6 @@ class Study(Section):
         return MISSIONS if self.mission else MODES if self.axes.modal_amplitude is not None else WEAR
 
     @property
-    def has_modes(self) -> bool:
-        """Whether the points of the study are those of nonlinear modes; then nothing wears."""
-        return self.kind is MODES
-
-    @property
-    def has_missions(self) -> bool:
-        """Whether the slow time of the study is counted in missions."""
-        return bool(self.mission)
-
-    @property
     def variables(self) -> Mapping[str, Variable]:
         """Variables that the points of such a study have, if they are asked for."""
         return self.kind.asked
@@ -91,10 +81,8 @@ class Study(Section):
     @property
     def sizes(self) -> Mapping[str, int]:
         """Lengths of the dimensions after the axes that the study gives: slow time, and blocks of missions."""
-        if self.has_modes:
-            return {}
-        n_kept = len(self.cycles_kept)
-        return {"mission": n_kept, "block": len(self.mission)} if self.has_missions else {"cycle": n_kept}
+        counted = {self.kind.counted: len(self.cycles_kept)} if self.kind.counted else {}
+        return {**counted, **({"block": len(self.mission)} if self.mission else {})}
 
     @property
     def scene_variables(self) -> tuple[str, ...]:
@@ -136,7 +124,7 @@ class Study(Section):
     def cycles_kept(self) -> tuple[float, ...]:
         """Cycle counts, or numbers of missions, of the result, ascending; with `to_the_end` numbers of the outputs."""
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
-        if self.has_missions:
+        if self.mission:
             return tuple(map(float, self.missions_kept))
         if isinstance(outputs, tuple):
             return outputs

@@ -146,17 +146,16 @@ def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
 def _life(life: Life, summary: Summary) -> str:
     units = {"wear_depth": "m", "worn_volume": "m3", "frequency_shift": "Hz"}.get(life.quantity, "1")
     target = f"{life.quantity.replace('_', ' ')} {scale_for(units, life.target).show(life.target)}"
-    beyond = f"{count(life.n_beyond, 'point')} {'does' if life.n_beyond == 1 else 'do'} not reach it"
+    unsure = f"; the life of {count(life.n_unsure, 'point')} is not known" if life.n_unsure else ""
     if math.isnan(life.count.value):
-        unsure = f"the life of {count(life.n_unsure, 'point')} is not known; " if life.n_unsure else ""
-        return f"{unsure}{target} is not reached by {'another' if unsure else 'any'} point computed to the end"
-    known = "error not known"
+        return f"no {'other ' if unsure else ''}point computed to the end reaches {target}{unsure}"
+    known = "(error not known)"
     if math.isfinite(life.count.error):
         known = f"+- {show_percent(life.count.error / life.count.value)}"
     text = f"{_count(round(life.count.value), summary)} {known} to {target}"
-    text += f", the shortest, at {life.where}" if life.where and summary.n_points > 1 else ""
-    text += f"; that of {count(life.n_unsure, 'point')} is not known" if life.n_unsure else ""
-    return text + (f"; {beyond}" if life.n_beyond else "")
+    text += f" at {life.where} (the shortest life)" if life.where and summary.n_points > 1 else ""
+    verb = "does" if life.n_beyond == 1 else "do"
+    return text + unsure + (f"; {count(life.n_beyond, 'point')} {verb} not reach the target" if life.n_beyond else "")
 
 
 def _mode(mode: ModeRange) -> str:

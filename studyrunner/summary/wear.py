@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from studyrunner.result.points import WELL_ENOUGH
 from studyrunner.result.scene_pairs import last_depth, tells_depth
-from studyrunner.result.view import NO_VOLUME, WELL_ENOUGH, Result
+from studyrunner.result.view import NO_VOLUME, Result
 
 _NO_SLIP = 1e-12  # m, round-off: less than the size of an atom
 
@@ -25,96 +26,69 @@ class Number:
 
 @dataclass(frozen=True)
 class Deepest:
-    """The deepest pair of a point. depth: m; its error is that of this pair.
+    """The deepest pair of a point; None and NaN where the file holds no depths of single pairs, or no places."""
 
-    pair: index along `contact`, with surface and position (3,), m, NaN where the file has none; None where the file
-    holds no depths of single pairs. edge_share, edge_area: of the volume and of the area of its surface, what belongs
-    to pairs at the edge of the contact; NaN where not known.
-    """
-
-    depth: Number
-    pair: int | None = None
+    depth: Number  # m, with the error of this pair
+    pair: int | None = None  # index along `contact`
     surface: str = ""
-    position: tuple[float, ...] = (math.nan,) * 3
-    edge_share: float = math.nan
-    edge_area: float = math.nan
+    position: tuple[float, ...] = (math.nan,) * 3  # m
+    edge_share: float = math.nan  # of the volume of its surface, what belongs to pairs at the edge of the contact
+    edge_area: float = math.nan  # the same of the area
 
 
 @dataclass(frozen=True)
 class MostWear:
-    """The point with the largest worn volume.
+    """The point with the largest worn volume, of points that differ in numerical settings only the best known one."""
 
-    Of points that differ in numerical settings only, it is the best known one. point: index along each axis. where:
-    the point in words. n_compared: cases that it is the largest of. n_left_out: cases without a worn volume that is
-    known, which may wear more. count: cycles or missions, inf for the final state. volume: m3. blocks: of missions,
-    share of each block.
-    """
-
-    point: dict[str, int]
-    where: str
-    n_compared: int
-    n_left_out: int
-    count: float
-    volume: Number
+    point: dict[str, int]  # index along each axis
+    where: str  # the point in words
+    n_compared: int  # cases that it is the largest of
+    n_left_out: int  # cases without a known worn volume, which may wear more
+    count: float  # cycles or missions, inf for the final state
+    volume: Number  # m3
     deepest: Deepest
-    blocks: tuple[tuple[str, float], ...] = ()
+    blocks: tuple[tuple[str, float], ...] = ()  # of missions, share of each block
 
 
 @dataclass(frozen=True)
 class NothingWore:
-    """No point that was computed to the end wears.
+    """No point that was computed to the end wears."""
 
-    largest_slip: m, of any pair, 0 where all stick; NaN where the file does not say. where: these points in words, as
-    "212 Hz" or "all 3 frequencies".
-    """
-
-    largest_slip: float
-    where: str
+    largest_slip: float  # m, of any pair, 0 where all stick; NaN where the file does not say
+    where: str  # these points in words, as "212 Hz" or "all 3 frequencies"
 
 
 @dataclass(frozen=True)
 class Vibration:
-    """How the joint responds. of: name of the response. where: the point in words.
+    """How the joint responds at a point; amplitudes are NaN where they are known to a factor of two only."""
 
-    followed: "resonance" or "peak", whose frequency goes from `frequency[0]` to `frequency[1]`, Hz, while the joint
-    wears. Else empty: frequency[0] is where the unworn joint responds most among the frequencies, NaN where none lies
-    between two others; frequency[1] is NaN. amplitude: m, of the unworn and of the worn joint at `where`; NaN where it
-    is known to a factor of two only. peak: m, of the unworn joint at frequency[0].
-    """
-
-    of: str
-    where: str
-    followed: str
+    of: str  # name of the response
+    where: str  # the point in words
+    followed: str  # "resonance" or "peak", whose frequency changes while the joint wears; else empty
+    # Hz, followed: first and last; else where the unworn joint responds most, NaN at the ends of the frequencies
     frequency: tuple[float, Number]
-    amplitude: tuple[Number, Number]
-    peak: float = math.nan
+    amplitude: tuple[Number, Number]  # m, of the unworn and of the worn joint
+    peak: float = math.nan  # m, of the unworn joint at frequency[0]
 
 
 @dataclass(frozen=True)
 class Life:
-    """The shortest life. quantity, target: of slow_time.until. count: NaN where no point reaches the target.
+    """The shortest life."""
 
-    n_beyond: points computed to the end that do not reach it. n_unsure: those whose life is known to a factor of two
-    only.
-    """
-
-    quantity: str
+    quantity: str  # of slow_time.until
     target: float
-    count: Number
+    count: Number  # NaN where no point reaches the target
     where: str
-    n_beyond: int
-    n_unsure: int = 0
+    n_beyond: int  # points computed to the end that do not reach the target
+    n_unsure: int = 0  # points whose life is known to a factor of two only
 
 
 @dataclass(frozen=True)
 class MeshChange:
-    """How far the worn volumes of two meshes are apart, relative: in the median and at most.
-
-    at: "at the resonance", "at equal frequency ratio".
-    """
+    """How far the worn volumes of two meshes are apart, relative."""
 
     meshes: tuple[float, float]
-    at: str
+    at: str  # "at the resonance", "at equal frequency ratio"
     median: float
     largest: float
 

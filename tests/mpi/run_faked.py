@@ -3,10 +3,8 @@
 FAKE_SECONDS: longest time of a history; each rank then notes those that it took in a file.
 FAKE_FAILURE: rank whose first history gives more results than it should: a bug, which raises. The histories of the
 others wait for that.
-FAKE_TOGETHER: no history goes on before as many ranks have had one.
 FAKE_STEPS: every history takes as many steps of FAKE_SECONDS each and says after each how far it is; every start state
 takes two. Each step is noted in a file, what was gone on from in another one, and what was done when in a third.
-FAKE_HOLDS: each step of a history keeps the interpreter from all other threads in so many calls, as of C, of a second.
 FAKE_PROGRESS: a task says so often how far it is, s; 0.03 where it is not given.
 FAKE_CRASH: what each history at the second frequency does instead: "segfault" or "abort"; so does each sweep on its way
 to the fourth one where "in sweep" stands behind.
@@ -82,7 +80,7 @@ def compute_sweep(task: Sweep, n_steps: int, seconds: float, keep: Keep) -> Iter
             return
         if crash_in("sweep") and started.place == 3:
             # what was given before is on the disk by then
-            time.sleep(1.0)
+            time.sleep(2.0)
             end_process(crash_in("sweep"))
         if number < gone_on_from(task):
             continue
@@ -111,8 +109,6 @@ def compute_history(
         yield from fake_evaluate(task, facts=facts)
     elif failing >= 0:
         time.sleep(PATIENCE)
-    if "FAKE_TOGETHER" in os.environ:
-        meet(int(os.environ["FAKE_TOGETHER"]))
     carried = walk(task, n_steps, seconds, keep) if n_steps else 0.0
     for result in fake_evaluate(task, facts=facts, seconds=0.0 if n_steps else seconds):
         assert isinstance(result, PointResult)
@@ -140,17 +136,10 @@ def walk(task: History, n_steps: int, seconds: float, keep: Keep) -> float:
     carried = 0.1 + 0.01 * (task.number % 50) if task.resume is None else float(task.resume.arrays[0][1])
     for step in range(first, n_steps):
         carried = 3.99 * carried * (1.0 - carried)
-        compute(seconds)
+        time.sleep(seconds)
         note_step(task, step)
         keep(Packed("history", (np.array([step + 1.0, carried]),)))
     return carried
-
-
-def compute(seconds: float) -> None:
-    """Takes so long."""
-    time.sleep(seconds)
-    for _ in range(int(os.environ.get("FAKE_HOLDS", "0"))):
-        ctypes.PyDLL(None).usleep(1_000_000)
 
 
 def note_step(task: Task, number: int) -> None:
@@ -164,12 +153,6 @@ def note_done(what: str, task: Task, number: int) -> None:
     """When a step or a result of a task was finished, before anybody hears of it."""
     with Path(DONE).open("a", encoding="ascii") as file:
         file.write(f"{time.time()} {what} {task.key} {number}\n")
-
-
-def meet(n_ranks: int) -> None:
-    """Returns when so many ranks have been here."""
-    Path(f"met{launcher_rank()}.txt").touch()
-    wait_until(lambda: len(list(Path().glob("met*.txt"))) >= n_ranks, PATIENCE)
 
 
 def watch_memory(samples: list[int]) -> None:

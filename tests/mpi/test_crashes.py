@@ -61,6 +61,8 @@ def test_a_run_that_is_killed_says_nothing_of_its_tasks(whole, tmp_path):
         started = running.reaches(lambda: "] " in running.said and len(running.ranks()) == 2)
         assert started, running.said
         assert running.reaches(lambda: count_entries("start", tmp_path / "out.nc") > 0), running.said
+        # a kill leaves no memory behind
+        assert not any(running.shared_memory().values())
         os.kill(running.ranks()[1], signal.SIGKILL)
 
     for _ in range(2):

@@ -195,6 +195,39 @@ def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks, number, whole,
         xr.testing.assert_equal(left[name].where(there), whole[name].where(there))
 
 
+STUCK = """
+import sys, time
+from studyrunner.checkpoint.store import Store
+from studyrunner.system import endings
+endings.SECONDS_OF_GRACE = 1.0
+
+def hang(*_, **__):
+    print("hangs", file=sys.stderr, flush=True)
+    while True:
+        time.sleep(600)
+
+Store.tick = hang
+from studyrunner.cli import main
+sys.exit(main())
+"""
+
+
+def test_one_more_signal_ends_a_run_that_cannot_end(tmp_path):
+    """A disk that does not answer, for one."""
+    script = tmp_path / "stuck.py"
+    script.write_text(STUCK, encoding="utf-8")
+
+    def end_twice(running):
+        for seconds in (0.0, 0.2, 2.0):
+            running.wait_for("hangs")
+            time.sleep(seconds)
+            running.process.send_signal(signal.SIGTERM)
+
+    ended = run_to_end(0, [str(script), "two_masses", "-o", "out.nc"], tmp_path, {}, end_twice)
+    assert (ended.status, ended.seconds < SOON) == (130, True)
+    assert "run-study: ended at once: the same command goes on where it was" in ended.said
+
+
 @pytest.mark.parametrize("rank_0_too", [False, True])
 def test_a_rank_that_is_ended_ends_the_run_in_good_order(rank_0_too, tmp_path):
     """The launcher tells all ranks, some earlier than others: rank 0 may be writing by then. Some other program may

@@ -3,7 +3,6 @@
 import re
 import signal
 import sys
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import xarray as xr
@@ -96,29 +95,6 @@ def test_bad_input_is_said_once(tmp_path):
     assert done.stdout == ""
     (line,) = done.stderr.splitlines()
     assert "sdof_slider: axes.frequency = -1: " in line
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_the_plan_is_printed_once(tmp_path):
-    alone, together = (start(n_ranks, [FAKED, *CHEAP, "--plan"], tmp_path).stdout for n_ranks in (0, 2))
-    assert alone
-    # a plan tells the time with that of its own process
-    assert re.sub(r"[0-9.]+ s\b", "seconds", together) == re.sub(r"[0-9.]+ s\b", "seconds", alone)
-
-
-def test_processes_of_srun_without_mpi(tmp_path):
-    """Processes that do not find each other say so once and compute nothing."""
-
-    def start_rank(rank):
-        return start(0, [FAKED, *GRID], tmp_path, {"SLURM_STEP_NUM_TASKS": "2", "SLURM_PROCID": str(rank)})
-
-    with ThreadPoolExecutor() as pool:
-        ranks = list(pool.map(start_rank, range(2)))
-    assert [done.returncode for done in ranks] == [2, 2]
-    (line,) = ranks[0].stderr.splitlines()
-    assert "2 processes were started" in line
-    assert "mpiexec" in line
-    assert [done.stderr for done in ranks[1:]] == [""]
     assert list(tmp_path.iterdir()) == []
 
 

@@ -89,17 +89,6 @@ def test_a_notebook_runs_without_a_warning_and_draws_its_figures(small_result, t
     assert count_figures(cells) == FIGURES[path.stem]
 
 
-@pytest.mark.slow
-def test_a_notebook_that_warns_or_fails_is_noticed(tmp_path):
-    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("import warnings; warnings.warn('look out')")])
-    nbformat.write(notebook, tmp_path / "warns.ipynb")
-    assert "look out" in written_as_warning(run(tmp_path / "warns.ipynb", tmp_path / "first", {}))[0]
-    notebook.cells[0].source = "1 / 0"
-    nbformat.write(notebook, tmp_path / "fails.ipynb")
-    with pytest.raises(Exception, match="ZeroDivisionError"):
-        run(tmp_path / "fails.ipynb", tmp_path / "second", {})
-
-
 def test_all_notebooks_are_here():
     assert {path.stem for path in NOTEBOOKS} == set(FIGURES)
 

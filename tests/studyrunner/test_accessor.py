@@ -219,12 +219,6 @@ def test_what_cannot_be_joined_is_refused(result):
         join_results([result, result], dim="gravity")
 
 
-@pytest.mark.parametrize("study", ["a = " + "[" * 50_000, "a = " + "9" * 6000, "= nonsense", "a = 1"])
-def test_a_study_that_is_none_is_not_joined(study, result):
-    with pytest.raises(ValueError, match="study"):
-        join_results([result.assign_attrs(study=study)], dim="friction_coefficient")
-
-
 def test_points_of_no_result_are_marked(result):
     joined = join_results([result.isel(frequency=[0], scheme=[0]), result.isel(frequency=[2], scheme=[1])])
     assert joined.outcome.values.tolist() == [[0, Outcome.NOT_COMPUTED], [Outcome.NOT_COMPUTED, 0]]

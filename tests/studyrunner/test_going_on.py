@@ -11,7 +11,6 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi import schedule
@@ -65,33 +64,6 @@ def test_an_interrupt_in_any_task(at, solver, capsys):
     xr.testing.assert_identical(results(), expected)
     again = capsys.readouterr().err
     assert (f"{n_there} of {N_POINTS} points are there from an earlier run" in again) == (n_there > 0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("where", "at"), [("flush", 5), ("note_life", 3), ("put", 6)])
-def test_an_interrupt_anywhere_in_the_main_thread(where, at, solver, monkeypatch):
-    """Before and after each of the calls that change what is kept."""
-    expected = whole(solver)
-    own, n_calls = getattr(Store, where), 0
-
-    def called(store, *arguments, **named):
-        nonlocal n_calls
-        n_calls += 1
-        if n_calls == at:
-            raise KeyboardInterrupt
-        found = own(store, *arguments, **named)
-        if n_calls + 1 == at:
-            n_calls += 1
-            raise KeyboardInterrupt
-        return found
-
-    with monkeypatch.context() as changed:
-        changed.setattr(Store, where, called)
-        status = main(TWO_WAYS)
-    assert status == (130 if n_calls >= at else 0)
-    assert_partial(results(), expected)
-    assert main(TWO_WAYS) == 0
-    xr.testing.assert_identical(results(), expected)
 
 
 @pytest.mark.slow
@@ -237,24 +209,3 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
     # but for the limit, which stands in their attributes
     xr.testing.assert_equal(results(), results("whole.nc"))
     assert count_entries("progress") == 0
-
-
-def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver):
-    expected = whole(solver)
-
-    def fail(task, _):
-        # the second state of the sweep upwards
-        if isinstance(task, Sweep) and task.number == 0 and (place := seen.setdefault(id(task), 0)) < 2:
-            seen[id(task)] = place + 1
-            if place == 1:
-                raise ZeroDivisionError("a bug")
-
-    seen: dict[int, int] = {}
-    solver.disturb = fail
-    assert main(TWO_WAYS) in (0, 3)
-    assert len(solver.tasks) == 2 + 8
-    solver.begin_again()
-    assert main([*TWO_WAYS, "--retry-failed"]) == 0
-    assert [type(task) for task in solver.tasks][:1] == [Sweep]
-    assert solver.n_results == 1 + 2 or solver.n_results == 1
-    xr.testing.assert_identical(results(), expected)

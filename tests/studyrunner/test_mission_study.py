@@ -253,15 +253,6 @@ seconds = 10
     assert find_scenes(study).of_blocks == ((0, 1), (0, 2))
 
 
-def test_missions_whose_blocks_give_all_need_no_axes(tmp_path):
-    path = tmp_path / "no_axes.toml"
-    path.write_text(STEADY.replace("[axes]\nfrequency = 160\n", "") + "frequency = 160\n", encoding="utf-8")
-    study = read_study(path)
-    assert tuple(study.dimensions) == ("wear_coefficient", "sweep")
-    path.write_text(format_study(study), encoding="utf-8")
-    assert read_study(path).dimensions == study.dimensions
-
-
 def test_blocks_have_the_same_pairs(study_file):
     with pytest.raises(UserError, match=r"mission.heavy: .* contact pairs of run-up"):
         run(study_file, overrides={"mission.heavy.area": 2e-4})
@@ -282,20 +273,6 @@ def test_samples_draw_what_all_blocks_have(study_file, blocks):
         assert loads["cruise"] == load
         assert loads["heavy"] == pytest.approx(12.0 + load - 10.0)
     assert len(set(result.worn_volume.isel(mission=-1).values.ravel())) == 3
-
-
-@pytest.mark.slow
-def test_drawn_values_are_those_of_a_block_where_each_gives_its_own(study_file, blocks):
-    own = {"mission.cruise.excitation_amplitude": 12.0, "axes.wear_coefficient": 1e-11, "axes.sweep": "up"}
-    scatter = {"samples": 3, "excitation_amplitude": {"normal": {"relative_std": 0.05}}}
-    result = run(study_file, overrides={**own, "axes.frequency": 160, "scatter": scatter})
-    drawn = result.sample_excitation_amplitude
-    for sample in range(3):
-        load = drawn.values[sample]
-        assert load in [case.block.excitation_amplitude for case in blocks.computed if case.block.name == "run-up"]
-        others = [case.block.excitation_amplitude for case in blocks.computed if case.block.name == "heavy"]
-        assert 1.4 * load == pytest.approx(min(others, key=lambda each: abs(each - 1.4 * load)))
-    assert "In the block run-up" in drawn.attrs["comment"]
 
 
 @pytest.mark.slow

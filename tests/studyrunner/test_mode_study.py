@@ -125,12 +125,6 @@ def test_points_of_a_line_share_a_task(study_file):
     assert len(set(points)) == len(points) == plan.n_points
 
 
-def test_equal_ratios_end_where_they_are_told_to():
-    table = {"start": 1e-6, "stop": 1e-2, "num": 5, "spacing": "log"}
-    study = read_study("sdof_slider", {"axes.wear_coefficient": table})
-    assert study.axes.wear_coefficient == (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
-
-
 def test_the_report_draws_frequency_and_damping(result, study_file, tmp_path):
     with open_for_report(study_file.with_name("out.nc")).dataset as dataset:
         assert dataset.sizes == result.sizes

@@ -9,7 +9,7 @@ import pytest
 from studyrunner.mpi import dispatch
 from studyrunner.mpi.cost_model import CostModel
 from studyrunner.mpi.dispatch import Dispatcher
-from studyrunner.mpi.ranks import Alone, LauncherError, launcher_rank, launcher_size, start_ranks
+from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
 
 
@@ -20,7 +20,7 @@ class Tasks(Office):
 
 
 def serve(tasks, run, take=lambda *_: []):
-    serve_tasks(Alone(), Tasks(tasks, take), lambda job, _: run(job))
+    serve_tasks(Ranks(), Tasks(tasks, take), lambda job, _: run(job))
 
 
 def test_long_tasks_go_first_and_results_make_new_ones():

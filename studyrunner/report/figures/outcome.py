@@ -11,8 +11,9 @@ from matplotlib.patches import Patch
 from studyrunner.report.drawing import COLOURS, Drawing, Table, add_legend, new_panel
 from studyrunner.report.figures.courses import find_course
 from studyrunner.result.choice import choose
+from studyrunner.result.points import CONVERGED
 from studyrunner.result.units import show_cycles
-from studyrunner.result.view import CONVERGED, Result, as_sentences
+from studyrunner.result.view import Result, as_sentences
 from studyrunner.variables import CERTIFICATE
 
 _MOST_ROWS, _MOST_CELLS, _MOST_TICKS = 24, 400, 9
