@@ -64,9 +64,11 @@ class ContactInterface:
         return np.where(tangents.sum(axis=1) == 1, np.argmax(tangents, axis=1), -1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LinearModel:
     """One linear structure with `n` displacements: `M x'' + C x' + K x + (contact forces) = load`, Eq. (1).
+
+    Equal to itself alone, so that what is derived from a structure can be cached by it.
 
     - mass, damping, stiffness (n, n): real symmetric, or Hermitian for a cyclic sector at one nodal diameter.
     - load_static (n,): N, real.

@@ -119,7 +119,8 @@ class PresentedHistory(Presented):
         missions = over == "mission"
         known = np.flatnonzero(np.isfinite(own.worn_volume))
         reached = own.last_mission if missions else own.last_cycle
-        pairs = f"{own.wear_depth.shape[1]} contact pairs"
+        n_pairs = own.wear_depth.shape[1]
+        pairs = f"{n_pairs} contact pair" + "s" * (n_pairs != 1)
         first = f"{own.outcome}, {reached:g} of {getattr(self, name)[-1]:g} {name}, {pairs}"
         computed = ("computed", f"{own.newton_iterations} Newton iterations, {own.run_time:.3g} CPU s")
         last = ("message", own.message) if own.message else computed

@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike
 
 from solver.accuracy.refinement import refine
 from solver.balance_functions import HarmonicBalance, balance_at_start, functions_of, start_of
-from solver.continuation.arc_length import Arc
+from solver.continuation.arc_length import Arc, add_fold
 from solver.continuation.options import CONTINUATION
-from solver.continuation.whole_curve import Branch, follow_branch_whole
 from solver.forced_response import check_case, check_number, check_numbers, worn_model
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.response_peak import largest_responses
@@ -133,17 +132,56 @@ def response_curve(
         return Balance(joint, history, balance.wear_depth)
 
     if at is None or not start.outcome.complete:
-        return _reported(case, Branch((), ()), balance_at, over_frequency, errors, (start.outcome, start.message))
+        return _reported(case, _Branch((), ()), balance_at, over_frequency, errors, (start.outcome, start.message))
     begin = State(at, balance.history, float(first))
     # a branch may turn back behind its start before it comes to the last value
     back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
     span = abs(last - first) / (CONTINUATION.smooth_change * _FEWEST_STEPS)
     arc = Arc(balance_at, begin, span, Run(settings.tolerance))
-    branch = follow_branch_whole(arc, last, back, most)
+    branch = _follow_branch(arc, last, back, most)
     return _reported(case, branch, balance_at, over_frequency, errors, _end(branch, most, over_frequency))
 
 
-def _end(branch: Branch, most: int, over_frequency: bool) -> tuple[Outcome, str]:
+@dataclass(frozen=True)
+class _Branch:
+    """Points of a branch in the order of the arc.
+
+    - points: the converged states.
+    - folds: indices of the points at which the parameter turns.
+    - arrived: whether the last point is at the last value of the parameter.
+    - returned: whether the branch has come back to the limit behind its start.
+    """
+
+    points: tuple[State, ...]
+    folds: tuple[int, ...]
+    arrived: bool = False
+    returned: bool = False
+
+
+def _follow_branch(arc: Arc, last: float, back: float, most: int) -> _Branch:
+    """Follow a branch until its parameter passes `last`, or the limit `back` on the other side of the start.
+
+    most: largest number of points.
+    """
+    points, folds = [arc.start], list[int]()
+    for before, reached, fold in arc.steps(float(np.sign(last - arc.start.parameter))):
+        add_fold(points, folds, fold, reached)
+        for value in (last, back):
+            if (reached.parameter - value) * (before.parameter - value) <= 0.0:
+                end = arc.state_at(before, reached, value)
+                return _Branch(
+                    tuple(points) if end is None else (*points, end),
+                    tuple(folds),
+                    end is not None and value == last,
+                    value == back,
+                )
+        points.append(reached)
+        if len(points) >= most:
+            break
+    return _Branch(tuple(points), tuple(folds))
+
+
+def _end(branch: _Branch, most: int, over_frequency: bool) -> tuple[Outcome, str]:
     """Outcome of a curve, and the sentence of one that does not come to its last value."""
     if branch.arrived:
         return Outcome.CONVERGED, ""
@@ -164,7 +202,7 @@ def _error(case: Case, joint: Joint, point: State, run: Run) -> float:
 
 
 def _reported(
-    case: Case, branch: Branch, balance_at: BalanceAt, over_frequency: bool, errors: bool, end: tuple[Outcome, str]
+    case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency: bool, errors: bool, end: tuple[Outcome, str]
 ) -> ResponseCurve:
     """The curve of a branch, each point with its error and multipliers."""
     n_response, n_points = len(case.model.linear[0].response), len(branch.points)

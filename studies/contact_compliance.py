@@ -15,7 +15,7 @@ ContactStiffness = Annotated[
     Field(
         gt=0,
         le=LARGEST_CONTACT_STIFFNESS,
-        description="normal stiffness per area of rough surfaces, N/m3; rigid if not given",
+        description="normal stiffness per area of rough surfaces; rigid if not given, N/m3",
     ),
 ]
 

@@ -5,13 +5,14 @@ For use in Python, from this package itself:
 - `read_study`: a checked `Study` from a file or by the name of a bundled one;
 - `run_study`: runs it in this process and gives its result as an `xarray.Dataset`;
 - `open_result`: that of a result file, with the accessor `fretwear`;
+- `compute_worn_joint`: response curve, loops and natural frequencies of a worn joint, from the wear depths of a result;
 - `UserError`, `StorageError`: what they raise, in one sentence.
 
-The rooms, in the way of a study: `study` (its file, checked), `scene` (its reduced model), `plan` (tasks, and what they
-are known by), `mpi` (ranks, and which of them does which task), `checkpoint` (the file of what is finished),
-`summary` (the last lines of a run), `result` (the result file), `report` (figures and page from result files), `system`
-(files, signals, streams, progress). On top: `api`, `cli`, `run`, `task_progress`, `evaluate`, `accessor`. On the
-ground: `variables`, `user_error`.
+The rooms, in the way of a study: `study` (its file, checked), `scene` (its reduced model), `kinds` (the kinds of study:
+their tasks, and how these are computed), `plan` (`--plan`), `mpi` (ranks, and which of them does which task),
+`checkpoint` (the file of what is finished), `summary` (the last lines of a run), `result` (the result file), `report`
+(figures and page from result files), `system` (files, signals, streams, progress). On top: `api`, `cli`, `run`,
+`task_runs`, `task_progress`, `accessor`. On the ground: `variables`, `user_error`.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from studyrunner.api import StorageError, Study, UserError, open_result, read_study, run_study
+    from studyrunner.worn_joint import compute_worn_joint
 
-__all__ = ["StorageError", "Study", "UserError", "open_result", "read_study", "run_study"]
+__all__ = ["StorageError", "Study", "UserError", "compute_worn_joint", "open_result", "read_study", "run_study"]
 
 
 # Before the libraries of HDF5 are loaded: they do without locks where the system has none, but refuse a file where the
@@ -36,7 +38,7 @@ os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.api"), name)
+    return getattr(import_module(f"{__name__}.{'worn_joint' if name == 'compute_worn_joint' else 'api'}"), name)
 
 
 def __dir__() -> list[str]:

@@ -6,12 +6,11 @@ Importing this module gives every `xarray.Dataset` read from a result file the a
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from studyrunner.result.grid import find_grid
 from studyrunner.statistics.study_statistics import worn_volume_statistics
@@ -19,7 +18,6 @@ from studyrunner.study.toml_text import read_toml
 from studyrunner.summary.answer import Summary, summary
 from studyrunner.user_error import UserError
 
-_SAME = 1e-9  # relative: two values of an axis that differ by less are one
 _NOT_COMPUTED = 13  # `Outcome.NOT_COMPUTED` of the solver, which results are read without
 _PAIRS = ("contact", "contact_x", "contact_y", "contact_z", "contact_surface")
 
@@ -94,6 +92,14 @@ class FretwearAccessor:
         values["along"].attrs = {"units": "m", "long_name": "distance along the flank"}
         return values.transpose(..., "across", "along")
 
+    def outcomes(self) -> xr.DataArray:
+        """How each point ended, as a word of `flag_meanings`; the sentence of each word is in `outcome.sentences`."""
+        outcome = self._dataset["outcome"]
+        numbers = np.atleast_1d(outcome.attrs["flag_values"]).tolist()
+        words = dict(zip(numbers, outcome.attrs["flag_meanings"].split(), strict=True))
+        named = [words.get(number, f"outcome_{number}") for number in outcome.values.ravel().tolist()]
+        return outcome.copy(data=np.array(named).reshape(outcome.shape)).drop_attrs(deep=False)
+
     def loop(self, contact: int) -> xr.Dataset:
         """Relative displacement and contact force of a pair through a period, closed: the first phase again at 2 pi.
 
@@ -101,41 +107,29 @@ class FretwearAccessor:
         component "normal" is positive when the pair closes, its force in compression. ValueError: the file does not
         hold the loop.
         """
-        ask = f"ask for it by [outputs] loops = [{contact}]"
-        if not {"loop_displacement", "loop_force"} <= set(self._dataset.data_vars):
-            raise ValueError(f"The result holds no loops; {ask}.")
-        if contact not in self._dataset["contact"].values:
-            raise ValueError(f"There is no contact pair {contact} in the result.")
         names = {"loop_displacement": "displacement", "loop_force": "force"}
-        loop = self._dataset[list(names)].sel(contact=contact).rename(names)
-        if not loop["force"].notnull().any():
-            raise ValueError(f"The result holds no loop of contact pair {contact}; {ask}, unless its points failed.")
-        first = loop.isel(phase=[0]).assign_coords(phase=loop["phase"][:1] + 2.0 * math.pi)
-        closed = xr.concat(
-            [loop, first], dim="phase", data_vars="minimal", coords="minimal", compat="override", join="outer"
-        )
-        closed["phase"].attrs = loop["phase"].attrs
-        return closed.transpose(..., "phase", "component")
+        found = self._dataset[[name for name in names if name in self._dataset]]
+        axis = "loop_contact" if "loop_contact" in found.dims else "contact"
+        if axis in found.dims and contact in found[axis].values:
+            loop = found.sel({axis: contact}).rename(names)
+            if loop["force"].notnull().any():
+                first = loop.isel(phase=[0]).assign_coords(phase=loop["phase"][:1] + 2.0 * math.pi)
+                closed = xr.concat(
+                    [loop, first], dim="phase", data_vars="minimal", coords="minimal", compat="override", join="outer"
+                )
+                closed["phase"].attrs = loop["phase"].attrs
+                return closed.transpose(..., "phase", "component")
+        ask = f"ask for it by [outputs] loops = [{contact}], unless its points failed"
+        raise ValueError(f"The result holds no loop of contact pair {contact}; {ask}.")
 
 
 def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.Dataset:
     """One result of several: the axes hold the values of all of them. A point in several is taken whole from the last.
 
     A point in none of them is NaN, its whole numbers 0 and its `outcome` not_computed. Attributes are kept that all
-    agree on.
-
-    Parameters
-    ----------
-    datasets
-        Results, read from files of `run-study`.
-    dim
-        Name of a key of the study that differs between them and is no axis, e.g. "friction_coefficient" or
-        "scene.friction_coefficient"; it becomes the first axis.
-
-    Raises
-    ------
-    ValueError
-        Where the results have different axes or pairs, are of different scenes and no `dim` is given, or lack the key.
+    agree on. dim: key of the study that differs between the results and is no axis, as "friction_coefficient" or
+    "scene.friction_coefficient"; it becomes the first axis. ValueError: the results have different axes or pairs, are
+    of different scenes and no `dim` is given, or lack the key.
     """
     if not datasets:
         raise ValueError("There are no results to join.")
@@ -147,51 +141,39 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
     for other in datasets:
         if other["outcome"].dims != axes:
             raise ValueError(f"The results have different axes: {axes} and {other['outcome'].dims}.")
-        own = "cycle_count" in first
-        if ("cycle_count" in other) != own or (own and other.sizes["cycle"] != first.sizes["cycle"]):
+        n_outputs = [one.sizes["cycle"] for one in (first, other) if "cycle_count" in one]
+        if n_outputs and n_outputs != 2 * [first.sizes["cycle"]]:
             raise ValueError("A result with slow_time.cycles = inf joins only those, and with as many outputs.")
         for each in _PAIRS:
-            if not np.array_equal(other[each].values, first[each].values, equal_nan=first[each].dtype.kind == "f"):
+            if not other[each].variable.equals(first[each].variable):  # type: ignore[no-untyped-call]
                 raise ValueError(f"The results have different contact pairs: see {each}.")
-    # Of each variable the last that is there; those without an axis, as a mesh, are the same in all results.
-    last = {name: one.variables[name] for one in datasets for name in one.data_vars}
-    dims = dict.fromkeys(d for variable in last.values() if set(axes) & set(variable.dims) for d in variable.dims)
-    known = {d: _union([one[d].values for one in datasets if d in one.dims]) for d in dims}
-    joined = {name: variable.copy() for name, variable in last.items()}
-    for name, variable in last.items():
-        if set(axes) & set(variable.dims):
-            joined[name] = _join_variable(name, variable, datasets, {d: known[d] for d in variable.dims}, axes)
-    coordinates = {name: array.variable for one in reversed(datasets) for name, array in one.coords.items()}
-    coordinates |= {d: xr.Variable(d, values, coordinates[d].attrs) for d, values in known.items()}
+    models = {name: array for one in datasets for name, array in one.data_vars.items()}
+    gaps = {name: _gap(str(name), array) for name, array in models.items()}
+    texts = [d for d in axes if first[d].dtype.kind in "OU"]
+    as_they_come = {d: list(dict.fromkeys(text for one in datasets for text in one[d].values.tolist())) for d in texts}
+    joined, *parts = (part.sel(as_they_come) for part in xr.align(*datasets, join="outer", fill_value=gaps))
+    for later in parts:
+        is_there = later["outcome"] != _NOT_COMPUTED
+        for name, gap in gaps.items():
+            model = later.get(name, joined.get(name, models[name]))
+            if not set(axes) <= set(model.dims):
+                # one without the axes, as a mesh, is the same in all results
+                joined = joined.assign({name: model})
+            elif name in later or name in joined:
+                new, old = (part.get(name, xr.full_like(model, gap)) for part in (later, joined))
+                taken = new.where(is_there, old).transpose(*model.dims)
+                joined = joined.assign({name: taken.assign_attrs(model.attrs)})
     common = {key: text for key, text in first.attrs.items() if all(one.attrs.get(key) == text for one in datasets)}
     history = [f"joined of {len(datasets)} results", *dict.fromkeys(str(one.attrs.get("history")) for one in datasets)]
-    return xr.Dataset(joined, coordinates, {**common, "history": "\n".join(history)})
+    joined.attrs = {**common, "history": "\n".join(history)}
+    return joined
 
 
-def _join_variable(
-    name: Hashable,
-    model: xr.Variable,
-    datasets: Sequence[xr.Dataset],
-    known: Mapping[Hashable, NDArray[Any]],
-    axes: Sequence[Hashable],
-) -> xr.Variable:
-    """A variable of all results, over the known values of its dimensions. model: one of them."""
-    fill = math.nan if model.dtype.kind == "f" else _NOT_COMPUTED if name == "outcome" else 0
-    target = np.full([len(values) for values in known.values()], fill, dtype=model.dtype)
-    for one in datasets:
-        place = {d: _places(one[d].values, values) for d, values in known.items() if d in one.dims}
-        # Nothing of an earlier result stays in a point that a later one holds.
-        points = [place[d] if d in axes else np.arange(len(values)) for d, values in known.items()]
-        target[np.ix_(*points)] = fill
-        if name in one:
-            target[np.ix_(*(place[d] for d in known))] = one[name].transpose(*known).values
-    attributes = dict(model.attrs)
-    if name == "outcome" and _NOT_COMPUTED in target and _NOT_COMPUTED not in attributes["flag_values"]:
-        attributes["flag_values"] = np.append(attributes["flag_values"], target.dtype.type(_NOT_COMPUTED))
-        attributes["flag_meanings"] += " not_computed"
-        if "sentences" in attributes:
-            attributes["sentences"] += "\nThe point is in none of the results that were joined."
-    return xr.Variable(tuple(known), target, attributes)
+def _gap(name: str, array: xr.DataArray) -> Any:
+    """What stands in a variable at a point in none of the results."""
+    if name == "outcome":
+        return _NOT_COMPUTED
+    return math.nan if array.dtype.kind == "f" else "" if array.dtype.kind in "OU" else 0
 
 
 def _with_axis(dataset: xr.Dataset, key: str) -> xr.Dataset:
@@ -208,21 +190,3 @@ def _with_axis(dataset: xr.Dataset, key: str) -> xr.Dataset:
     expanded = [each for each, array in dataset.data_vars.items() if not str(each).startswith("mesh_")]
     axis = xr.Variable(name, np.array(found), {"long_name": name.replace("_", " ")})
     return dataset.assign({each: dataset[each].expand_dims({name: 1}) for each in expanded}).assign_coords({name: axis})
-
-
-def _union(values: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """All values of an axis: numbers in order, texts as they come."""
-    joined = np.concatenate(values)
-    if joined.dtype.kind not in "iuf":
-        return np.array(list(dict.fromkeys(joined.tolist())))
-    joined = np.sort(joined)
-    new: NDArray[np.bool_] = np.diff(joined, prepend=-math.inf) > _SAME * np.abs(joined)
-    return joined[new]
-
-
-def _places(values: NDArray[Any], known: NDArray[Any]) -> NDArray[np.intp]:
-    """Where values of an axis are among all of them."""
-    if known.dtype.kind in "iuf":
-        nearest: NDArray[np.intp] = np.abs(known - values[:, None]).argmin(axis=1)
-        return nearest
-    return np.array([known.tolist().index(value) for value in values.tolist()], dtype=np.intp)

@@ -61,7 +61,7 @@ def advise(outcome: str, used: Used) -> str:
         if used.scheme not in _OF_ADAPTIVE_STEPS:
             return _try(*_other_steps(used))
         return _try("a smaller rtol") + (
-            " Where that leaves both apart, the joint itself is that sensitive: use [scatter]."
+            " If both still differ then, the joint itself is that sensitive: use [scatter]."
         )
     if outcome == "inaccurate":
         return _try(*_given(used))

@@ -9,14 +9,12 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
-from studyrunner.mpi.launcher import launcher_size
-from studyrunner.mpi.ranks import Alone
+from studyrunner.mpi.ranks import Ranks, launcher_size
 from studyrunner.result.creation_date import check_date
 from studyrunner.result.existing_result import Target, check_result
 from studyrunner.result.opening import open_result
 from studyrunner.result.paths import check_output
-from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
-from studyrunner.scene_building import build_scenes
+from studyrunner.run import Interrupted, RunOptions, compute_study
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay, SilentProgress
@@ -89,23 +87,14 @@ def run_study(
     checked = None if date is None else check_date(date, "run_study", "date")
     path = Path(f"{study.study.name}.nc" if output is None else output)
     target = _check_output(path, study, overwrite=overwrite)
+    given = RunOptions(fresh=fresh, retry_failed=retry_failed, date=checked)
+    shown = ProgressDisplay() if progress else SilentProgress()
     try:
         # the scene as well: with two threads its matrices differ in the last bits, and start states with them
-        with (
-            threadpool_limits(1),
-            open_progress(target) as store,
-            ProgressDisplay() if progress else SilentProgress() as shown,
-        ):
-            alone = Alone()
-            scenes = build_scenes(alone, study, store, shown.say)
-            given = RunOptions(fresh=fresh, retry_failed=retry_failed, date=checked)
-            serve_study(alone, study, scenes, target, shown, given)
+        with threadpool_limits(1):
+            compute_study(Ranks(), study, target, given, shown, shown.say)
     except Interrupted as ended:
-        summary = ended.summary
-        n_done = summary.n_points - summary.n_left
-        where = f"{target.path} holds them" if summary.written else f"{target.path} is the finished result that it was"
-        kept = f"{n_done} of {summary.n_points} points are kept, {where}"
-        raise KeyboardInterrupt(f"interrupted: {kept}, the same call goes on") from None
+        raise KeyboardInterrupt(ended.summary.describe_end(target.path, "the same call")) from None
     return open_result(target.path)
 
 

@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not is_ending(error):
             raise
         begin_ending()
-        from studyrunner.mpi.launcher import launcher_rank
+        from studyrunner.mpi.ranks import launcher_rank
 
         if launcher_rank() == 0:
             print("run-study: interrupted", file=sys.stderr)

@@ -10,8 +10,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studyrunner.mpi.launcher import LauncherError, job_size, launcher_rank
-from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, start_ranks
+from studyrunner.mpi.ranks import (
+    POLL_SECONDS,
+    LauncherError,
+    RankInterrupted,
+    Ranks,
+    check_software,
+    job_size,
+    launcher_rank,
+    start_ranks,
+)
 from studyrunner.options import Options, parse_options
 from studyrunner.system.endings import INTERRUPTED, begin_ending, is_ending, raise_ending, say_at_last
 from studyrunner.system.machine_faults import LEAST_ADDRESS_SPACE, address_space
@@ -63,7 +71,12 @@ def run_command(arguments: Sequence[str] | None) -> int:
     if ranks.rank == 0:
         say_at_last("run-study: ended at once: the same command goes on where it was")
     try:
-        status = _lead(ranks, sys.argv[1:] if arguments is None else arguments) if ranks.rank == 0 else _follow(ranks)
+        if ranks.rank == 0:
+            status = _lead(ranks, sys.argv[1:] if arguments is None else arguments)
+            for rank in range(1, ranks.size):
+                ranks.send(None, rank)
+        else:
+            status = _follow(ranks)
         if arguments is None:
             # it has come to its end: what comes while MPI and the interpreter end is of no use to anybody
             begin_ending()
@@ -99,8 +112,6 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 
     Returns whether rank 0 had already finished.
     """
-    from studyrunner.mpi.schedule import RankInterrupted
-
     ranks.send(RankInterrupted(), 0)
     latest = time.monotonic() + _SECONDS_FOR_RANK_0
     while time.monotonic() < latest:
@@ -113,11 +124,9 @@ def _leave_to_rank_0(ranks: Ranks) -> bool:
 
 
 def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
-    """Rank 0. The other ranks get the model and tasks, or None where nothing has to be computed."""
+    """Rank 0: its exit status."""
     try:
-        from studyrunner.mpi.version_check import check_versions
-
-        check_versions(ranks)
+        check_software(ranks)
         options = parse_options(arguments)
         _check_memory()
         raise_ending()
@@ -126,26 +135,21 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
         study = read_study(options.study, options.overrides)
         raise_ending()
         if options.plan:
-            status = _show_plan(study)
-        elif options.check:
-            status = _check(study)
-        elif options.write_scene is not None:
-            status = _write_scene(study, options.write_scene)
-        else:
-            return _compute(ranks, study, options)
+            return _show_plan(study)
+        if options.check:
+            return _check(study)
+        if options.write_scene is not None:
+            return _write_scene(study, options.write_scene)
+        return _compute(ranks, study, options)
     except UserError as error:
         # Ctrl-C ends the processes that read files as well, which tells nothing of the files
         raise_ending()
         print(*(f"run-study: {line}" for line in str(error).splitlines()), sep="\n", file=sys.stderr)
-        status = BAD_INPUT
     except LauncherError as error:
         print(f"run-study: launcher: {error}", file=sys.stderr)
-        status = BAD_INPUT
     except SystemExit:
-        status = CONVERGED
-    for rank in range(1, ranks.size):
-        ranks.send(None, rank)
-    return status
+        return CONVERGED
+    return BAD_INPUT
 
 
 def _check_memory() -> None:
@@ -157,29 +161,20 @@ def _check_memory() -> None:
 
 def _follow(ranks: Ranks) -> int:
     """Any other rank. Only rank 0 has an exit status."""
-    from studyrunner.mpi.mapped_file import take_over
-    from studyrunner.mpi.version_check import report_version
+    from studyrunner.mpi.schedule import follow_rank_0
+    from studyrunner.task_runs import evaluator
 
-    report_version(ranks)
-    model = take_over(ranks)
-    if model is not None:
-        from studyrunner.run import work_on_job
-        from studyrunner.scene_building import SeveralScenes, help_to_build
-
-        if isinstance(model, SeveralScenes):
-            help_to_build(ranks)
-            model = None
-        work_on_job(ranks, model)
+    follow_rank_0(ranks, evaluator())
     return CONVERGED
 
 
 def _show_plan(study: Study) -> int:
-    from studyrunner.plan.estimate import largest_memory
+    from studyrunner.kinds.estimate import largest_memory
+    from studyrunner.kinds.kind import build_tasks
     from studyrunner.plan.plan_text import format_plan
-    from studyrunner.plan.planning import build_tasks
     from studyrunner.plan.plausibility import doubts_of_study
+    from studyrunner.scene.check_command import remarks_of_study
     from studyrunner.scene.drawn_contacts import contact_changes
-    from studyrunner.scene.model_remarks import remarks_of_study
     from studyrunner.scene.planned_scenes import plan_scenes
 
     before = largest_memory()
@@ -223,36 +218,21 @@ def _write_scene(study: Study, path: Path) -> int:
 def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     from studyrunner.result.existing_result import check_result
     from studyrunner.result.paths import check_output
-    from studyrunner.result.provenance import compare_with_archived
-    from studyrunner.run import Interrupted, RunOptions, open_progress, serve_study
-    from studyrunner.scene.scene_set import merge_facts
-    from studyrunner.scene_building import build_scenes
+    from studyrunner.run import Interrupted, RunOptions, compute_study
     from studyrunner.system.progress import ProgressDisplay, count, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
     target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
-    progress = ProgressDisplay()
-    given = RunOptions(fresh=options.fresh, retry_failed=options.retry_failed, date=options.date)
+    display, announced = ProgressDisplay(), job_size() if ranks.size == 1 else 0
+    idle = f"one process, although the job has room for {announced}: srun or mpiexec starts them"
+    given = RunOptions(options.fresh, options.retry_failed, options.date)
     try:
-        with open_progress(target) as store:
-            # Before anything is said: a wrong scene is bad input, which ends with one line.
-            scenes = build_scenes(ranks, study, store, _SlowSteps().say)
-            for line in compare_with_archived(study, merge_facts(scenes.facts).digest):
-                print(f"run-study: {show_text(study.source)}: {line}", file=sys.stderr)
-            with progress:
-                if ranks.size == 1 and (announced := job_size()) > 1:
-                    progress.note(
-                        f"one process, although the job has room for {announced}: srun or mpiexec starts them"
-                    )
-                summary = serve_study(ranks, study, scenes, target, progress, given)
+        summary = compute_study(ranks, study, target, given, display, _SlowSteps().say, [idle] if announced > 1 else [])
     except Interrupted as ended:
-        done = f"{ended.summary.n_points - ended.summary.n_left} of {ended.summary.n_points} points"
-        kept = f"{done} are kept, {path} is the finished result that it was"
-        what = f"{path} holds {done}" if ended.summary.written else kept
-        raise KeyboardInterrupt(f"interrupted: {what}, the same command goes on") from None
+        raise KeyboardInterrupt(ended.summary.describe_end(path, "the same command")) from None
     failed = summary.n_points - summary.n_complete
     counts = f"{count(summary.n_points, 'point')}, {summary.n_complete} computed, {failed} failed"
-    print(f"{path}: {counts}, {format_seconds(progress.seconds)}", *_answer(study, target.path), sep="\n", flush=True)
+    print(f"{path}: {counts}, {format_seconds(display.seconds)}", *_answer(study, target.path), sep="\n", flush=True)
     return SOME_FAILED if failed else CONVERGED
 
 

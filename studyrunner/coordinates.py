@@ -56,18 +56,16 @@ STUCK_FREQUENCY = Variable(
 
 COORDINATES = {
     "frequency": Variable(
+        (), "Hz", "excitation frequency", comment="Of a followed resonance the middle of loading.between."
+    ),
+    "frequency_ratio": Variable(
         (),
-        "Hz",
-        "excitation frequency",
-        comment="Where the frequency follows the resonance: the middle of loading.between, which stands for the range;"
-        " excitation_frequency holds the frequency at each count.",
+        "1",
+        "excitation frequency over the first natural frequency with the joint stuck",
+        comment="Of the same scene; the coordinate frequency is in Hz.",
     ),
     "wear_coefficient": Variable(
-        (),
-        "1/Pa",
-        "wear coefficient",
-        comment="Worn volume over normal force times sliding distance, Archard's law, Eq. (2) of the reference; over"
-        " dissipated energy with the law energy; the attribute study says which law, under [wear].",
+        (), "1/Pa", "wear coefficient", comment="Of the law that the attribute study names under [wear]."
     ),
     "excitation_amplitude": Variable((), "N", "excitation amplitude, factor of the unit harmonic load"),
     "step": Variable((), "1", "step of the slow time scale, cycles", comment="Not used by the adaptive scheme."),
@@ -76,8 +74,7 @@ COORDINATES = {
         (),
         "1",
         "how the unworn state is reached",
-        comment="up: from low to high frequencies; down: from high to low ones; ramp: at this frequency, by raising the"
-        " excitation from nothing.",
+        comment="up, down: along the frequency; ramp: the excitation is raised at this frequency.",
     ),
     "harmonics": Variable((), "1", "harmonics above the static one"),
     "samples": Variable((), "1", "time samples in a period"),
@@ -87,19 +84,16 @@ COORDINATES = {
         (),
         "m kg^0.5",
         "modal amplitude",
-        comment="sqrt(x^H M x) with the first harmonic x of all displacements and the mass matrix M.",
+        comment="sqrt(x^H M x), x first harmonic of all displacements, M mass matrix.",
     ),
     "sample": Variable((), "1", "number of the sample", comment="What it draws is in the coordinates sample_..."),
     "cycle": Variable((), "1", "number of vibration cycles", comment="Slow time."),
-    "mission": Variable((), "1", "number of flown missions", comment="Slow time."),
-    "block": Variable((), "1", "name of the block of the mission", comment="In the order in which they are flown."),
+    "mission": Variable((), "1", "number of missions", comment="Slow time."),
+    "block": Variable((), "1", "name of the block of the mission", comment="In their order in a mission."),
     "contact": Variable((), "1", "index of the contact pair"),
     "response": Variable((), "1", "name of the response"),
     "phase": Variable(
-        (),
-        "rad",
-        "phase of the excitation",
-        comment="omega t, 0 where the excitation of a real harmonic load has its maximum.",
+        (), "rad", "phase of the excitation", comment="omega t, 0 where a real harmonic load has its maximum."
     ),
     "component": Variable((), "1", "component of relative displacement and contact force in the frame of the pair"),
     "nodal_diameter": Variable((), "1", "nodal diameter"),
@@ -111,7 +105,7 @@ COORDINATES = {
     "contact_area": Variable(
         ("contact",), "m2", "area of the contact pair", comment="Weight alpha of the pair, Eq. (7) of the reference."
     ),
-    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair"),
+    "contact_surface": Variable(("contact",), "1", "label of the surface of the contact pair", "str"),
     "contact_edge": Variable(
         ("contact",),
         "1",

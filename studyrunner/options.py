@@ -78,19 +78,8 @@ class _SceneHelp(argparse.Action):
         parser.exit()
 
 
-class _New(argparse.Action):
-    """Writes a new study file and ends, as --help does."""
-
-    def __call__(self, parser: argparse.ArgumentParser, _: object, values: object, __: str | None = None) -> NoReturn:
-        from studyrunner.study.keys import write_new_study
-
-        path = write_new_study(str(values))
-        print(f"{path}: run-study {path} computes it", flush=True)
-        parser.exit()
-
-
 def parse_options(arguments: Sequence[str]) -> Options:
-    """Options from the command line. Raises UserError; SystemExit after --help, --version and --scene-help."""
+    """Options from the command line. Raises UserError; SystemExit after --help, --new and the like."""
     parser = _Parser(
         prog="run-study",
         description=_DESCRIPTION,
@@ -111,9 +100,8 @@ def parse_options(arguments: Sequence[str]) -> Options:
     parser.add_argument(
         "--version", action="version", version=f"fretwear {metadata.version('fretwear')}", help="print the version"
     )
-    parser.add_argument(
-        "--new", action=_New, default=argparse.SUPPRESS, metavar="NAME", help="write NAME.toml, a study to start from"
-    )
+    parser.add_argument("--new", metavar="NAME", help="write NAME.toml, a study to start from, and stop")
+    parser.add_argument("--from", dest="deck", type=Path, metavar="DECK", help="with --new: a study of this deck")
     parser.add_argument("--plan", action="store_true", help="print what would be computed; compute nothing")
     parser.add_argument(
         "--check", action="store_true", help="print what a finite-element model is, draw its contact pairs; then stop"
@@ -147,6 +135,15 @@ def parse_options(arguments: Sequence[str]) -> Options:
         help="date_created of the result: a date, or now; without it equal runs have equal files",
     )
     found = vars(parser.parse_args(list(arguments)))
+    new, deck = found.pop("new"), found.pop("deck")
+    if deck is not None and new is None:
+        raise UserError("command line", "--from", str(deck), "give --new NAME beside it: the name of the new study")
+    if new is not None:
+        from studyrunner.study.keys import write_new_study
+
+        path = write_new_study(new, deck)
+        print(f"{path}: run-study {path} computes it", flush=True)
+        parser.exit()
     if found["date"] is not None:
         found["date"] = check_date(found["date"], "command line", "--date")
     return Options(**found)

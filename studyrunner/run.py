@@ -1,48 +1,37 @@
-"""One run of a study: does the tasks that are left, and writes the result file."""
+"""One run of a study: builds its scenes, does the tasks that are left, and writes the result file."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from solver.outcome import COMPLETE, Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.checkpoint.database import NoLocksError, StoreInUseError
 from studyrunner.checkpoint.records import record_type
-from studyrunner.checkpoint.store import Store
-from studyrunner.coordinates import STUCK_FREQUENCY
-from studyrunner.mpi.ranks import Ranks, wait_for_message
-from studyrunner.mpi.schedule import work_on_tasks
-from studyrunner.plan.identity import Identities, hash_of_kind
-from studyrunner.plan.planning import build_tasks
+from studyrunner.checkpoint.store import Store, StoreInUseError
+from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.task import Identity, digest
+from studyrunner.mpi.ranks import Ranks
 from studyrunner.plan.plausibility import doubts_of_study
-from studyrunner.plan.tasks import TaskPlan
 from studyrunner.result.arrays import SmallArray, coordinates, scene_arrays
 from studyrunner.result.creation_date import describe_date
 from studyrunner.result.existing_result import Label, Target
 from studyrunner.result.paths import older_folder, progress_file, remove_leftovers
-from studyrunner.result.provenance import PACKAGES, describe_run
+from studyrunner.result.provenance import PACKAGES, compare_with_archived, describe_run
 from studyrunner.result.sample_coordinates import sample_coordinates, worn_coordinate
 from studyrunner.result.software import describe_software
+from studyrunner.scene.check_command import remarks_of_study
 from studyrunner.scene.drawn_contacts import contact_changes
-from studyrunner.scene.model_remarks import remarks_of_study
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import merge_facts, pair_arrays, stuck_frequencies_of
-from studyrunner.scene_building import Scenes
+from studyrunner.scene.scene_set import frequencies_of_ratios, merge_facts, pair_arrays, stuck_frequencies_of
+from studyrunner.scene_building import Scenes, build_scenes
 from studyrunner.study.study import Study
 from studyrunner.system.endings import begin_ending, is_ending
 from studyrunner.system.progress import ProgressDisplay, count
-from studyrunner.task_runs import evaluator, run_tasks
-from studyrunner.user_error import UserError, Verbatim
-
-if TYPE_CHECKING:
-    from solver.model import ReducedModel
-
-
-_GO = "go"  # rank 0 has something to compute
+from studyrunner.task_runs import StudyRun, run_tasks
+from studyrunner.user_error import UserError, Verbatim, show_text
 
 
 class Interrupted(KeyboardInterrupt):
@@ -57,18 +46,20 @@ class Interrupted(KeyboardInterrupt):
 class RunSummary:
     """Summary of a run.
 
-    n_points: number of points of the study.
-    n_complete: number of points computed to the end.
-    n_left: number of points that are not computed yet.
-    n_found: number of points that an earlier run has left.
-    written: whether the file was written; else a finished result was kept.
+    n_points: of the study. n_complete: computed to the end. n_left: not computed yet. written: whether the file was
+    written; else a finished result was kept.
     """
 
     n_points: int
     n_complete: int
     n_left: int
-    n_found: int
     written: bool
+
+    def describe_end(self, path: object, again: str) -> str:
+        """What an end from outside leaves. path: of the result. again: what goes on from there, in words."""
+        done = f"{self.n_points - self.n_left} of {self.n_points} points"
+        left = f"{path} holds {done}" if self.written else f"{done} are kept, {path} is the finished result that it was"
+        return f"interrupted: {left}, {again} goes on"
 
 
 @dataclass(frozen=True)
@@ -85,92 +76,14 @@ class RunOptions:
     date: str | None = None
 
 
-@dataclass(frozen=True)
-class _ResultWriter:
-    """Writes the result file from the finished points.
-
-    study, plan, facts: the study, its tasks, and facts of its scenes.
-    scenes: the scenes.
-    target: the file.
-    software: attributes on the program.
-    date: as in `RunOptions`.
-    """
-
-    study: Study
-    plan: TaskPlan
-    facts: SceneFacts
-    scenes: Scenes
-    target: Target
-    software: Mapping[str, str]
-    date: str | None
-
-    def write(self, completion: CompletionIndex, n_found: int) -> RunSummary:
-        """Writes the file. n_found: number of points that an earlier run has left."""
-        # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
-        from studyrunner.result.write import write_result
-
-        completion.store.flush()
-        kept = self.scenes.kept
-        origin = {**describe_run(self.study, self.facts), **({} if kept is None else kept.origin)}
-        origin |= {**self.software, **describe_date(self.date)}
-        finished = self.target.finished
-        outcomes = write_result(
-            self.study, self.facts, completion, self.target.path, self._arrays(), origin, kept, keep_finished=finished
-        )
-        left = outcomes[Outcome.NOT_COMPUTED]
-        n_complete = sum(outcomes[number] for number in COMPLETE)
-        return RunSummary(self.plan.n_points, n_complete, left, n_found, written=not (finished and left))
-
-    def _arrays(self) -> list[SmallArray]:
-        """Coordinates of the file, and its variables that no task computes."""
-        study, scenes, facts = self.study, self.scenes, self.scenes.facts
-        stuck = SmallArray("stuck_frequency", *stuck_frequencies_of(study, facts, scenes.scenes), STUCK_FREQUENCY)
-        return [
-            *coordinates(study, self.facts, pair_arrays(study, facts, scenes.scenes)),
-            stuck,
-            *worn_coordinate(study, facts),
-            *sample_coordinates(study, facts, scenes.scenes),
-            *scene_arrays(study, scenes.variables),
-        ]
-
-
-@contextlib.contextmanager
-def open_progress(target: Target) -> Iterator[Store]:
-    """The file of the progress beside a result, open for a run: before the scene is built, which may be in the file.
-
-    Raises
-    ------
-    UserError
-        Where another run uses the file, or its file system has no locks.
-    StorageError
-        Where the file cannot be written.
-    """
-    path = progress_file(target.path)
-    try:
-        store = Store(path)
-    except StoreInUseError as error:
-        remedy = "another run is writing there: wait for its end, or give another result file with -o"
-        raise UserError(str(path), "in use", Verbatim(f"by {error}"), remedy) from None
-    except NoLocksError:
-        remedy = "give a result file on another disk with -o: this file system has no locks"
-        raise UserError(str(path), "locks", Verbatim("none"), remedy) from None
-    with contextlib.closing(store):
-        remove_leftovers(path)
-        try:
-            yield store
-        finally:
-            with contextlib.suppress(OSError):
-                # what the ranks have mapped
-                remove_leftovers(path)
-
-
-def serve_study(
+def compute_study(
     ranks: Ranks,
     study: Study,
-    scenes: Scenes,
     target: Target,
-    progress: ProgressDisplay,
     options: RunOptions,
+    display: ProgressDisplay,
+    say: Callable[[str], None],
+    notes: Sequence[str] = (),
 ) -> RunSummary:
     """Rank 0: computes a study together with the other ranks and writes the file `target.path`.
 
@@ -180,101 +93,146 @@ def serve_study(
     ----------
     ranks, study
         The ranks, and the study that they compute.
-    scenes
-        The scenes of the study, as `build_scenes` gives them, with the open file of the progress.
     target
         The result file, as `check_result` gives it.
-    progress
-        What the user sees during the run.
     options
         What is done with earlier results.
+    display
+        What the user sees while the tasks are done.
+    say
+        Takes a line on what is done before: a wrong scene is bad input, which ends with one line.
+    notes
+        Lines for the user.
 
     Raises
     ------
     UserError
-        Where another run uses the file of the progress.
+        Where a scene is wrong, or another run uses the file of the progress.
     StorageError
         Where something cannot be written.
     Interrupted
         Where the run is ended from outside; finished points have been written.
     """
-    completion, writer = _prepare(study, scenes, target, progress, options)
-    n_found = _begin(completion, writer.plan.n_points, options, progress)
-    try:
-        for rank in range(1, ranks.size):
-            ranks.send(_GO, rank)
-        run_tasks(ranks, completion, evaluator(scenes.model), progress, scenes)
-        progress.say("writing the result")
-        summary = writer.write(completion, n_found)
-    except BaseException as error:
-        if not is_ending(error):
-            raise
-        begin_ending()
-        raise Interrupted(writer.write(completion, n_found)) from None
-    if summary.n_left == 0:
-        _tidy(completion)
-    return summary
+    with _open_progress(target) as store:
+        scenes = build_scenes(ranks, study, store, say)
+        facts = merge_facts(scenes.facts)
+        completion = _completion_of(study, scenes, store, facts)
+        with display:
+            for note in (
+                *notes,
+                *(f"{show_text(study.source)}: {line}" for line in compare_with_archived(study, facts.digest)),
+                *store.notes,
+                *_older(target),
+                *scenes.notes,
+                *doubts_of_study(study, facts),
+                *(f"{label}: {text}" for label, text in remarks_of_study(study)),
+            ):
+                display.note(note)
+            return _serve(ranks, study, scenes, completion, target, options, display)
 
 
-def _prepare(
-    study: Study, scenes: Scenes, target: Target, progress: ProgressDisplay, options: RunOptions
-) -> tuple[CompletionIndex, _ResultWriter]:
-    """The index of finished points, and the writer of the result."""
-    store, facts = scenes.store, merge_facts(scenes.facts)
-    contacts = contact_changes(study, scenes.scenes, scenes.facts)
-    plan = build_tasks(study, [each.n_displacements for each in scenes.facts], contacts, scenes.scenes)
-    # The software is described when the run begins: a checkout may have changed at the end of the run.
-    software = describe_software(PACKAGES[0])
-    kind = record_type(study, facts)
-    for note in (
-        *store.notes,
-        *_older(target.path),
-        *scenes.notes,
-        *doubts_of_study(study, facts),
-        *(f"{label}: {text}" for label, text in remarks_of_study(study)),
-    ):
-        progress.note(note)
-    remove_leftovers(target.path)
-    identities = Identities([each.digest for each in scenes.facts], hash_of_kind(kind.descr))
-    completion = CompletionIndex(plan, identities, store, kind)
+def _serve(
+    ranks: Ranks,
+    study: Study,
+    scenes: Scenes,
+    completion: CompletionIndex,
+    target: Target,
+    options: RunOptions,
+    display: ProgressDisplay,
+) -> RunSummary:
+    # the software is described when the run begins: a checkout may have changed at the end of the run
+    origin = {**describe_software(PACKAGES[0]), **describe_date(options.date)}
+
+    def write() -> RunSummary:
+        return _write(study, scenes, completion, target, origin)
+
     label = Label.of(study)
-    store.note_study(label.name, label.model)
-    return completion, _ResultWriter(study, plan, facts, scenes, target, software, options.date)
-
-
-def _older(target: Path) -> list[str]:
-    """A sentence where a folder of an earlier version stands beside a result."""
-    folder = older_folder(target)
-    if not folder.is_dir():
-        return []
-    return [f"{folder.name} is of version 0.4.0 or before: it is neither used nor changed, and may be removed"]
-
-
-def _begin(completion: CompletionIndex, n_points: int, options: RunOptions, progress: ProgressDisplay) -> int:
-    """Applies the options to the results of earlier runs; returns the number of finished points."""
+    completion.store.note_study(label.name, label.model)
     if options.fresh:
         completion.forget_all()
     if options.retry_failed:
         completion.forget_failed(COMPLETE)
     completion.give_up_crashed()
     completion.store.flush()
-    n_found = completion.n_points_finished
-    if n_found:
-        progress.say(f"{n_found} of {count(n_points, 'point')} are there from an earlier run")
-    return n_found
-
-
-def _tidy(completion: CompletionIndex) -> None:
-    """Removes what a finished study no longer needs."""
-    completion.prune()
-    # The result is written. The next run does what a signal interrupts.
+    if n_found := completion.n_points_finished:
+        display.say(f"{n_found} of {count(completion.plan.n_points, 'point')} are there from an earlier run")
     try:
-        completion.store.shrink()
-    except KeyboardInterrupt:
+        run_tasks(ranks, study, StudyRun(completion, scenes, display), display)
+        display.say("writing the result")
+        summary = write()
+    except BaseException as error:
+        if not is_ending(error):
+            raise
         begin_ending()
+        raise Interrupted(write()) from None
+    if summary.n_left == 0:
+        completion.prune()
+    return summary
 
 
-def work_on_job(ranks: Ranks, model: ReducedModel | None) -> None:
-    """Any other rank after it has received the model, if there is only one: does tasks until there are none."""
-    if wait_for_message(ranks) == _GO:
-        work_on_tasks(ranks, evaluator(model))
+@contextlib.contextmanager
+def _open_progress(target: Target) -> Iterator[Store]:
+    """The file of the progress beside a result, open for a run: before the scene is built, which may be in the file."""
+    path = progress_file(target.path)
+    try:
+        store = Store(path)
+    except StoreInUseError as error:
+        remedy = "wait for its end, or give another result file with -o; where no run is at work the disk has no locks"
+        raise UserError(str(path), "in use", Verbatim(f"by {error}"), remedy) from None
+    with contextlib.closing(store):
+        remove_leftovers(path)
+        remove_leftovers(target.path)
+        try:
+            yield store
+        finally:
+            with contextlib.suppress(OSError):
+                # what the ranks have mapped
+                remove_leftovers(path)
+
+
+def _completion_of(study: Study, scenes: Scenes, store: Store, facts: SceneFacts) -> CompletionIndex:
+    """The tasks of a study, and what of them is finished. facts: of all scenes."""
+    contacts = contact_changes(study, scenes.scenes, scenes.facts)
+    plan = build_tasks(study, [each.n_displacements for each in scenes.facts], contacts, scenes.scenes)
+    kind = record_type(study, facts)
+    identity = Identity(tuple(each.digest for each in scenes.facts), digest(repr(kind.descr)))
+    return CompletionIndex(plan, identity, store, kind)
+
+
+def _write(
+    study: Study, scenes: Scenes, completion: CompletionIndex, target: Target, origin: dict[str, str]
+) -> RunSummary:
+    """Writes the result file from the finished points. origin: attributes on program and date."""
+    # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
+    from studyrunner.result.write import write_result
+
+    completion.store.flush()
+    facts, kept, finished = merge_facts(scenes.facts), scenes.kept, target.finished
+    attributes = {**describe_run(study, facts), **({} if kept is None else kept.origin), **origin}
+    arrays = _arrays(study, scenes, facts)
+    outcomes = write_result(study, facts, completion, target.path, arrays, attributes, kept, keep_finished=finished)
+    left = outcomes[Outcome.NOT_COMPUTED]
+    n_complete = sum(outcomes[number] for number in COMPLETE)
+    return RunSummary(completion.plan.n_points, n_complete, left, written=not (finished and left))
+
+
+def _arrays(study: Study, scenes: Scenes, facts: SceneFacts) -> list[SmallArray]:
+    """Coordinates of the file, and its variables that no task computes. facts: of all scenes."""
+    stuck = stuck_frequencies_of(study, scenes.facts, scenes.scenes)
+    hertz = frequencies_of_ratios(study, scenes.facts, scenes.scenes)
+    return [
+        *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
+        *coordinates(study, facts, pair_arrays(study, scenes.facts, scenes.scenes)),
+        SmallArray("stuck_frequency", *stuck, STUCK_FREQUENCY),
+        *worn_coordinate(study, scenes.facts),
+        *sample_coordinates(study, scenes.facts, scenes.scenes),
+        *scene_arrays(study, scenes.variables),
+    ]
+
+
+def _older(target: Target) -> list[str]:
+    """A sentence where a folder of an earlier version stands beside a result."""
+    folder = older_folder(target.path)
+    if not folder.is_dir():
+        return []
+    return [f"{folder.name} is of version 0.4.0 or before: it is neither used nor changed, and may be removed"]

@@ -1,24 +1,48 @@
-"""The models of several scenes on their way to the ranks: while they are in use, once in memory on each machine.
+"""The models of scenes on their way to the ranks: while they are in use, once in memory on each machine.
 
-Rank 0 keeps the models in the file of the run, and a task brings the model to a rank that does not have it: as a file
-that the ranks map (`mapped_file`), or the model itself where the rank does not see that file.
+A task brings the model to a rank that does not have it: as a file that the ranks map (`mapped_file`), or the model
+itself where the rank does not see that file.
 """
 
 from __future__ import annotations
 
 import contextlib
+from collections import OrderedDict
 from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from studyrunner.evaluate import ModelCache
+from studyrunner.kinds.task import Task
 from studyrunner.mpi.mapped_file import MappedFile, write_mapped
-from studyrunner.plan.tasks import BranchTask, MarchTask
 from studyrunner.system.files import new_partial
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
+
+MODELS_A_RANK = 2
+"""Models, or sets of models of the blocks of a mission, that a rank holds where a study has several scenes."""
+
+Models = TypeVar("Models")
+
+
+class ModelCache(OrderedDict[tuple[int, ...], Models]):
+    """The models that a rank has computed with last, by the numbers of the scenes that a task needs.
+
+    Rank 0 keeps such a list for each rank, without models, and so knows which models the rank has.
+    """
+
+    def use(self, scenes: tuple[int, ...]) -> bool:
+        """Whether the models are there; they are then the last to be removed."""
+        if scenes in self:
+            self.move_to_end(scenes)
+        return scenes in self
+
+    def add(self, scenes: tuple[int, ...], models: Models) -> None:
+        """Adds models; removes those that were not used for longest where there are too many."""
+        self[scenes] = models
+        if len(self) > MODELS_A_RANK:
+            self.popitem(last=False)
 
 
 class SceneModels:
@@ -33,27 +57,26 @@ class SceneModels:
         self._read = read
         self._seeing = seeing
         self._beside = beside
-        self._held: dict[int, ModelCache[None]] = {}
+        self._of_ranks: dict[int, ModelCache[None]] = {}
         self._files: dict[int, MappedFile] = {}
 
-    def with_model(self, rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
+    def with_model(self, rank: int, task: Task) -> Task:
         """The task as a rank gets it: with the models that the rank does not have."""
-        held = self._held.setdefault(rank, ModelCache())
-        if held.use(task.scenes):
+        own = self._of_ranks.setdefault(rank, ModelCache())
+        if own.use(task.scenes):
             return task
-        held.add(task.scenes, None)
-        self._remove_unused()
+        own.add(task.scenes, None)
+        used = {number for each in self._of_ranks.values() for scenes in each for number in scenes}
+        for number in self._files.keys() - used:
+            self._files.pop(number).remove()
         return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
 
     def _hand(self, rank: int, number: int) -> ReducedModel | MappedFile:
         """The model of a scene as a rank gets it."""
-        if rank in self._seeing and number not in self._files:
+        if rank not in self._seeing:
+            return self._read(number)
+        if number not in self._files:
             # a full disk costs memory: each rank gets the model itself
             with contextlib.suppress(OSError):
                 self._files[number] = write_mapped(self._read(number), new_partial(self._beside))
-        return self._files[number] if rank in self._seeing and number in self._files else self._read(number)
-
-    def _remove_unused(self) -> None:
-        used = {number for held in self._held.values() for scenes in held for number in scenes}
-        for number in self._files.keys() - used:
-            self._files.pop(number).remove()
+        return self._files[number] if number in self._files else self._read(number)

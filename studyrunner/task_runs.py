@@ -2,107 +2,110 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from solver.clock import n_compiled
+from solver.outcome import Outcome, describe_error
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.evaluate import build_evaluator, failed_results
+from studyrunner.kinds.kind import kind_of
+from studyrunner.kinds.task import Keep, Result, Task
+from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.ranks import Ranks
-from studyrunner.mpi.schedule import Handlers, serve_tasks
-from studyrunner.plan.results import Evaluate, Keep, MarchResult, StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask
-from studyrunner.scene_building import Scenes
+from studyrunner.mpi.schedule import Run, serve_tasks
+from studyrunner.scene_building import SceneBuilt, Scenes, SceneTask, build_scene_task
+from studyrunner.scene_models import ModelCache
+from studyrunner.study.study import Study
 from studyrunner.system.endings import raise_ending
-from studyrunner.system.progress import ProgressDisplay, count
-from studyrunner.task_progress import TaskProgress, fault_of
+from studyrunner.system.machine_faults import MachineFaultError, is_fault_of_machine
+from studyrunner.system.progress import ProgressDisplay
+from studyrunner.task_progress import TaskProgress
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
 
+Models = Mapping[int, "ReducedModel"]
 
-def evaluator(model: ReducedModel | None) -> Evaluate:
-    """The function that does tasks on a rank. A task that breaks off gives failed results; the other tasks go on."""
-    compute = build_evaluator(model)
 
-    def compute_all(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
-        given: set[int] = set()
-        for result in compute(task, keep):
-            if isinstance(result, StartResult):
-                given.add(result.position)
-            yield result
-        if isinstance(task, BranchTask) and len(given) < task.n_results and task.resume is not None:
-            # The earlier run had passed states that are damaged, or that it did not need.
-            yield from compute(replace(task, known=task.known | given, resume=None), keep)
+def compute_task(task: Task, models: Models, keep: Keep) -> Iterator[Result]:
+    """The results of a task, one by one. models: by number of the scene."""
+    return task.compute(models, keep)
 
-    def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
-        n_given = 0
+
+def evaluator() -> Run[Any, Any]:
+    """The function that does tasks on a rank, and builds scenes.
+
+    A task that breaks off gives failed results; the other tasks go on. A fault of the machine is no result.
+    """
+    models: ModelCache[tuple[ReducedModel, ...]] = ModelCache()
+
+    def own_models(task: Task) -> Models:
+        # first of all: rank 0 sends the models once, also where the task breaks off
+        if task.models:
+            given = (open_mapped(each) if isinstance(each, MappedFile) else each for each in task.models)
+            models.add(task.scenes, tuple(given))
+        elif not models.use(task.scenes):
+            raise RuntimeError(f"no model of scene {task.scenes} for {task}")
+        return dict(zip(task.scenes, models[task.scenes], strict=True))
+
+    def evaluate(task: Task | SceneTask, keep: Callable[[object], None]) -> Iterator[Result | SceneBuilt]:
+        if isinstance(task, SceneTask):
+            yield from build_scene_task(task, keep)
+            return
+        left = dict.fromkeys(task.places)
         try:
-            for result in compute_all(task, keep):
-                n_given += 1
+            for result in compute_task(replace(task, models=()), own_models(task), keep):
+                left.pop(result.place, None)
                 yield result
         except Exception as error:
             # An exception from a signal is no failure of the task.
             raise_ending()
-            yield from failed_results(task, n_given, error)
+            outcome = Outcome.NOT_COMPUTED if is_fault_of_machine(error) else Outcome.EXCEPTION
+            message = str(error) if isinstance(error, MachineFaultError) else describe_error(error)
+            for place in left:
+                yield task.failed(place, outcome, message)
 
     return evaluate
 
 
-def run_tasks(
-    ranks: Ranks,
-    completion: CompletionIndex,
-    evaluate: Evaluate,
-    progress: ProgressDisplay,
-    scenes: Scenes,
-) -> None:
-    """Rank 0: has the remaining tasks done and their results saved."""
-    tasks = TaskProgress(completion)
+class StudyRun(TaskProgress):
+    """Rank 0 while the tasks of a study are done: results are saved, and the user sees how far they are."""
 
-    def take(task: BranchTask | MarchTask, result: StartResult | MarchResult) -> Sequence[BranchTask | MarchTask]:
-        new = tasks.take(task, result)
-        if isinstance(task, BranchTask) and task.mode is None and tasks.n_starts_left == 0:
-            progress.say("computing the remaining wear histories")
-        return new
+    def __init__(self, completion: CompletionIndex, scenes: Scenes, display: ProgressDisplay) -> None:
+        super().__init__(completion)
+        self._store = completion.store
+        self._scenes = scenes
+        self._display = display
+        self._said: set[tuple[int, str]] = set()
+        self._n_compiled: int | None = n_compiled()
 
-    said: set[tuple[int, str]] = set()
+    def prepare(self, rank: int, task: Task) -> Task:
+        """The task with the models that the rank does not have."""
+        self._store.note_begin(task.key)
+        return self._scenes.models.with_model(rank, task)
 
-    def is_sick(rank: int, result: StartResult | MarchResult) -> bool:
-        fault = fault_of(result)
-        if fault and (rank, fault) not in said:
-            said.add((rank, fault))
-            progress.note(
-                f"rank {rank}: {fault}: a fault of the machine; the task is tried once more, by another rank where"
-                " there is one"
+    def is_sick(self, rank: int, result: Result) -> bool:
+        """Whether the result is a fault of the machine."""
+        if result.fault and (rank, result.fault) not in self._said:
+            self._said.add((rank, result.fault))
+            self._display.note(
+                f"rank {rank}: {result.fault}: a fault of the machine; the task is tried once more, by another rank"
+                " where there is one"
             )
-        return bool(fault)
+        return bool(result.fault)
 
-    known: int | None = n_compiled()
+    def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
+        """Writes and shows what is due."""
+        if self._n_compiled is not None and n_compiled() > self._n_compiled:
+            self._n_compiled = None
+            self._display.note("the solver is compiled for this machine, once after an installation")
+        self._store.tick()
+        self._display.tick(lambda: self.look(running()))
 
-    def tick(running: Callable[[], Sequence[tuple[BranchTask | MarchTask, int, float]]]) -> None:
-        nonlocal known
-        if known is not None and n_compiled() > known:
-            known = None
-            progress.note("the solver is compiled for this machine, once after an installation")
-        completion.store.tick()
-        progress.tick(lambda: tasks.look(running()))
 
-    if tasks.branches and tasks.branches[0].mode is not None:
-        n_points = count(tasks.n_starts_left, "point")
-        progress.say(f"following {count(len(tasks.branches), 'nonlinear mode')} through {n_points}")
-    elif tasks.branches:
-        n_branches = count(len(tasks.branches), "sweep")
-        n_starts = count(tasks.n_starts_left, "start state")
-        progress.say(f"computing {n_starts} along {n_branches}, and wear histories")
-    if completion.plan.n_missions:
-        progress.say(f"computing {count(completion.plan.n_missions, 'mission history', 'mission histories')}")
-    progress.begin_tasks()
-
-    def prepare(rank: int, task: BranchTask | MarchTask) -> BranchTask | MarchTask:
-        completion.store.note_begin(task.key)
-        return scenes.with_model(rank, task)
-
-    handlers = Handlers(take, tick, tasks.keep, is_sick, prepare)
-    serve_tasks(ranks, tasks.begin(), evaluate, handlers, tasks.costs)
-    completion.store.flush()
+def run_tasks(ranks: Ranks, study: Study, run: StudyRun, display: ProgressDisplay) -> None:
+    """Rank 0: has the remaining tasks done and their results saved."""
+    if run.tasks:
+        display.say(f"computing {kind_of(study).describe_tasks(run.tasks)}")
+    serve_tasks(ranks, run, evaluator(), run.costs)

@@ -20,12 +20,12 @@ from solver.settings import FollowedFrequency, SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
 from solver.wear.check import Checked, FullCheck
-from solver.wear.control import GivenSteps
-from solver.wear.integrate import Integration, Progress
+from solver.wear.control import Given
+from solver.wear.integrate import Integration
 from solver.wear.output import DenseOutput
 from solver.wear.state import WearState
-from solver.wear.stop import AtCount
 from solver.wear.wearing_joint import WearingJoint
+from solver.wear.where import Following
 
 
 @dataclass(frozen=True)
@@ -53,25 +53,24 @@ def followed_states(
     ((_, start),) = follow_branch(model, 0.5, load, follow, "up", settings)
     assert start.state is not None, start.message
     case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
-    work = WearingJoint.of(case, start.state, wear_coefficient, follow=follow)
+    work = WearingJoint.of(case, start.state, wear_coefficient, where=Following(follow))
     states, errors, check = [], [], FullCheck()
 
     def recorded(work: WearingJoint, state: WearState) -> Checked | Failure:
         checked = check(work, state)
-        if isinstance(checked, Checked):
-            states.append(checked.state)
-            errors.append(checked.report.excitation_frequency_error)
+        if not isinstance(checked, Failure):
+            states.append(checked[0])
+            errors.append(checked[1].excitation_frequency_error)
         return checked
 
-    output = DenseOutput(work.area, cycles, smooth=False)
-    steps = GivenSteps("implicit", float(cycles[1] - cycles[0]), float(cycles[-1]))
-    stop = AtCount(float(cycles[-1]))
-    integration = Integration(steps, recorded, stop, output, lambda _: None, 1e4)
+    output = DenseOutput(work.area, smooth=False)
+    steps = Given(work, "implicit", float(cycles[1] - cycles[0]), float(cycles[-1]))
+    integration = Integration(steps, recorded, output, lambda *_: None, 1e4, float(cycles[-1]))
     estimate = Estimate(start.response_error, start.wear_rate_error)
     first = work.begin(start.state, start.resolution, estimate, accurate=True)
-    progress = integration.begin(work, first)
-    assert isinstance(progress, Progress), progress
-    integration.run(work, progress)
+    begun = integration.begin(first)
+    assert isinstance(begun, WearState), begun
+    integration.run(begun)
     return FollowedStates(work, tuple(states), tuple(errors))
 
 

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
-from solver.model import FloatArray
 from solver.packing import packable
-
-Values = TypeVar("Values", float, FloatArray)
 
 
 @packable
@@ -40,16 +36,6 @@ class Estimate:
     def times(self, factor: float) -> Estimate:
         """The errors times a safety factor."""
         return Estimate(factor * self.response, factor * self.wear_rate, self.weight)
-
-
-def euler_error(length: float, change: Values) -> Values:
-    """Estimated error of an explicit or implicit Euler step: its difference to the trapezoidal rule.
-
-    length: length of the step, cycles.
-    change: change of the wear rate over the step: m per cycle for each pair, or m3 per cycle for the whole joint.
-    Returns the error in m or m3, with the sign of the change.
-    """
-    return 0.5 * length * change
 
 
 NOTHING = Estimate(0.0, 0.0)

@@ -61,12 +61,17 @@ class Both:
     """Values of a history and of its reference solution at equal counts.
 
     counts (n,): ascending.
-    fine, reference: values by name as from `solver.wear.output.DenseOutput.read`; the reference has NaN beyond its end.
+    fine, reference: values by name as from `solver.wear.output.DenseOutput.read`; the reference has NaN beyond its end,
+        and nothing where there is none.
     """
 
     counts: FloatArray
     fine: Mapping[str, Any]
     reference: Mapping[str, Any]
+
+    def other(self, name: str) -> Any:
+        """Values of the reference solution."""
+        return self.reference.get(name, np.full_like(self.fine[name], np.nan))
 
 
 def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) -> HistoryError:
@@ -83,7 +88,7 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
     scheme
         Scheme of the history.
     """
-    counts, fine, reference = outputs.counts, outputs.fine, outputs.reference
+    counts, fine = outputs.counts, outputs.fine
     safety = ACCURACY.history_safety
 
     def crossing(differences: FloatArray) -> FloatArray:
@@ -93,7 +98,7 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
     difference, apart = safety * _depth_change(outputs), _depth_change(steps)
     error = np.fmax(difference @ area, crossing(apart @ area))
     # the error of the start state remains, even where later states agree by chance
-    at_start = np.fmax(_start_error(fine, reference, area), fine["wear_rate_error"][0])
+    at_start = np.fmax(_start_error(outputs, area), fine["wear_rate_error"][0])
     from_start = np.where(volume > 0.0, at_start, 0.0) * volume
     # the local errors of Euler steps have one sign and add up
     by_steps = (1.0 if scheme == "adaptive" else safety) * fine["local"]
@@ -153,9 +158,9 @@ def _change_within(volume: FloatArray, error: FloatArray, steps: Both, area: Flo
     return found
 
 
-def _start_error(fine: Mapping[str, Any], reference: Mapping[str, Any], area: FloatArray) -> float:
+def _start_error(both: Both, area: FloatArray) -> float:
     """Relative difference of the wear rates of both start states, pair by pair; 0 where nothing wears."""
-    rate, other = fine["depth_rate"][0] * area, reference["depth_rate"][0] * area
+    rate, other = both.fine["depth_rate"][0] * area, both.other("depth_rate")[0] * area
     whole = float(rate.sum())
     return float(np.abs(rate - other).sum()) / whole if whole > 0.0 and np.isfinite(other).all() else 0.0
 
@@ -172,7 +177,7 @@ def _pairs_that_count(volumes: FloatArray) -> FloatArray:
 
 def _depth_change(both: Both) -> FloatArray:
     """Difference (n, n_contact) of the depths, m."""
-    return np.asarray(np.abs(both.fine["wear_depth"] - both.reference["wear_depth"]))
+    return np.asarray(np.abs(both.fine["wear_depth"] - both.other("wear_depth")))
 
 
 def _response_change(both: Both) -> FloatArray:
@@ -180,12 +185,12 @@ def _response_change(both: Both) -> FloatArray:
     found = np.zeros(len(both.counts))
     for name in ("response", "response_peak"):
         size = np.linalg.norm(both.fine[name], axis=1)
-        apart = np.linalg.norm(both.fine[name] - both.reference[name], axis=1)
+        apart = np.linalg.norm(both.fine[name] - both.other(name), axis=1)
         found = np.fmax(found, np.divide(apart, size, out=np.zeros_like(size), where=size > 0.0))
     return found
 
 
 def _rate_change(both: Both) -> FloatArray:
     """Relative difference (n,) of the wear rates."""
-    rate, other = both.fine["wear_rate"], both.reference["wear_rate"]
+    rate, other = both.fine["wear_rate"], both.other("wear_rate")
     return np.asarray(np.divide(np.abs(rate - other), rate, out=np.zeros_like(rate), where=rate > 0.0))

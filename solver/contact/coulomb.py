@@ -57,10 +57,10 @@ def friction_force(trial_1: float, trial_2: float, limit: float) -> tuple[float,
 
 @njit(cache=True)
 def slip_direction(trial_1: float, trial_2: float, limit: float) -> tuple[float, float, float]:
-    """Parts of the derivative of `friction_force` of a slipping pair, Eq. (15): direction n (2), limit over |trial|.
+    """Derivative of `friction_force` of a slipping pair, Eq. (15): direction n (2), limit over |trial|.
 
-    The derivative with respect to the limit is n; with respect to the trial force `limit / |trial| (1 - n n^T)`. All
-    are zero where the trial force is zero.
+    The derivative by the limit is n, by the trial force `limit / |trial| (1 - n n^T)`. All are zero where the trial
+    force is zero.
     """
     size = np.sqrt(trial_1 * trial_1 + trial_2 * trial_2)
     if size == 0.0:
@@ -70,7 +70,7 @@ def slip_direction(trial_1: float, trial_2: float, limit: float) -> tuple[float,
 
 @njit(cache=True)
 def across_slip(unit_1: float, unit_2: float, ratio: float) -> tuple[float, float, float]:
-    """Entries 11, 12, 22 of the symmetric matrix `ratio (1 - n n^T)`; arguments as `slip_direction` returns them."""
+    """Entries 11, 12, 22 of the symmetric matrix `ratio (1 - n n^T)`."""
     return ratio * (1.0 - unit_1 * unit_1), -ratio * unit_1 * unit_2, ratio * (1.0 - unit_2 * unit_2)
 
 
@@ -78,7 +78,7 @@ def across_slip(unit_1: float, unit_2: float, ratio: float) -> tuple[float, floa
 def contact_sample(
     normal: float, tangent_1: float, tangent_2: float, friction: float, state_1: float, state_2: float
 ) -> tuple[float, float, float, float, float, int]:
-    """One sample of one pair: normal force, 2 friction forces, 2 states, N, and status; Eqs. (3), (4), (11)-(15)."""
+    """Normal force, 2 friction forces, 2 states, N, and status at one sample, Eqs. (3), (4), (11)-(15)."""
     if normal <= 0.0:
         return 0.0, 0.0, 0.0, tangent_1, tangent_2, SEPARATED
     force_1, force_2, sticks = friction_force(
@@ -93,10 +93,9 @@ def contact_sample(
 def contact_tangent(
     status: int, normal: float, trial_1: float, trial_2: float, friction: float
 ) -> tuple[float, float, float, float, float]:
-    """Derivative of the tangential force of `contact_sample`.
+    """Derivative of the tangential force of `contact_sample`; the new state is `p_T - lambda_T`.
 
-    Returns the derivative with respect to the normal force (2), and entries 11, 12, 22 of the symmetric derivative with
-    respect to the trial force `p_T - x'`. The new state is `p_T - lambda_T`.
+    Returns that by the normal force (2), and entries 11, 12, 22 of that by the trial force `p_T - x'`.
     """
     if status == STICK:
         return 0.0, 0.0, 1.0, 0.0, 1.0
@@ -115,8 +114,8 @@ def advance_monodromy(
 ) -> None:
     """Multiply the monodromy (2, 2) by the derivative of one sample that slips or is separated, in place.
 
-    The monodromy is the derivative of the state with respect to the state at the start of the period. Arguments as in
-    `contact_tangent`. Slip leaves only changes of the state across the slip direction, separation leaves none.
+    The monodromy is the derivative of the state by the state at the start of the period. Slip leaves only changes of
+    the state across the slip direction, separation leaves none.
     """
     limit = friction_limit(friction, normal)
     if status == SEPARATED or limit == 0.0:
@@ -141,13 +140,12 @@ def advance_tangent(
 ) -> None:
     """Derivatives of one sample, in place: `dforce` (2, w) of the tangential force, `dstate` (2, w) of the state.
 
-    Eqs. (13)-(15), with the dependence on all earlier samples of the period.
+    Eqs. (13)-(15), with the dependence on all earlier samples of the period. dstate: on entry that of the sample
+    before.
 
-    - dstate: on entry the derivative of the state at the sample before.
-    - basis (m,): derivative of a time sample with respect to its harmonics.
-    - first (3,): first of the m columns of each component of the predicted force (normal, tangent 1, tangent 2); -1
-      where the force does not depend on the component.
-    - status, by: of the sample; as `contact_tangent` returns `by`.
+    - basis (m,): derivative of a time sample by its harmonics.
+    - first (3,): first of the m columns of each component of the predicted force; -1 where there are none.
+    - status, by: of the sample; `by` from `contact_tangent`.
     """
     m, width = basis.size, dstate.shape[1]
     pull_1, pull_2, across_11, across_12, across_22 = by
@@ -193,9 +191,9 @@ def sample_tangents(
 ) -> tuple[FloatArray, FloatArray]:
     """Derivatives of the state (normal, tangents) of each pair at every `stride`-th sample, n samples in all.
 
-    The normal state is predicted less contact force. Arrays as in `march_period`. Returns the derivatives with respect
-    to the predicted force at the sample (n, n_contact, 3, 3), and to the tangential state at the sample before (n,
-    n_contact, 2, 2), all dimensionless. The normal force is taken at the sample, without the mean around it.
+    The normal state is predicted less contact force; the normal force is taken at the sample, without the mean around
+    it. Arrays as in `law.Marched`. Returns the derivatives by the predicted force at the sample (n, n_contact, 3, 3),
+    and by the tangential state at the sample before (n, n_contact, 2, 2), all dimensionless.
     """
     n_contact, n_samples = status_t.shape
     own = np.zeros((n_samples // stride, n_contact, 3, 3))
@@ -229,13 +227,11 @@ def sample_tangents(
 
 @njit(cache=True)
 def closed_fraction(force: float, neighbour: float) -> tuple[float, float, float]:
-    """Mean normal force over the half step towards a neighbour, and its derivatives to both predicted forces.
+    """Mean normal force over the half step towards a neighbour, and its derivatives by both predicted normal forces.
 
-    force: predicted normal force at the sample, positive. neighbour: predicted normal force at the neighbour.
-
-    The predicted normal force is linear between two samples, and the pair opens or closes at its zero. The half step
-    next to an opening is weighted by the closed fraction of the step. Without this weight each change of a status is a
-    corner of the residual, and a branch with hard impacts breaks up into small folds.
+    `force` is positive. The predicted normal force is linear between two samples, and the pair opens or closes at its
+    zero. The half step next to an opening is weighted by the closed fraction of the step. Without this weight each
+    change of a status is a corner of the residual, and a branch with hard impacts breaks up into small folds.
     """
     if neighbour >= 0.0:
         return force, 1.0, 0.0
@@ -261,18 +257,16 @@ def mean_normal_force(predicted_t: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def mean_normal_tangent(
-    predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, has_normal: BoolArray
-) -> FloatArray:
-    """Derivative (n_contact, m, m) of the harmonics of `mean_normal_force` to the harmonics of its argument."""
-    n_contact, _, n_samples = predicted_t.shape
-    m = synthesis.shape[0]
-    basis_t = np.ascontiguousarray(synthesis.T)
-    tangent = np.zeros((n_contact, m, m))
-    analysis_t = np.ascontiguousarray(analysis.T)
+    pairs: IntArray, predicted_t: FloatArray, synthesis: FloatArray, analysis: FloatArray, out: FloatArray
+) -> None:
+    """Derivative of the harmonics of `mean_normal_force` of some pairs (n,) by those of the predicted normal force.
+
+    out (n_contact, 3m, 3m): receives the derivative in the first m rows and columns.
+    """
+    m, n_samples = synthesis.shape
+    basis_t, analysis_t = np.ascontiguousarray(synthesis.T), np.ascontiguousarray(analysis.T)
     rows = np.empty((n_samples, m))
-    for pair in range(n_contact):
-        if not has_normal[pair]:
-            continue
+    for pair in pairs:
         for n in range(n_samples):
             force = predicted_t[pair, 0, n]
             rows[n] = 0.0
@@ -287,5 +281,4 @@ def mean_normal_tangent(
                     + other_before * basis_t[n - 1, j]
                     + other_after * basis_t[ahead, j]
                 )
-        np.dot(analysis_t, rows, tangent[pair])
-    return tangent
+        out[pair, :m, :m] = np.dot(analysis_t, rows)

@@ -37,16 +37,15 @@ class Marched:
 
     - predicted_t (n_contact, 3, N): predicted force, N; tangential ones of inertial pairs as means over the steps.
     - force_t (n_contact, 3, N): contact force, N, compression positive; means for inertial pairs as in predicted_t.
-    - force_h (n_contact, 3, m): harmonics of the contact force, N.
-    - state_t (n_contact, 2, N+1): tangential state, N, beginning with the start of the period; for inertial pairs the
-      displacement, m.
+    - force_h (n_contact, 3, m): its harmonics, N.
+    - state_t (n_contact, 2, N+1): tangential state, N, from the start of the period on; of inertial pairs displacement,
+      m.
     - start (n_contact, 2): tangential state at the start of the first period, N; for inertial pairs the velocity at the
       start of the last period, m/s.
     - status_t (n_contact, N): SEPARATED, STICK or SLIP.
     - periods (n_contact,): number of periods that were marched.
     - periodicity_error: change of the tangential state over the last period, N.
-    - slip_work (n_contact,): integral of normal force times slip distance over a period, J. Archard's wear is
-      proportional to this integral, which is no work of a force (`solver.contact.archard`).
+    - slip_work (n_contact,): integral of normal force times slip distance over a period, J (`solver.contact.wear_law`).
     """
 
     predicted_t: FloatArray
@@ -153,42 +152,29 @@ class ContactLaw:
         Returns the derivatives of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the
         slip work (n_contact, 3m), m. Tangential displacements that do not exist count as sticking.
         """
-        contact, basis, m = self.contact, self.basis, self.basis.synthesis.shape[0]
-        n_contact, masses = contact.n_contact, self.penalty.inertial
+        contact, basis, masses = self.contact, self.basis, self.penalty.inertial
+        n_contact, m = contact.n_contact, basis.synthesis.shape[0]
         tangent, work_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
         # a pair that sticks during the whole period transmits the predicted force, an open pair transmits nothing; but
         # the start of a period that was marched more than once may depend on the force
         stuck = (at.status_t == STICK).all(axis=1) & (at.periods == 1)
         switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
         slides = switching & (contact.dofs[:, 1:] >= 0).any(axis=1)
-        elastic, inertial = np.flatnonzero(slides & ~masses), np.flatnonzero(slides & masses)
-        if elastic.size:
-            tangent[elastic], work_tangent[elastic] = march_tangent(
-                at.predicted_t[elastic],
-                self.friction_coefficient[elastic],
-                at.start[elastic],
-                at.state_t[elastic],
-                at.periods[elastic],
-                contact.line[elastic],
-                contact.has_normal[elastic],
-                (basis.synthesis, basis.analysis),
+        march_tangent(
+            np.flatnonzero(slides & ~masses),
+            *(at.predicted_t, self.friction_coefficient, at.start, at.state_t, at.periods),
+            *(contact.line, contact.has_normal, (basis.synthesis, basis.analysis), (tangent, work_tangent)),
+        )
+        work_tangent /= self.penalty.tangential[:, None]
+        if self.rate_dependent:
+            means = basis.synthesis * basis.step_mean[:, None], basis.analysis / basis.step_mean
+            mass_tangent(
+                np.flatnonzero(slides & masses),
+                *(at.predicted_t, self.friction_coefficient, self._masses(slice(None)), self.sample_step),
+                *(at.start, contact.has_normal, (basis.synthesis, *means), (tangent, work_tangent)),
             )
-            work_tangent[elastic] /= self.penalty.tangential[elastic, None]
-        if inertial.size:
-            tangent[inertial], work_tangent[inertial] = mass_tangent(
-                at.predicted_t[inertial],
-                self.friction_coefficient[inertial],
-                self._masses(inertial),
-                self.sample_step,
-                at.start[inertial],
-                contact.has_normal[inertial],
-                (basis.synthesis, basis.synthesis * basis.step_mean[:, None], basis.analysis / basis.step_mean),
-            )
-        normal = np.flatnonzero(contact.has_normal & switching)
-        if normal.size:
-            tangent[normal, :m, :m] = mean_normal_tangent(
-                at.predicted_t[normal], basis.synthesis, basis.analysis, contact.has_normal[normal]
-            )
+        closing = np.flatnonzero(contact.has_normal & switching)
+        mean_normal_tangent(closing, at.predicted_t, basis.synthesis, basis.analysis, tangent)
         passes = stuck[:, None] | (contact.dofs < 0)
         passes[:, 0] = stuck & contact.has_normal
         pair, component = np.nonzero(passes)

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
-from solver.contact import archard
 from solver.contact.coulomb import STICK, advance_monodromy, contact_sample
 from solver.model import FloatArray, IntArray
 from solver.settings import ROUND_OFF
@@ -24,8 +24,17 @@ to about 20 with Newton's method and above 40 without (`tests/solver/test_kernel
 PLAIN_PERIODS = 4  # periods before Newton's method is used on the periodicity; most pairs repeat within two
 SMALLEST_DETERMINANT = ROUND_OFF  # of 1 - monodromy: below it a part of the state does not fade
 
-slip_work_rate = njit()(archard.slip_work_rate)
-slip_work_slopes = njit()(archard.slip_work_slopes)
+
+@register_jitable
+def slip_work_rate(normal: float, speed: float) -> float:
+    """Slip work per time, W, from normal force, N, and sliding speed, m/s; or slip work, J, with slip, m, for speed."""
+    return normal * speed
+
+
+@register_jitable
+def slip_work_slopes(normal: float, speed: float) -> tuple[float, float]:
+    """Derivatives of `slip_work_rate` by the normal force and by the speed."""
+    return speed, normal
 
 
 @njit(cache=True)
@@ -39,10 +48,8 @@ def march_period(
     """March every pair through the period until its tangential state repeats, Eqs. (11)-(15).
 
     - predicted_t (n_contact, 3, N): predicted force, N, normal first.
-    - friction (n_contact,): friction coefficient.
     - start (n_contact, 2): tangential state at the start of the first period, N.
     - periodicity: accepted difference of the state over a period, N.
-    - most_periods: largest number of periods.
 
     Returns `force_t`, `state_t` of the last period, `status_t` and `periods` of `law.Marched`, and the change of the
     state over the last period (n_contact,), N.
@@ -118,7 +125,7 @@ def integrate_slip_work(force_t: FloatArray, state_t: FloatArray) -> FloatArray:
     """Slip work of a period times the tangential penalty (n_contact,), N * N.
 
     Eqs. (7), (21) with the sliding velocity (the print has the displacement): sum of normal force times increment of
-    the tangential state (`increment_work`).
+    the tangential state.
     """
     n_contact, _, n_samples = force_t.shape
     integral = np.zeros(n_contact)
@@ -140,6 +147,6 @@ def increment_work(normal_before: float, normal: float, slip: float) -> float:
 
 @njit(cache=True)
 def increment_slopes(normal_before: float, normal: float, slip: float) -> tuple[float, float]:
-    """Derivatives of `increment_work` with respect to the normal force at each end, and to the slip."""
+    """Derivatives of `increment_work` by the normal force at each end, and by the slip."""
     by_normal, by_slip = slip_work_slopes(0.5 * (normal_before + normal), slip)
     return 0.5 * by_normal, by_slip

@@ -47,13 +47,10 @@ def step_line(
 ) -> tuple[float, float, float, float]:
     """One step along one line: mean friction force, velocity after the step, mean velocity and mean speed in the step.
 
-    Coulomb's law in one direction (`coulomb.friction_force`). Changes between stick and slip inside the step are
-    resolved.
+    Coulomb's law in one direction. Changes between stick and slip inside the step are resolved.
 
     - force, velocity, limit: mean force, N, velocity before the step, m/s, and friction limit, N.
-    - gain, loss: as `step_gains` returns them.
-    - tangent (3, 3): receives the derivatives of (friction, velocity after, mean speed) with respect to (force,
-      velocity, limit).
+    - tangent (3, 3): receives the derivatives of (friction, velocity after, mean speed) by (force, velocity, limit).
     """
     tangent[:, :] = 0.0
     if velocity == 0.0 and abs(force) <= limit:
@@ -122,8 +119,7 @@ def step_plane(
     """One step in the plane, in `PARTS` implicit parts; arguments as in `step_line`, force and velocity (2,).
 
     - out (7,): receives mean friction force (2), velocity after the step (2), mean velocity (2) and mean speed.
-    - tangent (5, 5): receives the derivatives of (friction, velocity after, mean speed) with respect to (force,
-      velocity, limit).
+    - tangent (5, 5): receives the derivatives of (friction, velocity after, mean speed) by (force, velocity, limit).
     """
     mass, drag = 0.5 * (gain + loss), gain - loss
     gain = PARTS * mass + 0.5 * drag
@@ -212,9 +208,7 @@ def march_masses(
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
     """March every pair through the period until its velocity repeats.
 
-    - predicted_t (n_contact, 3, N): predicted force, N, the tangential ones as means over the steps.
-    - friction (n_contact,): friction coefficient.
-    - step: dt, s.
+    predicted_t (n_contact, 3, N): predicted force, N, the tangential ones as means over the steps. step: dt, s.
 
     Returns the contact force (n_contact, 3, N), N, as the predicted one; velocity, m/s, and displacement since the
     start of the period, m, at the ends of the steps (n_contact, 2, N+1); status (n_contact, N); slip work (n_contact,),

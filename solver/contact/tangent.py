@@ -18,6 +18,7 @@ from solver.model import BoolArray, FloatArray, IntArray
 
 @njit(cache=True)
 def march_tangent(
+    pairs: IntArray,
     predicted_t: FloatArray,
     friction: FloatArray,
     start: FloatArray,
@@ -26,8 +27,9 @@ def march_tangent(
     line: IntArray,
     has_normal: BoolArray,
     series: tuple[FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the results of `march_period` and `integrate_slip_work`, including the periodicity.
+    out: tuple[FloatArray, FloatArray],
+) -> None:
+    """Derivatives of the results of `march_period` and `integrate_slip_work` of some pairs (n,), with the periodicity.
 
     Where the periodicity does not determine the start of the last period (the pair has come to stick), the derivative
     of the start follows from the periods before.
@@ -35,16 +37,13 @@ def march_tangent(
     - predicted_t, friction, start: arguments of `march_period`; state_t, periods: its results.
     - line, has_normal (n_contact,): as in `model.ContactInterface`.
     - series (m, N), (N, m): synthesis and analysis of the Fourier basis.
-
-    Returns the derivatives of the harmonics of the friction force (n_contact, 3m, 3m), dimensionless, where the rows of
-    the normal force and of tangents that do not exist are zero, and of the slip work (N * N), (n_contact, 3m), N.
+    - out: receives the derivatives of the harmonics of the friction force (n_contact, 3m, 3m), dimensionless, in the
+      rows of the tangents that exist, and of the slip work (N * N), (n_contact, 3m), N.
     """
     # rows of the transposes are contiguous, as the loops over columns need
     basis_t, analysis_t = np.ascontiguousarray(series[0].T), np.ascontiguousarray(series[1].T)
-    (n_contact, _, n_samples), m = predicted_t.shape, basis_t.shape[1]
-    force_tangent = np.zeros((n_contact, 3 * m, 3 * m))
-    slip_work_tangent = np.zeros((n_contact, 3 * m))
-    for pair in range(n_contact):
+    n_samples, m = basis_t.shape
+    for pair in pairs:
         columns, tangents, width = pair_columns(m, line[pair], has_normal[pair])
         dforce_t = np.empty((n_samples, tangents.size, width + 2))
         dforce, before, dstart = np.empty((2, width + 2)), np.empty((2, width + 2)), np.empty((2, width))
@@ -65,16 +64,14 @@ def march_tangent(
             _add_slip_work(work, n, predicted_t[pair, 0], state_t[pair], before, dstate, basis_t, has_normal[pair])
         plain = min(periods[pair] - 1, PLAIN_PERIODS)
         _start_tangent(dstart, dstate, predicted_t[pair], friction[pair], start[pair], plain, basis_t, columns)
-        _assemble(force_tangent[pair], slip_work_tangent[pair], dforce_t, work, dstart, analysis_t, tangents, columns)
-    return force_tangent, slip_work_tangent
+        _assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_t, tangents, columns)
 
 
 @njit(cache=True)
 def pair_columns(m: int, line: int, has_normal: bool) -> tuple[IntArray, IntArray, int]:
     """Columns of the derivatives of a pair: first column of each component (3,), -1 for none; its tangents; number.
 
-    A pair with one tangent (`line` as in `rigid_slider.step_mass`) has the columns of its components alone; a pair with
-    both tangents has 3m columns.
+    A pair with one tangent has the columns of its components alone; a pair with both tangents has 3m columns.
     """
     columns = np.array([0 if has_normal else -1, m, 2 * m])
     if line < 0:
@@ -97,8 +94,7 @@ def _add_slip_work(
 ) -> None:
     """Add the derivative of the slip work of sample n to `work` (width + 2,).
 
-    normal_t (N,), state_t (2, N + 1): predicted normal force and state of the pair, N. before, after (2, width + 2):
-    derivatives of the state before and after the sample.
+    normal_t (N,): predicted normal force, N. before, after (2, width + 2): derivatives of the state around the sample.
     """
     step_1 = state_t[0, n + 1] - state_t[0, n]
     step_2 = state_t[1, n + 1] - state_t[1, n]
@@ -137,7 +133,6 @@ def _assemble(
     - dforce_t (N, n_tangents, width + 2 or more), work (width + 2,): derivatives with the start of the period held; the
       last two of width + 2 columns by the start.
     - dstart (2, width): derivative of the start.
-    - tangents, columns: as `pair_columns` returns them.
     """
     (m, n_samples), width = analysis_t.shape, dstart.shape[1]
     dforce_h = np.dot(analysis_t, dforce_t.reshape(n_samples, -1)).reshape(m, tangents.size, -1)
@@ -172,8 +167,7 @@ def _start_tangent(
     """Derivative of the start of the last period, into `dstart` (2, width).
 
     - dstate (2, width + 2): derivative of the end of the last period.
-    - periods: number of periods before the last one, which give the derivative where the periodicity does not; 0 where
-      the start is given.
+    - periods: those before the last one, which give the derivative where the periodicity does not; 0: start given.
     """
     width = dstart.shape[1]
     dstart[:, :] = 0.0
@@ -203,6 +197,7 @@ def _start_tangent(
 
 @njit(cache=True)
 def mass_tangent(
+    pairs: IntArray,
     predicted_t: FloatArray,
     friction: FloatArray,
     masses: Masses,
@@ -210,24 +205,22 @@ def mass_tangent(
     start: FloatArray,
     has_normal: BoolArray,
     series: tuple[FloatArray, FloatArray, FloatArray],
-) -> tuple[FloatArray, FloatArray]:
-    """Exact derivative of the periodic motion of `march_masses` with respect to the harmonics of the predicted force.
+    out: tuple[FloatArray, FloatArray],
+) -> None:
+    """Exact derivative of the periodic motion of `march_masses` of some pairs (n,) by the harmonics of the predicted
+    force.
 
     - predicted_t, friction, masses, step: arguments of `march_masses`.
     - start (n_contact, 2): velocity at the start of the period, m/s.
-    - has_normal (n_contact,): as in `model.ContactInterface`.
     - series (m, N), (m, N), (N, m): from the harmonics to the normal force at the samples and to the means of the
       tangential forces over the steps, and from these means back to their harmonics.
-
-    Returns what `march_tangent` returns; the derivative of the slip work is in m.
+    - out: receives what that of `march_tangent` receives; the derivative of the slip work is in m.
     """
     point_t, mean_t = np.ascontiguousarray(series[0].T), np.ascontiguousarray(series[1].T)
     analysis_t = np.ascontiguousarray(series[2].T)
-    (n_contact, _, n_samples), m = predicted_t.shape, point_t.shape[1]
-    force_tangent = np.zeros((n_contact, 3 * m, 3 * m))
-    slip_work_tangent = np.zeros((n_contact, 3 * m))
-    out, local = np.empty(7), np.empty((5, 5))
-    for pair in range(n_contact):
+    n_samples, m = point_t.shape
+    ahead, local = np.empty(7), np.empty((5, 5))
+    for pair in pairs:
         line = masses[2][pair]
         columns, tangents, width = pair_columns(m, line, has_normal[pair])
         leave = np.empty((5, width + 2))
@@ -243,23 +236,22 @@ def mass_tangent(
         for n in range(n_samples):
             normal = max(predicted_t[pair, 0, n], 0.0)
             limit = friction_limit(friction[pair], normal)
-            step_mass(predicted_t[pair, 1:, n], velocity, limit, gain, loss, line, out, local)
+            step_mass(predicted_t[pair, 1:, n], velocity, limit, gain, loss, line, ahead, local)
             by_limit = friction[pair] if normal > 0.0 and has_normal[pair] else 0.0
             _leave(leave, local, entry, tangents, columns, mean_t[n], by_limit * point_t[n])
             for place, tangent in enumerate(tangents):
                 dforce_t[n, place, : width + 2] = leave[tangent]
-            by_normal, by_speed = slip_work_slopes(normal, out[6])
+            by_normal, by_speed = slip_work_slopes(normal, ahead[6])
             work += by_speed * step * leave[4]
             if normal > 0.0 and has_normal[pair]:
                 work[:m] += by_normal * step * point_t[n]
-            velocity[:] = out[2:4]
+            velocity[:] = ahead[2:4]
             entry[:, :] = leave[2:4]
         dstart = np.empty((2, width))
         for column in range(width):
             first, second, _ = solve_periodicity(entry[:, width:], entry[0, column], entry[1, column])
             dstart[0, column], dstart[1, column] = first, second
-        _assemble(force_tangent[pair], slip_work_tangent[pair], dforce_t, work, dstart, analysis_t, tangents, columns)
-    return force_tangent, slip_work_tangent
+        _assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_t, tangents, columns)
 
 
 @njit(cache=True)
@@ -272,11 +264,9 @@ def _leave(
     mean: FloatArray,
     limit: FloatArray,
 ) -> None:
-    """Derivatives (5, width + 2) of the results of a step of a mass with respect to all columns, into `leave`.
+    """Derivatives (5, width + 2) of the results of a step of a mass by all columns, into `leave`.
 
-    - local (5, 5): derivatives of the step, as of `rigid_slider.step_plane`.
-    - entry (2, width + 2): derivatives of the velocities before the step.
-    - tangents, columns: as `pair_columns` returns them.
+    - local (5, 5): derivatives of the step. entry (2, width + 2): of the velocities before the step.
     - mean, limit (m,): derivatives of a force, and of the friction limit by the normal force, by their harmonics.
     """
     for row in range(5):

@@ -1,21 +1,25 @@
 """Wear laws. Each law is Archard's law with another work in place of the slip work.
 
-The wear depth of a pair grows in a cycle by `k_w / alpha` times the *wearing work* X, J, Eqs. (7), (21) (`archard`):
+The wear depth of a pair grows in a cycle by, Eqs. (7), (21),
 
-    X = c f(p, W) max(S - q alpha, 0)
+    g = k_w / alpha * X,      X = c f(p, W) max(S - q alpha, 0)
 
-with the slip work S, J, the mean pressure over the period p, Pa, the depth W, m, and the area of the pair alpha, m2:
+with the area of the pair alpha, m2, and the *wearing work* X, J: a function of the slip work S, J, the mean pressure
+over the period p, Pa, and the depth W, m:
 
 - `archard`: X = S.
-- `energy`: c = mu, so that X = mu S is the energy dissipated by friction (`law.ContactLaw.friction_work`).
-  k_w is then the energy wear coefficient, volume over dissipated energy (Fouvry, Liskiewicz, Kapsa, Hannel, Sauger,
-  Wear 255 (2003) 287).
+- `energy`: c = mu, so that X = mu S is the energy dissipated by friction. k_w is then the energy wear coefficient,
+  volume over dissipated energy (Fouvry, Liskiewicz, Kapsa, Hannel, Sauger, Wear 255 (2003) 287).
 - `threshold`: q, J/m2, is a density of slip work per cycle. Only slip work above this threshold wears.
 - `table`: f is given at pressures and depths, with bilinear interpolation and constant extrapolation. `k_w f` is then
   a wear coefficient that depends on pressure and depth.
 
-In each law c may differ between surfaces, and the wear rate is proportional to k_w. An implicit step solves
-`W = W_k + gain X(S, p, W)` for each pair separately and so eliminates W.
+The slip work is the integral over a period of lambda_N |dX_T|, which is no work of a force. The friction force is at
+its limit during slip, so that the energy dissipated by friction is mu S (`law.ContactLaw.friction_work`).
+
+In each law c may differ between surfaces, and the wear rate is proportional to k_w. An implicit step of h cycles solves
+`W = W_k + gain X(S, p, W)`, Eq. (24), with the gain `h k_w / alpha` (the print of (26b) lacks h), for each pair
+separately and so eliminates W.
 """
 
 from __future__ import annotations
@@ -110,17 +114,7 @@ class WearingWork:
         return largest if self.table is None else largest * float(self.table.max())
 
     def work(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> FloatArray:
-        """Wearing work X (n_contact,), J.
-
-        Parameters
-        ----------
-        slip_work
-            S (n_contact,), J.
-        normal_force
-            Mean normal force over the period (n_contact,), N.
-        depth
-            W (n_contact,), m.
-        """
+        """Wearing work X (n_contact,), J, from slip work, J, mean normal force, N, and depth, m, each (n_contact,)."""
         work = self._without_table(slip_work)
         if self.table is None:
             return work
@@ -130,7 +124,7 @@ class WearingWork:
     def slopes(
         self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Derivatives (n_contact,) of `work` with respect to slip work, 1, normal force, m, and depth, N."""
+        """Derivatives (n_contact,) of `work` by slip work, 1, normal force, m, and depth, N."""
         by_work = np.ones_like(slip_work) if self.factor is None else self.factor
         if self.least is not None:
             by_work = np.where(slip_work > self.least, by_work, 0.0)
@@ -155,9 +149,7 @@ class WearingWork:
     ) -> FloatArray:
         """Growth of the depth (n_contact,), m, in a step: the least root y of `y = gain X(S, p, before + y)`.
 
-        - gain (n_contact,): `archard.wear_gain` of the step, m/J.
-        - before (n_contact,): depth at the start of the step, m.
-
+        gain (n_contact,): `h k_w / alpha` of the step, m/J. before (n_contact,): depth at the start of the step, m.
         Between two depths of the table both sides are straight lines, so that the root is exact.
         """
         work = self._without_table(slip_work)
@@ -236,21 +228,9 @@ def _between(knots: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray,
 
 
 def wearing_work(law: WearLaw, contact: ContactInterface, friction_coefficient: FloatArray) -> WearingWork:
-    """The wearing work of the pairs of a joint under a wear law.
+    """The wearing work of the pairs of a joint. friction_coefficient: (n_contact,).
 
-    Parameters
-    ----------
-    law
-        The wear law.
-    contact
-        The pairs, with their areas and the labels of their surfaces.
-    friction_coefficient
-        (n_contact,), for each pair.
-
-    Raises
-    ------
-    ValueError
-        The law is not in `LAWS`, or its surfaces are not the surfaces of the pairs.
+    Raises ValueError where the law is not in `LAWS`, or where its surfaces are not the surfaces of the pairs.
     """
     if law.name not in LAWS:
         raise ValueError(f'wear law "{law.name}": give one of {", ".join(LAWS)}')

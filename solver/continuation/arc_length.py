@@ -19,6 +19,31 @@ from solver.newton.bordering import Bordered
 from solver.newton.run import Run
 from solver.settings import DIFFERENCE, NEGLIGIBLE
 
+ARC_SPAN = 0.05
+"""Natural length of a frequency over the frequency, and of a load factor."""
+
+ARC_CORRECTORS = 300
+"""Most correctors of one continuation, converged or not."""
+
+FIRST_ARC = CONTINUATION.smooth_change / 10.0
+"""Length of the first step, in unknowns divided by the norm of the first predicted force. With the length of the
+longest one seven branches with folds take 1.5 % more iterations."""
+
+CORNER_ARC = 1e-3
+"""Length of the step behind a corner, and least length after a step. Without such a least length the same branches
+take 46 % more iterations; with ten times the value 8 % more than with several lengths, with this value 5 %."""
+
+SHORTEST_ARC = CORNER_ARC / 10.0
+"""Shortest step: where none of this length converges, the branch has a corner."""
+
+ARC_WANDER = 2.0
+"""Distance of a corrector from its start over the length of the step, above which the corrector is given up. Without it
+the branch of `tests/solver/test_arc_length.py` is left for another one. Four times the length takes 1 % more
+iterations."""
+
+FARTHEST = 10.0
+"""Natural lengths of the parameter from start and target at which the search ends."""
+
 
 @dataclass(frozen=True)
 class ArcResult:
@@ -44,28 +69,17 @@ def follow_arc(
 ) -> ArcResult:
     """Follow the branch by arc length, through folds, to an accepted state at the target.
 
-    The search also ends at a distance of `CONTINUATION.farthest` from start and target, and after
-    `CONTINUATION.arc_correctors` correctors.
-
-    Parameters
-    ----------
-    arc : Arc
-        The branch and its first state.
-    target : float
-        Target of the parameter.
-    accept : callable
-        Whether a state at the target ends the search.
-    toward : float
-        Sign of the first change of the parameter; by default towards the target. Needed where the target is the start.
-    beyond : bool
-        False ends the search where the branch reaches the target before any fold in a state that is not accepted. The
-        branch has then lost its stability otherwise than at a fold, and no slow change leads to its later states.
+    accept: whether a state at the target ends the search. The search also ends at a distance of `FARTHEST` from start
+    and target, and after `ARC_CORRECTORS` correctors.
+    toward: sign of the first change of the parameter; by default towards the target.
+    beyond: False ends the search where the branch reaches the target before any fold in a state that is not accepted.
+    The branch has then lost its stability otherwise than at a fold, and no slow change leads to its later states.
     """
     begin = arc.start.parameter
     toward = toward or float(np.sign(target - begin)) or 1.0
-    far = CONTINUATION.farthest * abs(arc.span)
+    far = FARTHEST * abs(arc.span)
     states, turns = [arc.start], list[int]()
-    for before, reached, fold in arc.steps(toward, CONTINUATION.arc_correctors):
+    for before, reached, fold in arc.steps(toward, ARC_CORRECTORS):
         add_fold(states, turns, fold, reached)
         states.append(reached)
         if (reached.parameter - target) * (before.parameter - target) <= 0.0 and before.parameter != target:
@@ -132,7 +146,7 @@ class Arc:
 
         toward: sign of the first change of the parameter. correctors: most correctors of all steps.
         """
-        state, length, left = self.start, CONTINUATION.smooth_change / 10.0, correctors
+        state, length, left = self.start, FIRST_ARC, correctors
         along = np.zeros(state.evaluation.predicted_h.size + 1)
         along[-1] = toward
         tangent = self.tangent(state.parameter, state.evaluation, along)
@@ -141,14 +155,14 @@ class Arc:
             if reached is None:
                 return
             back = state is self.start and (reached.parameter - state.parameter) * toward < 0.0
-            if back and 0.25 * length > CONTINUATION.shortest_arc:
+            if back and 0.25 * length > SHORTEST_ARC:
                 # the start lies so near to a fold that the first step passes the fold
                 length *= 0.25
                 continue
             ahead = self.tangent(reached.parameter, reached.evaluation, self.place(reached) - self.place(state))
             turns = ahead is not None and ahead[-1] * tangent[-1] < 0.0
             yield state, reached, state if back else self._fold(state, tangent, reached) if turns else None
-            state, tangent, length = reached, ahead, max(length, CONTINUATION.corner_arc)
+            state, tangent, length = reached, ahead, max(length, CORNER_ARC)
 
     def place(self, state: State) -> FloatArray:
         """Scaled unknowns of a state."""
@@ -181,7 +195,7 @@ class Arc:
     ) -> tuple[State | None, float, float]:
         """The next state, None where none is found; the length of the step after it; correctors left of `left`."""
         reached = None
-        while reached is None and length > CONTINUATION.shortest_arc and left > 0:
+        while reached is None and length > SHORTEST_ARC and left > 0:
             reached = self.step(state, tangent, length)
             left -= 1
             length = min(2.0 * length, CONTINUATION.smooth_change) if reached is not None else 0.5 * length
@@ -205,7 +219,7 @@ class Arc:
         may not meet the branch behind the corner. So the tangent behind the corner is taken a little ahead of the
         state, and both signs of this tangent are tried. A solution on the branch before the corner is refused.
         """
-        base, length = self.place(state), CONTINUATION.corner_arc
+        base, length = self.place(state), CORNER_ARC
         ahead = base + length * tangent
         parameter, predicted_h = float(ahead[-1] * self.span), ahead[:-1].reshape(state.evaluation.predicted_h.shape)
         behind = self.balance_at(parameter, self.start.history).evaluate(predicted_h * self.size)
@@ -287,5 +301,5 @@ class _Plane:
 
     def fraction(self, here: Bordered, _: FloatArray, __: FloatArray) -> float:
         """NaN where the corrector has gone too far."""
-        far = np.linalg.norm(here.extra) > CONTINUATION.arc_wander * abs(self.length)
+        far = np.linalg.norm(here.extra) > ARC_WANDER * abs(self.length)
         return np.nan if far else 1.0

@@ -32,33 +32,20 @@ from solver.structure.joint import Case, Joint
 def add_harmonics(
     case: Case, joint: Joint, evaluation: Evaluation, resolution: Resolution, run: Run
 ) -> Evaluation | None:
-    """State with more harmonics, by a homotopy in their compliance.
+    """State with more harmonics, by a homotopy in their compliance; None where it does not reach its end.
 
-    Parameters
-    ----------
-    case, joint, evaluation : Case, Joint, Evaluation
-        The known state.
-    resolution : Resolution
-        All harmonics of the known state and new ones, and at least as many samples.
-    run : Run
-        Tolerance and limits.
-
-    Returns
-    -------
-    Evaluation or None
-        State with the penalty of `case`; the caller transfers the state to the penalty of the new harmonics. None where
-        the homotopy does not reach its end.
+    case, joint, evaluation: the known state. resolution: its harmonics and new ones, and at least as many samples.
+    The state has the penalty of `case`; the caller transfers it to the penalty of the new harmonics.
     """
     finer = replace(case, resolution=resolution).joint(joint.omega, joint.excitation_amplitude)
     new = np.flatnonzero(~np.isin(resolution.orders, case.resolution.orders))
     homotopy = HarmonicHomotopy(finer, evaluation.history, evaluation.wear_depth, new, *compliances(finer, new))
     start = change_orders(evaluation.predicted_h, case.resolution.orders, resolution.orders)
-    first = homotopy.at(0.0, evaluation.history)
-    result = run.fresh().solve(first, start)
-    if not result.converged:
+    begun = run.fresh().state(homotopy.at(0.0, evaluation.history), start)
+    if begun is None:
         return None
-    begin = State(result.evaluation, evaluation.history, 0.0)
-    last, arrived = follow_naturally(homotopy.at, begin, 1.0, run.fresh(), keep_history=True)
+    first = State(begun.evaluation, evaluation.history, 0.0)
+    last, arrived = follow_naturally(homotopy.at, first, 1.0, run.fresh(), keep_history=True)
     return last.evaluation if arrived else None
 
 
@@ -68,12 +55,7 @@ def start_with_tail(old: Case, joint: Joint, evaluation: Evaluation) -> tuple[Ba
     The new harmonics of the force are taken from the force samples, and the new harmonics of the motion are the motion
     of the structure under these forces. Zeros would remove the impacts that the samples contain.
 
-    Parameters
-    ----------
-    old, evaluation : Case, Evaluation
-        The known state.
-    joint : Joint
-        The joint with all harmonics.
+    old, evaluation: the known state. joint: with all harmonics.
     """
     balance = Balance(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
     orders, known = joint.basis.orders, old.resolution.orders
@@ -99,9 +81,8 @@ def compliances(joint: Joint, places: IntArray) -> tuple[ComplexArray, ComplexAr
     unit = np.zeros((joint.contact.n_contact, 3, 2 * joint.basis.n_harmonics + 1))
     unit[:, :, 1::2] = 1.0
     penalty = to_complex(joint.to_relative(joint.law.force(unit)))[:, places]
-    return np.stack([np.diag(1.0 / column) for column in penalty.T]), np.linalg.inv(
-        joint.structure.dynamic_stiffness[places]
-    ).astype(complex)
+    compliance = np.linalg.inv(joint.structure.dynamic_stiffness[places]).astype(complex)
+    return np.stack([np.diag(1.0 / column) for column in penalty.T]), compliance
 
 
 @dataclass(frozen=True)
@@ -109,7 +90,7 @@ class HarmonicHomotopy:
     """Balances between the state without the new harmonics (s = 0) and the state with the new harmonics (s = 1).
 
     - joint: the joint with all harmonics.
-    - history (n_contact, 2), wear_depth (n_contact,): m, held.
+    - history (n_contact, 2), wear_depth (n_contact,): m, constant.
     - new (k,): indices of the new harmonics.
     - penalty_compliance, compliance: as `compliances` returns them.
     """
@@ -128,5 +109,4 @@ class HarmonicHomotopy:
             mixed = structure.dynamic_stiffness.astype(complex)
             mixed[self.new] = np.linalg.inv((1.0 - parameter) * self.penalty_compliance + parameter * self.compliance)
             structure = replace(structure, moving=DenseStiffness(mixed))
-        joint = replace(self.joint, structure=structure)
-        return Balance(joint, self.history, self.wear_depth)
+        return Balance(replace(self.joint, structure=structure), self.history, self.wear_depth)

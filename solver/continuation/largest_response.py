@@ -29,6 +29,15 @@ from solver.settings import NEGLIGIBLE
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case
 
+PEAK_RISE = 2.0
+"""Largest rise of the logarithm of the response with the phase lag, 1/rad, over rtol, at which an amplitude counts as
+the largest one: its frequency is then within 2 rtol of half the width of the resonance, and the amplitude within
+2 rtol^2. The states of single samples change with the frequency, so that the rise is rough: by 0.005 for the dovetail
+with rtol 0.01, which would take five solves a step with 1e-4."""
+
+LARGEST_LAG_STEP = 0.2
+"""Largest change of the phase lag between two solves, rad."""
+
 
 def solve_at_peak(
     case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int | None = None
@@ -54,8 +63,7 @@ def solve_at_peak(
             return replace(found, reduced=np.array([[turn]])), lag
         # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
         slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
-        largest = CONTINUATION.largest_lag_step
-        step = float(np.clip(-rise / min(slope, -NEGLIGIBLE), -largest, largest))
+        step = float(np.clip(-rise / min(slope, -NEGLIGIBLE), -LARGEST_LAG_STEP, LARGEST_LAG_STEP))
         before = lag, rise
         lag = lag + step if below < lag + step < above else 0.5 * (below + above)
         balance, start = found.balance, found.at.predicted_h
@@ -64,7 +72,7 @@ def solve_at_peak(
 
 def accepted_rise(rtol: float) -> float:
     """Rise of the logarithm of an amplitude with the phase lag, 1/rad, at which the amplitude counts as the largest."""
-    return CONTINUATION.peak_rise * rtol
+    return PEAK_RISE * rtol
 
 
 def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float, float]:

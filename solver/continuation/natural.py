@@ -1,8 +1,7 @@
 """Natural continuation of a converged state along one parameter. Where it fails, `arc_length` may continue.
 
 The parameter is the frequency, the excitation amplitude, a homotopy parameter or the fraction of a step on the slow
-time scale. The caller supplies the balance at a value of the parameter. The shortest step and the number of failures
-limit the work.
+time scale. The shortest step and the number of failures limit the work.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ def follow_naturally(
     run: Run,
     keep_history: bool = False,
     fine: float = np.inf,
-    shortest: float | None = None,
 ) -> tuple[State, bool]:
     """Step the parameter to the target. Steps are halved where Newton's method needs many iterations.
 
@@ -33,22 +31,13 @@ def follow_naturally(
 
     Parameters
     ----------
-    balance_at : callable
-        Balance at a value of the parameter for a tangential history (n_contact, 2), m.
-    start : State
-        First state, with its parameter.
-    target : float
-        Last value of the parameter.
-    run : Run
-        Tolerance and limits.
+    balance_at, start, target, run
+        Balance at a value of the parameter; first state, with its parameter; last value of the parameter; limits.
     keep_history : bool
-        True holds the tangential history of the start, for intermediate states that are no states of the joint.
+        True keeps the tangential history of the start, for intermediate states that are no states of the joint.
     fine : float
         Step length, in the unit of the parameter. A longer step is accepted only if the vibration changes little over
         the step: where each step leaves a history to the next step, the state at the target depends on the steps.
-    shortest : float, optional
-        Shortest step as a fraction of the range; by default `SHORTEST_STEP`, or a quarter of `fine`
-        if that is shorter.
 
     Returns
     -------
@@ -57,9 +46,7 @@ def follow_naturally(
     arrived : bool
         Whether the last state is at the target.
     """
-    state = start
-    whole = target - start.parameter
-    shortest = SHORTEST_STEP if shortest is None else shortest
+    state, whole, shortest = start, target - start.parameter, SHORTEST_STEP
     if np.isfinite(fine) and whole != 0.0:
         shortest = min(shortest, 0.25 * fine / abs(whole))
     # fractions of two: sums of them are exact, so that the last step ends at the target
@@ -73,13 +60,12 @@ def follow_naturally(
         smooth = abs(reach - state.parameter) <= fine or _is_smooth(state.evaluation, result.evaluation)
         if result.converged and smooth:
             history = state.history if keep_history else final_history(balance, result.evaluation)
-            state, done = State(result.evaluation, history, reach), ahead
-            fraction = min(2.0 * fraction, 1.0)
-        else:
-            fraction *= 0.5
-            failures += not result.converged
-            if fraction < shortest or failures > CONTINUATION.attempts or run.budget.exhausted:
-                return state, False
+            state, done, fraction = State(result.evaluation, history, reach), ahead, min(2.0 * fraction, 1.0)
+            continue
+        fraction = 0.5 * (ahead - done)
+        failures += not result.converged
+        if fraction < shortest or failures > CONTINUATION.attempts or run.budget.exhausted:
+            return state, False
     return state, True
 
 

@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.model import ComplexArray, FloatArray
 from solver.newton.bordering import Bordered
@@ -27,6 +26,9 @@ from solver.settings import DIFFERENCE
 from solver.structure.fourier import to_complex
 from solver.structure.frequency_slope import frequency_slope
 from solver.structure.joint import Case, Joint
+
+LARGEST_FREQUENCY_CHANGE = 0.02
+"""Largest change of the frequency in an iteration, over the frequency."""
 
 
 def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
@@ -72,7 +74,7 @@ class AtLag:
 
     def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
         """The frequency changes by a small fraction of itself at most."""
-        return min(1.0, CONTINUATION.largest_frequency_change * float(here.values[0] / max(abs(change[0]), 1e-300)))
+        return min(1.0, LARGEST_FREQUENCY_CHANGE * float(here.values[0] / max(abs(change[0]), 1e-300)))
 
     def _errors(self, part: complex, product: complex) -> FloatArray:
         """-Im(exp(i lag) part) / |product| (1,)."""

@@ -14,8 +14,6 @@ mass slips to and fro, or sticks: this is the state after shakedown.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from solver.continuation.natural import follow_naturally
@@ -38,47 +36,25 @@ def ratchets(joint: Joint, evaluation: Evaluation, fraction: float) -> bool:
 
 
 def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
-    """State after shakedown of the masses, at an unchanged wear depth.
+    """State after shakedown of the masses, at an unchanged wear depth; the last one found where it does not end.
 
-    Parameters
-    ----------
-    joint, state : Joint, State
-        The state before shakedown.
-    fraction : float
-        Accepted work of ratcheting over the slip work.
-    run : Run
-        Tolerance and limits.
-
-    Returns
-    -------
-    State
-        The state after shakedown; the last state that was found where ratcheting does not end.
+    fraction: accepted work of ratcheting over the slip work.
     """
     run, worn = run.fresh(), state.evaluation.wear_depth
     for _ in range(CONTINUATION.attempts):
         if not ratchets(joint, state.evaluation, fraction):
             break
+        before = state.evaluation.history
         # from the mean position of the masses in the history to the one reached
-        shift = joint.law.origin(state.evaluation.displacement_h[:, 1:, 0] - state.evaluation.history)
-        homotopy = _MeanShift(joint, worn, state.evaluation.history, shift)
-        start = State(state.evaluation, state.evaluation.history, 0.0)
-        moved, arrived = follow_naturally(homotopy.at, start, 1.0, run, keep_history=True)
+        shift = joint.law.origin(state.evaluation.displacement_h[:, 1:, 0] - before)
+
+        def balance_at(part: float, _: FloatArray, before: FloatArray = before, shift: FloatArray = shift) -> Balance:
+            return Balance(joint, before + part * shift, worn)
+
+        start = State(state.evaluation, before, 0.0)
+        moved, arrived = follow_naturally(balance_at, start, 1.0, run, keep_history=True)
         if not arrived:
             break
-        history = final_history(homotopy.at(1.0, start.history), moved.evaluation)
+        history = final_history(balance_at(1.0, before), moved.evaluation)
         state = State(moved.evaluation, history, state.parameter)
     return state
-
-
-@dataclass(frozen=True)
-class _MeanShift:
-    """Homotopy of balances from `history` to `history + shift`, both (n_contact, 2), m."""
-
-    joint: Joint
-    wear_depth: FloatArray
-    history: FloatArray
-    shift: FloatArray
-
-    def at(self, parameter: float, _: FloatArray) -> Balance:
-        """Balance at a homotopy parameter from 0 to 1, the fraction of the shift."""
-        return Balance(self.joint, self.history + parameter * self.shift, self.wear_depth)

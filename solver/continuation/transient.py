@@ -42,6 +42,15 @@ from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Case, Joint
 
+TRANSIENT_CUT = 0.35
+"""Factor of the length of a step that fails, or whose change is twice `smooth_change`. Half the value takes 2.5
+times the iterations of a jump at a fold. With 0.5 a random scene (`THROWN_OFF` in `tests/solver/test_homotopy.py`)
+does not settle within the budget."""
+
+RELAXED_CHANGE = CONTINUATION.smooth_change / 10.0
+"""Change over a step below which a periodic state is sought: norm of the change of the amplitudes over the larger norm
+of two motions."""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -51,7 +60,7 @@ class Motion:
     velocity: ComplexArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _LoadedStructure(CondensedStructure):
     """A structure with a load in each harmonic, load_h (n_rel, 2H+1), N."""
 
@@ -82,11 +91,6 @@ class Transient:
     def periodic(self, evaluation: Evaluation) -> Motion:
         """Motion of the whole structure in a periodic state of this joint."""
         return self._motion(evaluation, self.rates, [load for _, load in self.parts], None, 0.0)
-
-    def rest(self) -> Motion:
-        """No displacement, no velocity."""
-        none = np.zeros((len(self.parts), len(self.parts[0][0].mass)), complex)
-        return Motion(none, none)
 
     def resumed(self, motion: Motion) -> Motion:
         """Initial motion with the amplitudes of a periodic motion of another joint (another frequency or load)."""
@@ -154,31 +158,25 @@ def relax_to_periodic(
 
     Parameters
     ----------
-    case : Case
-        Model and settings of both joints.
-    joint : Joint
-        The joint whose periodic state is sought.
-    wear_depth : array (n_contact,)
-        Wear depth, m, held.
-    start, start_joint : Evaluation, Joint
+    case, joint
+        Model and settings of both joints; the joint whose periodic state is sought.
+    wear_depth
+        (n_contact,), m, constant.
+    start, start_joint
         First state. Both joints have equal pairs and harmonics; frequency and load may differ. A start without
         excitation leads to the state that builds up from rest.
-    history : array (n_contact, 2)
-        Tangential history at the start, m.
-    run : Run
-        Tolerance and limits.
+    history
+        Tangential history (n_contact, 2) at the start, m.
 
     Returns
     -------
     State or Outcome
-        The stable state, or why there is none:
-
-        - ADRIFT: the mean positions run away. All pairs slip, and only friction holds the parts: there is no periodic
-          state.
-        - UNSTABLE: the motion is an unstable periodic state and does not leave this state.
-        - UNSETTLED: the motion does not settle within `CONTINUATION.search_iterations` Newton iterations.
+        The stable state, or why there is none: ADRIFT where the mean positions run away, as all pairs slip and only
+        friction holds the parts; UNSTABLE where the motion is an unstable periodic state and does not leave this state;
+        UNSETTLED where it does not settle within `CONTINUATION.search_iterations` Newton iterations.
     """
-    run.budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
+    budget = run.budget
+    budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
     transient = Transient(case, joint)
     motion = transient.resumed(Transient(case, start_joint).periodic(start))
     predicted, period = start.predicted_h, 2.0 * np.pi / joint.omega
@@ -188,7 +186,7 @@ def relax_to_periodic(
     left = CONTINUATION.search_iterations
     # whether an unstable state has been found, which the motion leaves
     grows = False
-    while left > 0 and length >= SHORTEST_STEP and not run.budget.exhausted:
+    while left > 0 and length >= SHORTEST_STEP and not budget.exhausted:
         inverse = 1.0 / (length * period)
         balance = Balance(transient.step(motion, inverse), history, wear_depth)
         result = run.solve(balance, predicted, CONTINUATION.near_iterations)
@@ -201,7 +199,7 @@ def relax_to_periodic(
         if damped and result.iterations == 0:
             return Outcome.UNSTABLE
         if not result.converged or too_far or damped:
-            length *= CONTINUATION.transient_cut
+            length *= TRANSIENT_CUT
             continue
         motion, predicted = ahead, result.evaluation.predicted_h
         history = final_history(balance, result.evaluation)
@@ -211,18 +209,18 @@ def relax_to_periodic(
             return Outcome.ADRIFT
         # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
         renewed = change < 0.5 * tried or length >= longest
-        if change < CONTINUATION.relaxed_change and renewed:
+        if change < RELAXED_CHANGE and renewed:
             tried = change
-            begun = run.budget.iterations
+            begun = budget.iterations
             balance = Balance(joint, history, wear_depth)
             # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
             found = run.state(balance, predicted)
-            left -= run.budget.iterations - begun
+            left -= budget.iterations - begun
             if found is not None and not is_stable(balance, found.evaluation, run):
                 grows = True
             elif found and _change(transient.periodic(found.evaluation), motion) < CONTINUATION.smooth_change:
                 return found
-        elif change > CONTINUATION.relaxed_change:
+        elif change > RELAXED_CHANGE:
             tried = np.inf
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
         growth = float(np.clip(CONTINUATION.smooth_change / max(change, 1e-300), 0.5, 2.0))

@@ -42,7 +42,7 @@ class Balance:
     - joint: the joint.
     - history (n_contact, 2): corrected slip X_T at the start of the period, m.
     - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6).
-    - wear_gain (n_contact,): `archard.wear_gain` of the step, m/J; 0 where W is given.
+    - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given.
     - wearing: wearing work of the wear law.
     """
 
@@ -168,13 +168,20 @@ class Linearisation:
         tangent[:, 0, :] += self.growth_tangent
         return tangent
 
+    @cached_property
     def active(self) -> IntArray:
         """Pairs whose motion depends on their predicted force."""
-        return self._active
+        return np.flatnonzero(differs_from_identity(self.force_tangent, _PASSIVE))
 
     @cached_property
-    def _active(self) -> IntArray:
-        return np.flatnonzero(differs_from_identity(self.force_tangent, _PASSIVE))
+    def active_rows(self) -> IntArray:
+        """Relative displacements of the active pairs."""
+        return self.joint.rows_of(self.active)
+
+    @cached_property
+    def passive_rows(self) -> IntArray:
+        """All other relative displacements: the columns of their unknowns are those of the identity."""
+        return np.setdiff1d(np.arange(self.joint.component_index.size), self.active_rows, assume_unique=True)
 
     def transmit(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Changes of motion, m, and contact force, N, both (n_contact, 3, m), for a step (n_rel, m), N."""
@@ -193,8 +200,8 @@ class Linearisation:
     def apply_roughly(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step to at least three digits in less time, for directions of Newton's method."""
         joint = self.joint
-        pairs, held_back = self._held_back
-        held, motion = hold_back(step, self._rows_of_pairs, pairs, held_back, *self._compliance, self.growth_tangent)
+        rows, compliance = joint.pair_rows, joint.pair_compliance
+        held, motion = hold_back(step, rows, self.active, self._held_back, *compliance, self.growth_tangent)
         if joint.law.rate_dependent:
             # masses move by Newton's law
             motion_h = joint.law.motion(joint.to_pairs(held))
@@ -203,54 +210,31 @@ class Linearisation:
         return joint.structure.apply_roughly(motion) + step - held
 
     @cached_property
-    def _held_back(self) -> tuple[IntArray, SingleArray]:
-        """Active pairs, and the part `1 - d lambda/dp` that they do not transmit, in single precision."""
-        pairs = self.active()
-        return pairs, (np.eye(self.force_tangent.shape[1]) - self.force_tangent[pairs]).astype(np.float32)
+    def _held_back(self) -> SingleArray:
+        """Part `1 - d lambda/dp` (n, 3m, 3m) that the active pairs do not transmit, in single precision."""
+        return identity_less(self.force_tangent, self.active)
 
-    @cached_property
-    def _rows_of_pairs(self) -> IntArray:
-        """Row of each component of the pairs (n_contact, 3); -1 where a component does not exist."""
-        rows = np.full(3 * self.joint.contact.n_contact, -1)
-        rows[self.joint.component_index] = np.arange(self.joint.component_index.size)
-        return rows.reshape(-1, 3)
-
-    @property
-    def _compliance(self) -> tuple[FloatArray, FloatArray]:
-        """Motion over force (n_contact,), m/N, of elastic pairs: normal and tangential."""
-        return 1.0 / self.joint.penalty.normal, 1.0 / self.joint.penalty.tangential
-
-    def dense(self, pairs: IntArray, n_harmonics: int | None = None) -> FloatArray:
-        """Rows and columns of the Jacobian for some pairs, in the order (relative displacement, harmonic).
-
-        n_harmonics: number of the lowest harmonics that are included; all if not given.
-        """
-        whole = self.joint.basis.synthesis.shape[0]
-        m = whole if n_harmonics is None else 2 * n_harmonics + 1
-        rows, pair, component = self._rows(pairs)
-        n_rows = rows.size
+    def dense(self, pairs: IntArray) -> FloatArray:
+        """Rows and columns of the Jacobian for some pairs, in the order (relative displacement, harmonic)."""
+        m = self.joint.basis.synthesis.shape[0]
+        rows = self.joint.rows_of(pairs)
+        pair, component = np.divmod(self.joint.component_index[rows], 3)
+        pair = np.searchsorted(pairs, pair)
         # blocks of the pairs, spread over the existing rows and columns: (row, harmonic, column, harmonic)
-        spread = np.zeros((2, n_rows, m, n_rows, m))
-        same = pair[:, None] == pair[None, :]
-        row, column = np.nonzero(same)
+        spread = np.zeros((2, rows.size, m, rows.size, m))
+        row, column = np.nonzero(pair[:, None] == pair[None, :])
         for place, part in enumerate((self.motion_tangent, self.force_tangent)):
-            blocks = part[pairs].reshape(pairs.size, 3, whole, 3, whole)
-            spread[place][row, :, column] = blocks[pair[row], component[row], :m, component[column], :m]
-        motion, matrix = spread[0].reshape(n_rows, m, -1), spread[1].reshape(n_rows, m, -1)
+            blocks = part[pairs].reshape(pairs.size, 3, m, 3, m)
+            spread[place][row, :, column] = blocks[pair[row], component[row], :, component[column]]
+        motion, matrix = spread.reshape(2, rows.size, m, -1)
         structure = self.joint.structure
         matrix[:, 0] += structure.static_stiffness[np.ix_(rows, rows)] @ motion[:, 0]
         if m > 1:
             amplitude = (motion[:, 1::2] - 1j * motion[:, 2::2]).transpose(1, 0, 2)
-            stiffness = structure.dynamic_stiffness[: (m - 1) // 2, rows[:, None], rows]
-            moved = np.matmul(stiffness, amplitude).transpose(1, 0, 2)
+            moved = np.matmul(structure.dynamic_stiffness[:, rows[:, None], rows], amplitude).transpose(1, 0, 2)
             matrix[:, 1::2] += moved.real
             matrix[:, 2::2] -= moved.imag
-        return np.asarray(matrix.reshape(n_rows * m, n_rows * m))
-
-    def _rows(self, pairs: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-        """Rows of `pairs`; for each row the index of its pair in `pairs`, and its component."""
-        rows = self.joint.rows_of(pairs)
-        return rows, np.searchsorted(pairs, self.joint.component_index[rows] // 3), self.joint.component_index[rows] % 3
+        return np.asarray(matrix.reshape(rows.size * m, rows.size * m))
 
 
 @njit(cache=True)
@@ -268,6 +252,19 @@ def differs_from_identity(matrices: FloatArray, by: float) -> BoolArray:
             if differs[place]:
                 break
     return differs
+
+
+@njit(cache=True)
+def identity_less(matrices: FloatArray, chosen: IntArray) -> SingleArray:
+    """The identity less some of the matrices (n, k, k), in single precision."""
+    k = matrices.shape[1]
+    found = np.empty((chosen.size, k, k), np.float32)
+    for place, which in enumerate(chosen):
+        for row in range(k):
+            for column in range(k):
+                found[place, row, column] = -matrices[which, row, column]
+            found[place, row, row] = 1.0 - matrices[which, row, row]
+    return found
 
 
 @njit(cache=True)

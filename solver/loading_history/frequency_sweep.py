@@ -12,15 +12,12 @@ from solver.accuracy.certificate import certify
 from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
 from solver.accuracy.refinement import Refined, refine, state_difference
 from solver.continuation.first_state import solve_first_state
-from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.state import State
-from solver.loading_history.options import LOADING
-from solver.loading_history.path import LoadingPath
+from solver.loading_history.path import FREE_STEP, LoadingPath
 from solver.loading_history.path_of_states import Step
-from solver.loading_history.sweep import Sweep, SweepState
+from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep, SweepState
 from solver.loading_history.sweep_start import Direction, Origin, find_origin
 from solver.model import FloatArray, ReducedModel
-from solver.newton.linear_solver import SMALL_JOINT
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import packable
@@ -29,6 +26,13 @@ from solver.results.state_report import periodic_state
 from solver.settings import Resolution, SolverSettings, all_orders, allowed
 from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
+
+FIRST_ITERATIONS = SWEEP_ITERATIONS // 8
+"""Most Newton iterations of all attempts to begin a sweep, or to find a state where the sweep is lost. Tens to hundreds
+suffice where some pairs stick; a joint that slips everywhere takes all of them in vain."""
+
+OTHER_STARTS = ((1, 64), (3, 256), (15, 256))
+"""Harmonics and samples of further attempts to find a first state."""
 
 _REASONS = (Outcome.UNSTABLE, Outcome.ADRIFT, Outcome.UNSETTLED)
 """Outcomes that give the reason for the end of a sweep, not only its end."""
@@ -118,7 +122,7 @@ class FrequencySweep:
         """What another sweep needs to go on, to be packed; None where nothing is saved yet."""
         if self.nodes is None or self.origin is None or self.nodes.saved is None:
             return None
-        return FrequencySweepState(self.origin, _path(self.nodes).omega, self.nodes.saved)
+        return FrequencySweepState(self.origin, path_of(self.nodes).omega, self.nodes.saved)
 
     def load(self, state: FrequencySweepState) -> None:
         """Go on from the saved state of another sweep."""
@@ -128,14 +132,8 @@ class FrequencySweep:
     def go_on_from(self, case: Case, state: State, frequency: float) -> bool:
         """Begin at a known state; False where the state is rejected.
 
-        Parameters
-        ----------
-        case
-            Harmonics, samples and penalty of the state.
-        state
-            Its parameter is the frequency, rad/s, or for a ramp its amplitude over that of the sweep.
-        frequency
-            The frequency to which the sweep goes, Hz.
+        case: harmonics, samples and penalty of the state. state: its parameter is the frequency, rad/s, or for a ramp
+        its amplitude over that of the sweep. frequency: to which the sweep goes, Hz.
         """
         ramp, target = self.sweep == "ramp", 2.0 * np.pi * frequency
         origin = replace(find_origin(self.model, frequency, self.sweep), penalty=case.penalty_omega / (2.0 * np.pi))
@@ -148,35 +146,29 @@ class FrequencySweep:
         """State at the next frequency, Hz, with the harmonics that it needs."""
         origin, omega = find_origin(self.model, frequency, self.sweep), 2.0 * np.pi * frequency
         ramp, budget = self.sweep == "ramp", self.run.budget
-        budget.iterations, budget.limit = 0, LOADING.node_iterations
+        budget.iterations, budget.limit = 0, NODE_ITERATIONS
         # the state must not depend on those at other frequencies
         self.run = run = self.run.fresh()
         nodes, target = self._sweep_to(origin, omega), 1.0 if ramp else omega
+        nodes.advance_to(target)
         try:
-            self.advance_nodes(nodes, target)
             reached = nodes.state_at(target, run.fresh())
-            case = _path(nodes).case
+            case = path_of(nodes).case
             if isinstance(reached, Outcome):
-                failed = nodes.state if nodes.here is None else replace(nodes.state, failure=reached)
-                nodes.state = failed
-                budget.limit = budget.iterations + LOADING.first_iterations
-                first = self._first(omega, run)
+                nodes.state = nodes.state if nodes.here is None else replace(nodes.state, failure=reached)
+                budget.limit = budget.iterations + FIRST_ITERATIONS
+                first = self._first(nodes, target, run)
                 if first is None:
-                    return Found(self.why_lost(nodes), message=self._where_lost(nodes))
+                    return Found(self.why_lost(nodes), message=_where_lost(nodes))
                 case, reached = first[0], Step(first[1])
             refined = self._at_known(frequency, case, omega, reached.state)
             if refined is None:
                 refined = refine(case, omega, self.excitation_amplitude, reached.state, run)
-            # with impacts a small joint has many other states
-            small = case.joint(omega, 0.0).component_index.size <= SMALL_JOINT
-            if not refined.accurate and small:
-                refined = self._restarted_from_static(omega) or refined
         except np.linalg.LinAlgError:
             return Found(Outcome.SINGULAR)
         # folds of a ramp are load factors
         fold = float("nan") if ramp else (nodes.state.fold, *reached.folds)[-1]
-        branch = nodes.state.branch + len(reached.folds)
-        return self._judge(refined, omega, nodes, Found(Outcome.CONVERGED, branch, fold))
+        return self._judge(refined, nodes, Found(Outcome.CONVERGED, nodes.state.branch + len(reached.folds), fold))
 
     def sweep_in_cell(self, frequency: float) -> Sweep[State]:
         """The sweep that passes all frequencies in the quarter octave of a frequency, Hz, at its present node."""
@@ -188,7 +180,7 @@ class FrequencySweep:
     def _sweep_to(self, origin: Origin, omega: float) -> Sweep[State]:
         """The sweep that leads to a frequency, rad/s, at its first node or beyond."""
         nodes, ramp = self.nodes, self.sweep == "ramp"
-        passed = nodes is not None and (_path(nodes).omega != omega if ramp else nodes.has_passed(omega))
+        passed = nodes is not None and (path_of(nodes).omega != omega if ramp else nodes.has_passed(omega))
         if nodes is None or passed or self.origin is None or origin.cell != self.origin.cell:
             nodes = self._new_sweep(origin, omega if ramp else None)
         return self._at_begin(nodes, origin)
@@ -210,90 +202,48 @@ class FrequencySweep:
         """A sweep at its first node or beyond; without a state where none is found."""
         if not self._begun:
             self._begun = True
-            nodes.run.budget.limit = nodes.run.budget.iterations + LOADING.first_iterations
-            places = [2.0 * np.pi * start for start in origin.starts] or [LOADING.free_step]
+            nodes.run.budget.limit = nodes.run.budget.iterations + FIRST_ITERATIONS
+            places = [2.0 * np.pi * start for start in origin.starts] or [FREE_STEP]
             any(self._begin_at(nodes, place) for place in places)
         return nodes
 
     def _begin_at(self, nodes: Sweep[State], place: float) -> bool:
         """Begin a sweep at a value of its parameter; False where there is no state."""
-        ramp, before, first = _path(nodes).omega, nodes.run.budget.iterations, None
-        omega, load_factor = (place, 1.0) if ramp is None else (ramp, place)
-        nodes.run.budget.report(f"first state at {omega / (2.0 * np.pi):.6g} Hz")
+        joint = path_of(nodes).omega
+        nodes.run.budget.report(f"first state at {(place if joint is None else joint) / (2.0 * np.pi):.6g} Hz")
         with contextlib.suppress(np.linalg.LinAlgError):
-            first = self._first(omega, nodes.run, load_factor)
-        if not np.isnan(nodes.state.lost_at):
-            searched = nodes.state.searched + nodes.run.budget.iterations - before
-            nodes.state = replace(nodes.state, searched=searched)
-        if first is None:
-            return False
-        case, state = first
-        return nodes.begin(replace(_path(nodes), case=case), replace(state, parameter=place))
+            if (first := self._first(nodes, place, nodes.run)) is not None:
+                return nodes.begin(replace(path_of(nodes), case=first[0]), first[1])
+        return False
 
-    def advance_nodes(self, nodes: Sweep[State], target: float) -> None:
-        """Advance the sweep to the target; where the sweep is lost before, begin it again a little further on."""
-        while True:
-            try:
-                nodes.advance_to(target)
-            except np.linalg.LinAlgError:
-                nodes.lose()
-            if nodes.here is not None or _path(nodes).omega is not None or np.isnan(nodes.state.lost_at):
-                return
-            behind = nodes.state.lost_at * (1.0 + CONTINUATION.arc_span * nodes.direction)
-            # budget of all attempts: where every pair slips, all of them fail
-            left = LOADING.first_iterations - nodes.state.searched
-            if (behind - target) * nodes.direction >= 0.0 or left < 0:
-                return
-            nodes.run.budget.limit = nodes.run.budget.iterations + left
-            if not self._begin_at(nodes, behind):
-                nodes.state = replace(nodes.state, lost_at=behind)
-
-    def _first(self, omega: float, run: Run, load_factor: float = 1.0) -> tuple[Case, State] | None:
-        """A state from the static one with the harmonics of the sweep, or else with others, and its case."""
-        assert self.nodes is not None
+    def _first(self, nodes: Sweep[State], place: float, run: Run) -> tuple[Case, State] | None:
+        """A state from the static one at a value of the parameter, with the harmonics of the sweep, or else with
+        others, and its case; None where there is none, with the reason of the first attempt in the sweep.
+        """
         why: Outcome | None = None
-        others = _other_starts() if self.settings.automatic else ()
-        for case, found in self._firsts(omega, run, load_factor, (self.nodes.state.resolution, *others)):
+        for case in self._cases(nodes):
+            path = replace(path_of(nodes), case=case)
+            omega, load = (place, 1.0) if path.omega is None else (path.omega, place)
+            unworn = np.zeros(self.model.contact.n_contact)
+            found = solve_first_state(case, omega, load * self.excitation_amplitude, unworn, run.fresh())
             if isinstance(found, State):
-                return case, found
-            # the reason comes from the first attempt
+                return case, replace(found, parameter=place)
             why = found if why is None or found.static else why
             if found.static or run.budget.exhausted:
                 break
-        self.nodes.state = replace(self.nodes.state, failure=why or Outcome.START_FAILED)
+        nodes.state = replace(nodes.state, failure=why or Outcome.START_FAILED)
         return None
 
-    def _firsts(
-        self, omega: float, run: Run, load_factor: float, resolutions: tuple[Resolution, ...]
-    ) -> Iterator[tuple[Case, State | Outcome]]:
-        """States from the static one with some harmonics and samples, as far as the settings allow them."""
-        assert self.nodes is not None
-        amplitude, unworn = load_factor * self.excitation_amplitude, np.zeros(self.model.contact.n_contact)
-        for resolution in resolutions:
-            case = _path(self.nodes).case.at(allowed(resolution, self.settings))
-            yield case, solve_first_state(case, omega, amplitude, unworn, run.fresh())
-
-    def _restarted_from_static(self, omega: float) -> Refined | None:
-        """An accurate state from the static one with other harmonics than the branch; None if there is none."""
-        for case, found in self._firsts(omega, self.run, 1.0, _other_starts()[1:]):
-            if isinstance(found, State):
-                refined = refine(case, omega, self.excitation_amplitude, found, self.run)
-                if refined.accurate:
-                    return refined
-        return None
+    def _cases(self, nodes: Sweep[State]) -> Iterator[Case]:
+        """The case of a sweep, and with other harmonics and samples as far as the settings allow them."""
+        yield path_of(nodes).case
+        for highest, samples in OTHER_STARTS if self.settings.automatic else ():
+            yield path_of(nodes).case.at(allowed(Resolution(all_orders(highest), samples), self.settings))
 
     def why_lost(self, nodes: Sweep[State]) -> Outcome:
         """The reason why a sweep has no state."""
         never = np.isnan(nodes.state.lost_at)
         return nodes.state.failure if never or nodes.state.failure in _REASONS else Outcome.BRANCH_LOST
-
-    def _where_lost(self, nodes: Sweep[State]) -> str:
-        """Sentence with the last parameter of a lost sweep; empty for a sweep that never began."""
-        if np.isnan(nodes.state.lost_at):
-            return ""
-        if _path(nodes).omega is not None:
-            return f"the vibration repeats up to {100.0 * nodes.state.lost_at:.3g} % of the excitation"
-        return f"the sweep goes on in stable states as far as {nodes.state.lost_at / (2.0 * np.pi):.6g} Hz"
 
     def _at_known(self, frequency: float, case: Case, omega: float, state: State) -> Refined | None:
         """The state with the known resolution; None where none is known, or where the state is not found with it."""
@@ -306,37 +256,40 @@ class FrequencySweep:
             return None if moved is None else Refined(wanted, moved, NOTHING, accurate=True)
         return Refined(case, state, NOTHING, accurate=True)
 
-    def _judge(self, refined: Refined, omega: float, nodes: Sweep[State], found: Found) -> Found:
+    def _judge(self, refined: Refined, nodes: Sweep[State], found: Found) -> Found:
         """The outcome of a refined state, with its error and the state of the reference sweep."""
-        case, at = refined.case, refined.point.evaluation
-        joint = case.joint(omega, self.excitation_amplitude)
+        case, point = refined.case, refined.point
+        joint = replace(path_of(nodes), case=case).joint_at(point.parameter)
         lost = replace(found, resolution=case.resolution, estimate=refined.estimate)
-        if not certify(joint, at).holds(self.settings.tolerance):
+        if not certify(joint, point.evaluation).holds(self.settings.tolerance):
             return replace(lost, outcome=Outcome.CERTIFICATE_FAILED)
-        if unstable := find_instability(case, joint, at, self.run, self.every):
+        if unstable := find_instability(case, joint, point.evaluation, self.run, self.every):
             return replace(lost, outcome=unstable.outcome, message=unstable.sentence)
-        found = replace(lost, state=periodic_state(joint, refined.point))
-        if (reference := self._reference(nodes, case, omega)) is not None:
-            estimate = found.estimate + state_difference(case, joint, refined.point, reference)
+        found = replace(lost, state=periodic_state(joint, point))
+        if (reference := self._reference(nodes, case, point)) is not None:
+            estimate = found.estimate + state_difference(case, joint, point, reference)
             found = replace(found, reference=periodic_state(joint, reference), estimate=estimate)
         return found if refined.accurate else replace(found, outcome=Outcome.INACCURATE)
 
-    def _reference(self, nodes: Sweep[State], case: Case, omega: float) -> State | None:
-        """The state of the reference sweep with the harmonics of a case; None where it has none."""
+    def _reference(self, nodes: Sweep[State], case: Case, state: State) -> State | None:
+        """A state with the history that the reference sweep leaves; None where there is none."""
         with contextlib.suppress(np.linalg.LinAlgError):
-            found = nodes.reference_at(1.0 if self.sweep == "ramp" else omega, self.run.fresh())
-            if found is not None and nodes.reference is not None:
-                joint = case.joint(omega, self.excitation_amplitude)
-                return self.run.move(_path(nodes.reference).case, joint, found)
+            if nodes.reference is not None and (node := nodes.reference_node(state.parameter)) is not None:
+                path = path_of(nodes.reference)
+                return path.like(node, replace(path, case=case), state, self.run)
         return None
 
 
-def _path(sweep: Sweep[State]) -> LoadingPath:
+def path_of(sweep: Sweep[State]) -> LoadingPath:
     """The path of a sweep."""
     assert isinstance(sweep.path, LoadingPath)
     return sweep.path
 
 
-def _other_starts() -> tuple[Resolution, ...]:
-    """Harmonics and samples of further attempts to find a first state."""
-    return tuple(Resolution(all_orders(highest), samples) for highest, samples in LOADING.other_starts)
+def _where_lost(nodes: Sweep[State]) -> str:
+    """Sentence with the last parameter of a lost sweep; empty for a sweep that never began."""
+    if np.isnan(nodes.state.lost_at):
+        return ""
+    if path_of(nodes).omega is not None:
+        return f"the vibration repeats up to {100.0 * nodes.state.lost_at:.3g} % of the excitation"
+    return f"the sweep goes on in stable states as far as {nodes.state.lost_at / (2.0 * np.pi):.6g} Hz"

@@ -23,18 +23,14 @@ class OnPath(Protocol):
 
 @dataclass(frozen=True)
 class Step(Generic[S]):
-    """End of a step.
-
-    state: the state reached.
-    folds: values of the parameter at the folds that the step has jumped over.
-    """
+    """End of a step: the state reached, and values of the parameter at the folds that the step has jumped over."""
 
     state: S
     folds: tuple[float, ...] = ()
 
 
 class Path(Protocol[S]):
-    """The joint along a parameter; the harmonics and samples are those of its case."""
+    """The joint along a parameter, with the harmonics and samples of its case."""
 
     @property
     def case(self) -> Case:
@@ -60,6 +56,12 @@ class Path(Protocol[S]):
     def change(self, before: S, after: S, wider: float) -> float:
         """Change over a step, over the largest change allowed, which is `wider` times larger in a reference sweep."""
 
+    def rests(self, state: S) -> bool:
+        """Whether no pair slips or opens within the period."""
+
+    def forgets(self, state: S) -> bool:
+        """Whether each pair slips or opens within the period, so that the state follows from its parameter alone."""
+
     def differs(self, before: S, after: S) -> float:
         """Relative change of the vibration between two states."""
 
@@ -73,7 +75,7 @@ class Path(Protocol[S]):
         """Path and state with the harmonics that the state needs, whether they suffice, relative error."""
 
     def suffices(self, state: S, at_limit: bool, run: Run) -> bool:
-        """Whether the state has about the harmonics that it needs."""
+        """Whether the state has about the harmonics that it needs. at_limit: whether more are not allowed."""
 
     def describe(self, state: S) -> str:
         """Where the path is, in words."""

@@ -20,9 +20,10 @@ from solver.continuation.phase_lag import phase_lag
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
 from solver.loading_history.frequency_sweep import Found, FrequencySweep
-from solver.loading_history.options import LOADING
+from solver.loading_history.path import FREE_STEP
 from solver.loading_history.path_of_states import Step
-from solver.loading_history.sweep import Sweep
+from solver.loading_history.sweep import NODE_ITERATIONS, Sweep
+from solver.loading_history.sweep_start import CELLS_PER_OCTAVE
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.settings import FollowedFrequency
@@ -58,7 +59,7 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
 
         def excess(omega: float, nodes: Sweep[State] = nodes, run: Run = run) -> float:
             """Positive before the resonance on the way of the sweep, negative behind."""
-            run.budget.iterations, run.budget.limit = 0, LOADING.node_iterations
+            run.budget.iterations, run.budget.limit = 0, NODE_ITERATIONS
             state = _state_at(line, nodes, omega, run)
             joint = nodes.path.case.joint(omega, line.excitation_amplitude)
             return nodes.direction * math.cos(phase_lag(joint, state.evaluation))
@@ -67,12 +68,12 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
         if nodes.here is not None and (nodes.here.parameter - place) * nodes.direction > 0.0:
             # saved on the way
             place = nodes.here.parameter
-        line.advance_nodes(nodes, place)
+        nodes.advance_to(place)
         here = excess(place)
         if before is not None and before > 0.0 >= here:
             return near
         while place != end:
-            line.advance_nodes(nodes, float(np.nextafter(place, nodes.direction * math.inf)))
+            nodes.advance_to(float(np.nextafter(place, nodes.direction * math.inf)))
             if nodes.ahead is None:
                 raise _lost(line, nodes, place)
             target = min(nodes.ahead.state.parameter, end, key=lambda at: (at - place) * nodes.direction)
@@ -89,7 +90,7 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
 
 def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, float]]:
     """Parts of a range, Hz, in each of which one sweep passes all frequencies, in the order of the sweep."""
-    per_octave = LOADING.cells_per_octave
+    per_octave = CELLS_PER_OCTAVE
     first, last = (math.floor(per_octave * math.log2(end)) for end in (follow.low, follow.high))
     edges = [2.0 ** (cell / per_octave) for cell in range(first + 1, last + 1)]
     ends = [follow.low, *(edge for edge in edges if follow.low < edge < follow.high), follow.high]
@@ -129,7 +130,7 @@ def _between(
     found = float(brentq(excess, one, other, xtol=line.settings.tolerance * one, rtol=1e-12))
     assert nodes.ahead is not None
     for fold in nodes.ahead.folds:
-        if abs(found - fold) <= LOADING.free_step * fold:
+        if abs(found - fold) <= FREE_STEP * fold:
             way, back = ("up", "down") if nodes.direction > 0.0 else ("down", "up")
             over = f"resonance at {fold / (2.0 * math.pi):.6g} Hz"
             raise _NoneFoundError(f'the sweep {way} jumps over the {over}: give sweep = "{back}"')

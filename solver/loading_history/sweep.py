@@ -6,10 +6,11 @@ only on the change of the vibration from node to node. A state between two nodes
 leaves the sweep unchanged. So the state of a point does not depend on the other points of the study.
 
 The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
-slip, up to one step too early. A reference sweep from the same first state has steps twice as long, and harmonics one
-level lower where these are automatic. The difference of both sweeps is at least half the error of the finer one, and as
-a rule the error of the coarser one. Where the sweep jumps over a fold, its reference begins anew behind the jump: the
-place of a jump is no measure of the error by steps.
+slip, up to one step too early. A reference sweep has steps twice as long, and harmonics one level lower where these are
+automatic. The difference of both sweeps is at least half the error of the finer one, and as a rule the error of the
+coarser one. There is no difference, and no reference, as long as nothing slips or opens, and where each pair slips or
+opens within the period: such a state follows from its parameter alone. Where the sweep jumps over a fold, its reference
+begins anew behind the jump: the place of a jump is no measure of the error by steps.
 """
 
 from __future__ import annotations
@@ -23,13 +24,25 @@ import numpy as np
 from solver.accuracy.harmonic_levels import fewer
 from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.options import LOADING
 from solver.loading_history.path_of_states import Path, S, Step
 from solver.march.steps import Lengths, take_step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
 from solver.settings import Resolution
+
+AIMED_CHANGE = 0.75
+"""Expected change of the vibration in the next step over the largest change. Few steps are refused."""
+
+SWEEP_ITERATIONS = 8000
+"""Most Newton iterations of a sweep: more in jumps and searches are in vain (the dovetail takes 300)."""
+
+NODE_ITERATIONS = 5 * SWEEP_ITERATIONS // 16
+"""Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""
+
+ITERATIONS_PER_SAVE = 100
+"""Newton iterations after which a sweep is saved at its next node, and its factorisation dropped, so that a resumed
+sweep is equal to the last bit: 1 s of 48 pairs, 17 s of 336."""
 
 
 @packable
@@ -43,7 +56,7 @@ class SweepState:
     checked: the node at which the harmonics were chosen. at_limit: whether it needs more than a sweep may have.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
     failure, lost_at: reason why there is no state, and the parameter of the last node before, NaN if there was none.
-    iterations: Newton iterations so far. searched: of these, in attempts to begin again where the sweep was lost.
+    iterations: Newton iterations so far.
     reference: state of the reference sweep; None for none.
     """
 
@@ -57,7 +70,6 @@ class SweepState:
     failure: Outcome = Outcome.START_FAILED
     lost_at: float = float("nan")
     iterations: int = 0
-    searched: int = 0
     reference: SweepState | None = None
 
 
@@ -66,6 +78,7 @@ class Sweep(Generic[S]):
 
     state: at the current node. saved: at the last saved node; a sweep resumed from there is equal to the last bit.
     ahead: the next node, where it is known. last: the last node of a lost sweep.
+    passed: parameters of the nodes so far.
     save: called where the sweep was saved.
     wider: factor on the steps, 2 for a reference sweep. reference: the reference sweep, led from node to node.
     """
@@ -79,6 +92,7 @@ class Sweep(Generic[S]):
         self.saved: SweepState | None = None
         self.ahead: Step[S] | None = None
         self.last: S | None = None
+        self.passed: list[float] = []
         self.save: Callable[[], None] = lambda: None
         # counts of its own: when the sweep is saved must not depend on the points that are asked for
         own = Budget(deadline=budget.deadline)
@@ -96,8 +110,7 @@ class Sweep(Generic[S]):
     @property
     def n_iterations(self) -> int:
         """Newton iterations so far, those of the reference sweep included."""
-        own = self.run.budget.iterations
-        return own if self.reference is None else own + self.reference.run.budget.iterations
+        return self.run.budget.iterations + (0 if self.reference is None else self.reference.run.budget.iterations)
 
     def set_deadline(self, deadline: float) -> None:
         """Set the CPU time of the thread, s, after which the sweep ends."""
@@ -117,7 +130,6 @@ class Sweep(Generic[S]):
         opens everywhere a state that does not exist.
         """
         self.place_at(path, state)
-        self._begin_reference()
         if self._choose_resolution() > SENSITIVE_ERROR:
             self.state = replace(self.state, states=(), failure=Outcome.UNSETTLED)
             return False
@@ -128,7 +140,12 @@ class Sweep(Generic[S]):
         """End the sweep at the current node."""
         at = self.state.lost_at if self.here is None else self.here.parameter
         self.last = self.here or self.last
-        self.state, self.ahead = replace(self.state, lost_at=at, states=()), None
+        self.drop()
+        self.state = replace(self.state, lost_at=at)
+
+    def drop(self) -> None:
+        """Be without a state, as a reference sweep that does not differ from its sweep."""
+        self.state, self.ahead = replace(self.state, states=()), None
 
     def has_passed(self, parameter: float) -> bool:
         """Whether a value of the parameter lies before the current node, or before the end of a lost sweep."""
@@ -137,25 +154,16 @@ class Sweep(Generic[S]):
 
     def advance_to(self, parameter: float) -> None:
         """Go on until the next node lies at or beyond a value of the parameter, or until the branch is lost."""
-        budget = self.run.budget
-        while self.here is not None:
-            if self.ahead is None:
-                budget.report(self.path.describe(self.here))
-                budget.limit = budget.iterations + LOADING.node_iterations
-                found = Failure(Outcome.BRANCH_LOST)
-                if budget.iterations <= LOADING.sweep_iterations:
-                    taken = take_step(self, self.here, self.state.length, self._lengths())
-                    if not isinstance(taken, Failure):
-                        self.ahead, length = taken
-                        self.state = replace(self.state, length=min(length, self.path.steps[1]))
-                        continue
-                    found = taken
-                self.state = replace(self.state, failure=found.outcome)
-                self.lose()
-            elif (self.ahead.state.parameter - parameter) * self.direction >= 0.0:
-                return
-            else:
-                self._advance(self.ahead)
+        try:
+            while self.here is not None:
+                if self.ahead is None:
+                    self._look_ahead(self.here)
+                elif (self.ahead.state.parameter - parameter) * self.direction >= 0.0:
+                    return
+                else:
+                    self._advance(self.ahead)
+        except np.linalg.LinAlgError:
+            self.lose()
 
     def state_at(self, parameter: float, run: Run) -> Step[S] | Outcome:
         """State at a parameter between the current and the next node, or why there is none.
@@ -176,11 +184,16 @@ class Sweep(Generic[S]):
 
     def reference_at(self, parameter: float, run: Run) -> S | None:
         """State of the reference sweep at a parameter between the current and the next node; None if there is none."""
-        if self.reference is None or self.here is None:
+        if self.reference is None or self.reference_node(parameter) is None:
             return None
-        self.reference.advance_to(parameter)
         found = self.reference.state_at(parameter, run)
         return None if isinstance(found, Outcome) else found.state
+
+    def reference_node(self, parameter: float) -> S | None:
+        """Last node of the reference sweep before a parameter; None where it has no state of its own."""
+        if self.reference is not None:
+            self.reference.advance_to(parameter)
+        return None if self.reference is None else self.reference.here
 
     # the line of `take_step`
 
@@ -203,31 +216,33 @@ class Sweep(Generic[S]):
     def _target(self, here: S, length: float) -> float:
         return self.path.ahead(here.parameter, self.direction * length)
 
-    def _lengths(self) -> Lengths:
-        shortest, _, rescue = self.path.steps
-        return Lengths(1, LOADING.aimed_change, shortest, rescue)
-
-    def place_at(self, path: Path[S], state: S) -> None:
-        """Put the sweep at a first node."""
-        self.forget()
-        self.path = path
-        length = path.steps[1]
-        self.state = replace(self.state, states=(state,), resolution=path.case.resolution, length=length)
+    def _look_ahead(self, here: S) -> None:
+        """Find the next node, or lose the sweep."""
+        budget, (shortest, longest, rescue) = self.run.budget, self.path.steps
+        budget.report(self.path.describe(here))
+        budget.limit = budget.iterations + NODE_ITERATIONS
+        taken: tuple[Step[S], float] | Failure = Failure(Outcome.BRANCH_LOST)
+        if budget.iterations <= SWEEP_ITERATIONS:
+            taken = take_step(self, here, self.state.length, Lengths(1, AIMED_CHANGE, shortest, rescue))
+        if isinstance(taken, Failure):
+            self.state = replace(self.state, failure=taken.outcome)
+            self.lose()
+        else:
+            self.ahead, length = taken
+            self.state = replace(self.state, length=min(length, longest))
 
     def _advance(self, step: Step[S]) -> None:
         """Make the next node the current one."""
         before, self.ahead = self.here, None
+        self.passed.append(step.state.parameter)
         self.state = replace(
             self.state,
             states=(step.state,) if step.folds else (before, step.state),
             branch=self.state.branch + len(step.folds),
             fold=(self.state.fold, *step.folds)[-1],
         )
-        if self.reference is not None:
-            if not step.folds:
-                self._lead(self.reference, step.state.parameter)
-            if step.folds or self.reference.here is None or self.reference.state.branch > 0:
-                self._begin_reference()
+        if self.reference is not None and before is not None:
+            self._lead(self.reference, before, step)
         if self.state.checked is None:
             return
         if self.path.differs(self.state.checked, step.state) > ACCURACY.vibration_recheck:
@@ -236,27 +251,34 @@ class Sweep(Generic[S]):
             else:
                 self._choose_resolution()
         saved = 0 if self.saved is None else self.saved.iterations
-        if self.run.budget.iterations >= saved + LOADING.iterations_per_save:
+        if self.run.budget.iterations >= saved + ITERATIONS_PER_SAVE:
             self._save()
 
-    def _lead(self, reference: Sweep[S], parameter: float) -> None:
-        """Lead the reference sweep to the present node."""
-        try:
-            reference.advance_to(parameter)
-        except np.linalg.LinAlgError:
-            reference.lose()
-
-    def _begin_reference(self) -> None:
-        """Begin the reference sweep, where there is one, at the current node, with harmonics one level lower."""
-        reference, here = self.reference, self.state.states[-1]
-        if reference is None:
+    def _lead(self, reference: Sweep[S], before: S, step: Step[S]) -> None:
+        """Lead the reference sweep to the present node: the end of a step from the node `before`."""
+        if step.folds or self.path.forgets(step.state):
+            reference.drop()
             return
-        path = self.path.at(fewer(self.state.resolution, self.path.case.settings))
-        moved = None
+        if reference.here is None and not self.path.rests(step.state):
+            self._begin_reference(reference, before)
+        reference.advance_to(step.state.parameter)
+        if reference.state.branch > 0:
+            reference.drop()
+
+    def _begin_reference(self, reference: Sweep[S], node: S) -> None:
+        """Begin the reference sweep at a node, with harmonics one level lower."""
+        path, moved = self.path.at(fewer(self.state.resolution, self.path.case.settings)), None
         if path.case.resolution != self.state.resolution:
-            moved = self.path.move(here, path, self.run)
+            moved = self.path.move(node, path, self.run)
+        placed = (self.path, node) if moved is None else (path, moved)
         reference.state = replace(reference.state, branch=0)
-        reference.place_at(*((self.path, here) if moved is None else (path, moved)))
+        reference.place_at(*placed, reference.wider * self.state.length)
+
+    def place_at(self, path: Path[S], state: S, length: float = np.inf) -> None:
+        """Put the sweep at a first node; length: of the first step."""
+        self.forget()
+        self.path, self.passed, length = path, [state.parameter], min(length, path.steps[1])
+        self.state = replace(self.state, states=(state,), resolution=path.case.resolution, length=length)
 
     def _choose_resolution(self) -> float:
         """Choose the harmonics and samples of the nodes for the current state, as far as they are automatic.
@@ -283,7 +305,7 @@ class Sweep(Generic[S]):
             wanted = path.at(fewer(path.case.resolution, path.case.settings))
             moved = other.path.move(other.here, wanted, self.run)
             if moved is None:
-                self._begin_reference()
+                self._begin_reference(other, state)
             else:
                 other.forget()
                 other.take(wanted, moved)

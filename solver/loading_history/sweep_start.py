@@ -14,12 +14,22 @@ from typing import Literal
 
 import numpy as np
 
-from solver.loading_history.options import LOADING
 from solver.model import ReducedModel
 from solver.packing import packable
 from solver.structure.condensation import build_structure
 
 Direction = Literal["up", "down", "ramp"]
+
+BEGIN_AWAY = 0.3
+"""Least distance from the start of a sweep to the point, as a fraction of the frequency of the point. With 0.22 and
+0.38 the dovetail has the same state within 2e-3."""
+
+CELLS_PER_OCTAVE = 4
+"""Cells in an octave. All points of a cell have one first frequency: 105 Hz, half the resonance, for the dovetail."""
+
+ORIGIN_CANDIDATES = 8
+"""Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen. They
+are 2 % apart and at least 1 % away from two resonances of the dovetail, 212.9 and 411 Hz."""
 
 
 @packable
@@ -40,21 +50,19 @@ class Origin:
 
 def find_origin(model: ReducedModel, frequency: float, sweep: Direction) -> Origin:
     """Origin of the sweep to a frequency, Hz."""
-    cell = math.floor(LOADING.cells_per_octave * math.log2(frequency))
-    low, high = (2.0 ** (edge / LOADING.cells_per_octave) for edge in (cell, cell + 1))
+    cell = math.floor(CELLS_PER_OCTAVE * math.log2(frequency))
+    low, high = (2.0 ** (edge / CELLS_PER_OCTAVE) for edge in (cell, cell + 1))
     if sweep == "ramp":
         return Origin((), high, cell)
-    width = 2.0 ** (1.0 / LOADING.cells_per_octave)
+    width = 2.0 ** (1.0 / CELLS_PER_OCTAVE)
     # further attempts where no state is found at the quiet frequency
-    near, away = (
-        ((1.0 - LOADING.begin_away) * low, 1.0 / width) if sweep == "up" else ((1.0 + LOADING.begin_away) * high, width)
-    )
+    near, away = ((1.0 - BEGIN_AWAY) * low, 1.0 / width) if sweep == "up" else ((1.0 + BEGIN_AWAY) * high, width)
     return Origin((_quiet(model, near * away, near), near, near / away), high, cell)
 
 
 def _quiet(model: ReducedModel, far: float, near: float) -> float:
     """Frequency between two of them, Hz, at which the excitation loads the stuck joint least."""
-    frequencies = np.geomspace(far, near, LOADING.origin_candidates + 1)
+    frequencies = np.geomspace(far, near, ORIGIN_CANDIDATES + 1)
     loads = []
     for frequency in frequencies:
         try:

@@ -14,9 +14,8 @@ from solver.clock import computing_time
 from solver.contact.wear_law import WearLaw
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.frequency_sweep import FrequencySweep
-from solver.loading_history.start_states import follow_line
 from solver.loading_history.sweep_start import Direction
-from solver.missions.block_start import begin_again, continue_block
+from solver.missions.block_start import Begun, begin_block, continue_block
 from solver.missions.blocks import Block, Mission, worn
 from solver.model import ComplexArray, FloatArray
 from solver.outcome import Outcome
@@ -29,6 +28,10 @@ from solver.wear.rate_slope import rate_slope
 from solver.wear.solutions import Ended, Like, SlowTime, Solutions
 from solver.wear.wearing_joint import WearingJoint
 
+NODES_OF_A_REFERENCE_STEP = 3
+"""Nodes of the sweep of a block in one step of its reference solution: the difference of both is twice the error by the
+steps of the sweep, as in a wear history."""
+
 
 @packable
 @dataclass(frozen=True)
@@ -37,27 +40,26 @@ class BlockRun:
 
     failure: reason of the end; the outcome CONVERGED for a regular end.
     growth (n_contact,): depth worn in the block, m.
-    slope (n_contact, n_contact): derivative of the growth with respect to the depth before, 1; None if not asked for.
     response (2, n_response): complex first harmonic, m.
     peak (2, n_response): largest magnitude over a period, m.
-    response_error: estimated relative error of both.
+    slope (n_contact, n_contact): derivative of the growth with respect to the depth before, 1; None if not asked for.
+    response_error: estimated relative error of response and peak.
     growth_error: estimated relative error of the growth by harmonics, samples, the way to the start state and steps.
     inaccurate: largest relative error of a state above rtol, 0 where there is none.
     held: whether the mean position of a joint that slides as a whole was held.
     cut_off: whether a pair at an edge of the modelled contact carries load or has worn.
     like: what the reference solution takes over.
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
+    begun: what the block of the next mission takes over; None for a block that continues.
     iterations: Newton iterations, start state included.
-    sweep_rate: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.delay`; 0 for steady vibration.
-    frequencies: with which a passage of the next mission begins, ascending, Hz.
-    begun: state to which the ramp or the sweep of the block has led; None for other blocks.
+    sweep_rate: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.passage`; 0 for steady vibration.
     """
 
     failure: Failure
     growth: FloatArray
-    slope: FloatArray | None
     response: ComplexArray
     peak: FloatArray
+    slope: FloatArray | None = None
     response_error: float = 0.0
     growth_error: float = 0.0
     inaccurate: float = 0.0
@@ -65,10 +67,9 @@ class BlockRun:
     cut_off: bool = False
     like: Like | None = None
     last: StartState | None = None
+    begun: Begun | None = None
     iterations: int = 0
     sweep_rate: float = 0.0
-    frequencies: tuple[float, ...] = ()
-    begun: StartState | None = None
 
     @property
     def completed(self) -> bool:
@@ -83,21 +84,19 @@ class BlockCase:
     mission, place: the mission, and the place of the block in it.
     depth (n_contact,): m, worn before the block.
     carried: state that the block continues; None for a block that begins anew.
-    with_slope: whether the slope of the growth is asked for.
     settings: with the time that is left.
-    frequencies: with which a passage begins, ascending, Hz; none for the first one.
-    begun: state to which the ramp or the sweep of the block has led in a mission before.
-    every: for which states stability is tested, as in `find_instability`.
+    with_slope: whether the slope of the growth is asked for.
+    begun: of an earlier mission.
+    every: whether stability is tested at begin and end, also where nothing speaks for a loss of stability.
     """
 
     mission: Mission
     place: int
     depth: FloatArray
     carried: StartState | None
-    with_slope: bool
     settings: SolverSettings
-    frequencies: tuple[float, ...] = ()
-    begun: StartState | None = None
+    with_slope: bool = False
+    begun: Begun | None = None
     every: bool = True
 
     @property
@@ -118,56 +117,47 @@ class BlockCase:
         line.every = self.every
         return line
 
+    def not_computed(self, failure: Failure, iterations: int = 0) -> BlockRun:
+        """The block, which was not computed to its end."""
+        nothing = np.full((2, len(self.block.model.response_names)), np.nan)
+        unknown = np.full_like(self.depth, np.nan)
+        return BlockRun(failure, unknown, nothing.astype(complex), nothing, iterations=iterations)
+
 
 def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
-    """Compute a block, or its reference solution.
+    """Compute a block of steady vibration; with `like` of this block in the history its reference solution.
 
-    A failure is a value. With `like`, of the same block in the history, the reference solution is integrated.
+    A block that does not come to its end has its failure as a value. Raises OutOfTimeError, LinAlgError.
     """
     began, block = computing_time(), case.block
-    start, begun = _start(case)
+    frequency, cycles = block.steady
+    if case.carried is not None:
+        start, begun = continue_block(block, case.depth, case.carried, case.settings), None
+    else:
+        line = case.line(case.mission.first if block.way == "continue" else block.way)
+        line.set_deadline(began + case.settings.time_limit)
+        every_node = 1 if like is None else NODES_OF_A_REFERENCE_STEP
+        start, begun = begin_block(line, frequency, case.begun, every_node)
+        begun = None if block.way == "continue" else begun
     if start.state is None:
-        return not_computed(case, Failure(start.outcome, start.message), start.newton_iterations)
+        return case.not_computed(Failure(start.outcome, start.message), start.newton_iterations)
     left = replace(case.settings, time_limit=case.settings.time_limit - (computing_time() - began))
-    model, counts = worn(block.model, case.depth), np.array([0.0, block.steady[1]])
-    asked = SlowTime(
-        case.mission.wear_coefficient,
-        "adaptive",
-        counts,
-        law=case.law,
-        ends_at_last=True,
-    )
+    counts = np.array([0.0, cycles])
+    asked = SlowTime(case.mission.wear_coefficient, "adaptive", counts, law=case.law, ends_at_last=True)
+    model = worn(block.model, case.depth)
     of_block = build_case(model, block.friction_coefficient, start.penalty_omega, left, start.resolution)
     solutions = Solutions(of_block, start, asked)
-    if like is None:
-        ended = solutions.history()
-        output = solutions.output_of(ended)
-    else:
-        ended = solutions.follow(like, counts)
-        output = solutions.output_of_reference(ended)
+    ended = solutions.history(stable_end=case.every) if like is None else solutions.follow(like, counts)
+    output = solutions.output_of(ended) if like is None else solutions.output_of_reference(ended)
+    iterations = start.newton_iterations + ended.iterations
     if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
-        return not_computed(case, ended.failure, start.newton_iterations + ended.iterations)
-    computed = _read(case, ended, output.read(counts), start)
+        return case.not_computed(ended.failure, iterations)
+    computed = replace(_read(case, ended, output.read(counts), start), begun=begun, iterations=iterations)
     if case.with_slope:
         work = WearingJoint.of(of_block, start.state, asked.wear_coefficient, asked.law)
         computed = replace(computed, slope=_slope(work, ended, case, computed.growth))
-    computed = replace(computed, begun=begun)
     # as read from a file: an interrupted mission goes on with equal bits
     return in_rows(computed)
-
-
-def _start(case: BlockCase) -> tuple[StartState, StartState | None]:
-    """The state at the begin of a block, and `BlockRun.begun`."""
-    block = case.block
-    if case.carried is not None:
-        return continue_block(block, case.depth, case.carried, case.settings), None
-    if case.begun is not None:
-        near = begin_again(block, case.depth, case.begun, case.settings, case.every)
-        if near is not None:
-            return near, case.begun
-    sweep: Direction = case.mission.first if block.way == "continue" else block.way
-    _, start = next(follow_line(case.line(sweep), np.array([block.steady[0]])))
-    return start, None if block.way == "continue" or start.state is None else start
 
 
 def _slope(work: WearingJoint, ended: Ended, case: BlockCase, growth: FloatArray) -> FloatArray:
@@ -191,7 +181,6 @@ def _read(case: BlockCase, ended: Ended, values: dict[str, Any], start: StartSta
     return BlockRun(
         failure=ended.failure,
         growth=growth,
-        slope=None,
         response=values["response"],
         peak=values["response_peak"],
         response_error=float(np.fmax.reduce(values["response_error"])),
@@ -201,7 +190,6 @@ def _read(case: BlockCase, ended: Ended, values: dict[str, Any], start: StartSta
         cut_off=not math.isnan(cut),
         like=Like(course.resolutions, state.step_limit, ended.iterations),
         last=_last(case, ended, start) if case.mission.continued_by(case.place) else None,
-        iterations=start.newton_iterations + ended.iterations,
     )
 
 
@@ -227,10 +215,3 @@ def _last(case: BlockCase, ended: Ended, start: StartState) -> StartState:
         message="",
         reference=None,
     )
-
-
-def not_computed(case: BlockCase, failure: Failure, iterations: int) -> BlockRun:
-    """A block that was not computed to its end."""
-    nothing = np.full((2, len(case.block.model.response_names)), np.nan)
-    unknown = np.full_like(case.depth, np.nan)
-    return BlockRun(failure, unknown, None, nothing.astype(complex), nothing, iterations=iterations)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import numpy as np
-
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.loading_history.sweep_start import Direction
 from solver.model import FloatArray, ReducedModel
@@ -46,7 +44,7 @@ class Block:
     - cycles: of the block in one mission, above 0; None for a passage, whose cycles follow from its rate.
     - begin: "ramp", "up" and "down": from the static state of the model with the depths worn so far, as `sweep` of
       `solver.march_wear`. "continue": from the last state of the block before (before the first block: of the last
-      block of the mission before), whose tangential history is kept. Amplitude and frequency then change slowly, one
+      block of the mission before), whose tangential history goes on. Amplitude and frequency then change slowly, one
       after the other, the frequency at the smaller of both amplitudes. By default "ramp"; a passage begins with a sweep
       of its own direction.
     - name: of the block, for messages.
@@ -82,16 +80,10 @@ class Block:
 
 @dataclass(frozen=True)
 class Mission:
-    """Blocks in order, repeated a number of times.
+    """Blocks in order, at least one, repeated a number of times. Arguments as of `solver.integrate_mission`.
 
-    - blocks: in their order, at least one.
-    - wear_coefficient: k_w, 1/Pa.
-    - missions (n_output,): ascending numbers of missions at which the history is reported, whole, the first 0.
-    - settings: numerical settings.
-    - law: the wear law.
-    - until: target at which the history ends; "frequency_shift" is no target of missions.
+    - missions (n_output,): ascending whole numbers of missions at which the history is reported, the first 0.
     - first: how the first mission begins where its first block continues.
-    - largest_step: most missions computed in one step; 1 for every mission by itself.
     """
 
     blocks: tuple[Block, ...]
@@ -107,11 +99,6 @@ class Mission:
     def area(self) -> FloatArray:
         """Area of the pairs (n_contact,), m2."""
         return self.blocks[0].model.contact.area
-
-    @property
-    def frequencies(self) -> FloatArray:
-        """Frequencies (n_block, 2) at begin and end of the blocks, Hz."""
-        return np.array([block.ends for block in self.blocks])
 
     def called(self, place: int) -> str:
         """Name of a block in messages."""

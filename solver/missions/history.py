@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.accuracy.history_error import Both, HistoryError, history_error
 from solver.accuracy.target_error import error_of_wear, target_error
 from solver.harmonic_balance.state import Failure
 from solver.missions.blocks import Mission
-from solver.missions.course import RESPONSES, MissionCourse
-from solver.missions.one_block import integrate_one_block, is_one_history
-from solver.missions.options import MISSIONS
+from solver.missions.course import MissionCourse, Values
+from solver.missions.passage import LARGEST_SWEEP_RATE
 from solver.missions.result import MissionHistory
-from solver.missions.solutions import MissionSolutions
+from solver.missions.solutions import MissionSolutions, missions_to_target, worn_by
 from solver.model import FloatArray
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, unpack
@@ -31,28 +29,14 @@ ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
 def integrate_missions(
     mission: Mission, keep: Callable[[Packed], None] | None = None, resume: Packed | None = None
 ) -> MissionHistory:
-    """Mission history of one point of a study.
+    """Mission history of one point of a study, as far as computed, with its outcome.
 
-    Parameters
-    ----------
-    mission
-        Blocks, counts, settings and wear law.
-    keep
-        Called after each block with the progress.
-    resume
-        Progress, as given to `keep`, of an equal mission, which goes on from there. The result is equal to the last
-        bit, except `run_time`.
-
-    Returns
-    -------
-    MissionHistory
-        The history as far as computed, with its outcome. A history that fails raises no error.
+    keep: called after each block with the progress. resume: such progress of an equal mission, which goes on from there
+    with a result that is equal to the last bit, except `run_time`.
     """
-    if is_one_history(mission):
-        return integrate_one_block(mission, keep, resume)
     solutions = MissionSolutions(mission, keep, None if resume is None else unpack(resume))
     fine = solutions.history()
-    reference = None
+    reference = MissionCourse.unworn(*fine.nodes[0].growth.shape)
     if len(fine.nodes) > 1 and (fine.failure is None or fine.failure.outcome not in ENDS_ALL):
         reference = solutions.reference(fine)
         if reference.failure is not None and reference.failure.outcome in ENDS_ALL:
@@ -64,20 +48,21 @@ def integrate_missions(
     return replace(history, outcome=failure.outcome, message=failure.message)
 
 
-def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: MissionCourse | None) -> MissionHistory:
+def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: MissionCourse) -> MissionHistory:
     """The result, from both solutions."""
     mission, counts = solutions.mission, np.array(solutions.mission.missions, np.float64)
-    area, growth = mission.area, fine.growth_at(counts)
-    depth, values = growth.sum(axis=1), _values(mission, fine, counts)
+    area, (growth, values) = mission.area, _read(mission, fine, counts)
+    depth, other = growth.sum(axis=1), reference.growth_at(counts).sum(axis=1)
     whole, *blocks = _errors(mission, counts, fine, reference)
-    other = np.full_like(depth, np.nan) if reference is None else reference.growth_at(counts).sum(axis=1)
     reached = np.flatnonzero(np.isfinite(whole.worn_volume))
-    failure = fine.failure or Failure(Outcome.CONVERGED)
-    target = solutions.missions_to_target(fine)
+    failure, target = fine.failure or Failure(Outcome.CONVERGED), missions_to_target(mission, fine)
     return MissionHistory(
-        **{name: values[name] for name in RESPONSES},
+        response_begin=values["response"][:, :, 0],
+        response_end=values["response"][:, :, 1],
+        response_peak_begin=values["peak"][:, :, 0],
+        response_peak_end=values["peak"][:, :, 1],
         response_error=np.array([each.response for each in blocks]).T,
-        excitation_frequency=mission.frequencies,
+        excitation_frequency=np.array([block.ends for block in mission.blocks]),
         outcome=failure.outcome,
         message=failure.message,
         missions=counts,
@@ -88,57 +73,39 @@ def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: Miss
         block_volume=growth @ area,
         block_volume_error=np.array([each.worn_volume for each in blocks]).T,
         reference_volume=other @ area,
-        sweep_rate=fine.sweep_rate,
+        sweep_rate=fine.largest("sweep_rate"),
         error_estimate=float(whole.worn_volume[reached[-1]]) if reached.size else math.nan,
         last_mission=float(fine.ends[-1]),
         steps=np.diff(fine.ends),
         missions_to_target=math.nan if math.isinf(target) else target,
-        missions_to_target_error=math.nan if math.isinf(target) else _target_error(solutions, fine, reference),
-        newton_iterations=fine.iterations + (0 if reference is None else reference.iterations),
+        missions_to_target_error=math.nan if math.isinf(target) else _target_error(mission, fine, reference),
+        newton_iterations=fine.iterations + reference.iterations,
         run_time=solutions.spent,
     )
 
 
-def _errors(
-    mission: Mission, counts: FloatArray, fine: MissionCourse, reference: MissionCourse | None
-) -> list[HistoryError]:
+def _read(mission: Mission, course: MissionCourse, missions: FloatArray) -> tuple[FloatArray, Values]:
+    """Depths worn by each block (n, n_block, n_contact), m, and other values of a course; NaN beyond its end."""
+    n_response = len(mission.blocks[0].model.response_names)
+    return course.growth_at(missions), course.values_at(missions, n_response)
+
+
+def _errors(mission: Mission, counts: FloatArray, fine: MissionCourse, reference: MissionCourse) -> list[HistoryError]:
     """Errors of the whole wear, and of wear and responses of each block, at the counts (n_output,), the first 0."""
-    area, blocks = mission.area, range(len(mission.blocks))
-    at = {"outputs": counts, "steps": fine.ends}
-    read = {name: (_read(mission, fine, rows), _read(mission, reference, rows)) for name, rows in at.items()}
+    blocks = range(len(mission.blocks))
+    read = [(rows, _read(mission, fine, rows), _read(mission, reference, rows)) for rows in (counts, fine.ends)]
     found = []
     for chosen in (list(blocks), *([place] for place in blocks)):
         outputs, steps = (
-            Both(at[name], *(_of_blocks(growth, values, chosen, area) for growth, values in read[name])) for name in at
+            Both(rows, *(_of_blocks(*each, chosen, mission.area) for each in solutions)) for rows, *solutions in read
         )
-        found.append(history_error(outputs, steps, area, "adaptive"))
+        found.append(history_error(outputs, steps, mission.area, "adaptive"))
     # where blocks adapt the pressures of the pairs against each other, two solutions may agree in a pair by chance
-    by_steps = np.fmax(found[0].wear_depth, read["outputs"][0][1]["local"])
+    by_steps = np.fmax(found[0].wear_depth, np.where(counts[:, None] > 0.0, read[0][1][1]["local"], 0.0))
     return [replace(found[0], wear_depth=by_steps), *found[1:]]
 
 
-def _read(
-    mission: Mission, course: MissionCourse | None, missions: FloatArray
-) -> tuple[FloatArray, dict[str, NDArray[Any]]]:
-    """Depths worn by each block (n, n_block, n_contact), m, and other values of a course; NaN where there is none."""
-    shape = len(mission.blocks), mission.area.size
-    if course is None:
-        return np.full((missions.size, *shape), np.nan), _values(mission, MissionCourse.begun(*shape), missions)
-    return course.growth_at(missions), _values(mission, course, missions)
-
-
-def _values(mission: Mission, course: MissionCourse, counts: FloatArray) -> dict[str, NDArray[Any]]:
-    """Values of a course at the counts; NaN where no mission was computed."""
-    responses = len(mission.blocks), len(mission.blocks[0].model.response_names)
-    shapes = dict.fromkeys(RESPONSES, responses) | {"rate": course.nodes[0].growth.shape, "local": (mission.area.size,)}
-    shapes |= dict.fromkeys(("response_error", "growth_error"), (len(mission.blocks),))
-    unknown = {name: np.full((counts.size, *shape), np.nan) for name, shape in shapes.items()}
-    return unknown | course.values_at(counts)
-
-
-def _of_blocks(
-    growth: FloatArray, values: dict[str, NDArray[Any]], chosen: list[int], area: FloatArray
-) -> dict[str, NDArray[Any]]:
+def _of_blocks(growth: FloatArray, values: Mapping[str, Any], chosen: list[int], area: FloatArray) -> dict[str, Any]:
     """Wear of some blocks together, and their responses, in the terms of a wear history."""
     n, rates = len(growth), values["rate"][:, chosen]
     volumes = np.nan_to_num(rates @ area)
@@ -157,50 +124,45 @@ def _of_blocks(
         "wear_rate": rates.sum(axis=1) @ area,
         "wear_rate_error": rate_error,
         "local": np.fmax(share * (values["local"] @ area) - first * (depth @ area), 0.0),
-        "response": np.concatenate([values[name][:, chosen].reshape(n, -1) for name in RESPONSES[:2]], axis=1),
-        "response_peak": np.concatenate([values[name][:, chosen].reshape(n, -1) for name in RESPONSES[2:]], axis=1),
+        "response": values["response"][:, chosen].reshape(n, -1),
+        "response_peak": values["peak"][:, chosen].reshape(n, -1),
         "response_error": np.fmax.reduce(values["response_error"][:, chosen], axis=1),
     }
 
 
-def _target_error(solutions: MissionSolutions, fine: MissionCourse, reference: MissionCourse | None) -> float:
+def _target_error(mission: Mission, fine: MissionCourse, reference: MissionCourse) -> float:
     """Estimated error of the number of missions to the target; the rate of the wear is that of the last step."""
-    until, area = solutions.mission.until, solutions.mission.area
-    if reference is None or until is None:
-        return math.inf
-    at, other = solutions.missions_to_target(fine), solutions.missions_to_target(reference)
-    whole, *_ = _errors(solutions.mission, np.array([0.0, at]), fine, reference)
+    assert mission.until is not None
+    at, other = missions_to_target(mission, fine), missions_to_target(mission, reference)
+    whole, *_ = _errors(mission, np.array([0.0, at]), fine, reference)
     depth = fine.growth_at(np.array([at])).sum(axis=1)[0]
-    known_to = error_of_wear(until.quantity, depth, whole.wear_depth[1], float(whole.worn_volume[1] * (depth @ area)))
+    volume_error = float(whole.worn_volume[1] * (depth @ mission.area))
+    known = error_of_wear(mission.until.quantity, depth, whole.wear_depth[1], volume_error)
     before, end = fine.nodes[-2:]
-    per_mission = (solutions.worn(end.growth) - solutions.worn(before.growth)) / (end.mission - before.mission)
-    return target_error(at, other, known_to, per_mission)
+    per_mission = (worn_by(mission, end.growth) - worn_by(mission, before.growth)) / (end.mission - before.mission)
+    return target_error(at, other, known, per_mission)
 
 
 def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> Failure:
     """The outcome of a complete history, and its sentence."""
-    rtol, error = mission.settings.rtol, history.error_estimate
-    remarks = []
-    if fine.held < math.inf:
-        remarks.append(
-            f"from mission {fine.held:.0f} on only friction holds the joint in one direction: it is held there"
-        )
-    for place in np.flatnonzero(fine.sweep_rate > MISSIONS.largest_sweep_rate):
-        rate = f"passes at {fine.sweep_rate[place]:.2g} (zeta f)^2"
+    rtol, held, cut_off = mission.settings.rtol, fine.first_with("held"), fine.first_with("cut_off")
+    inaccurate, said, remarks = fine.largest("inaccurate"), "", []
+    if held < math.inf:
+        remarks.append(f"from mission {held:.0f} on only friction holds the joint in one direction: it is held there")
+    for place in np.flatnonzero(history.sweep_rate > LARGEST_SWEEP_RATE):
+        rate = f"passes at {history.sweep_rate[place]:.2g} (zeta f)^2"
         remarks.append(
             f"{mission.called(int(place))} {rate}: it may wear otherwise than its steady states (see the error)"
         )
-    if fine.cut_off < math.inf:
-        return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(fine.cut_off).replace("cycle", "mission"))
-    if error > SENSITIVE_ERROR:
-        volumes = [
-            1e9 * float(values[np.isfinite(history.worn_volume)][-1])
-            for values in (history.worn_volume, history.reference_volume)
-        ]
+    worst, outcome = int(np.argmax(inaccurate)), Outcome.CONVERGED
+    if cut_off < math.inf:
+        return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(cut_off).replace("cycle", "mission"))
+    if history.error_estimate > SENSITIVE_ERROR:
+        last = np.flatnonzero(np.isfinite(history.worn_volume))[-1]
+        volumes = 1e9 * history.worn_volume[last], 1e9 * history.reference_volume[last]
+        outcome = Outcome.SENSITIVE
         said = f"worn volume {volumes[0]:.3g} mm3, but {volumes[1]:.3g} mm3 in coarser steps"
-        return Failure(Outcome.SENSITIVE, "; ".join((said, *remarks)))
-    worst = int(np.argmax(fine.inaccurate))
-    if fine.inaccurate[worst] > 0.0:
-        said = f"in {mission.called(worst)} the vibration {known_to(float(fine.inaccurate[worst]), rtol)}"
-        return Failure(Outcome.INACCURATE, "; ".join((said, *remarks)))
-    return Failure(Outcome.CONVERGED, "; ".join(remarks))
+    elif inaccurate[worst] > 0.0:
+        outcome = Outcome.INACCURATE
+        said = f"in {mission.called(worst)} the vibration {known_to(float(inaccurate[worst]), rtol)}"
+    return Failure(outcome, "; ".join(filter(None, (said, *remarks))))

@@ -14,15 +14,24 @@ later ones. So the depth y since the start of the passage follows from the linea
 with the implicit trapezoidal rule in the order of the passage. The square of this correction, relative to the wear, is
 a part of the error, and falls with the wear of one passage.
 
-A slow passage finds the steady states. What a faster one may wear more or less is a part of its error, see
-`solver.missions.delay`. A vibration passes df in the time df / |df/dt|, in which it does not tell apart frequencies
-that are closer than 1 / time: an interval far below sqrt(|df/dt|) is not divided. Without this limit no number of
-frequencies suffices at the resonance of a structure without damping that friction does not limit: its integral is
-infinite.
+The vibration follows the frequency with a delay: what it differs from that of the steady state dies out as
+exp(-zeta omega t). So a passage shows at one frequency what belongs to another one, which it has passed before:
+
+    lag = |df/dt| / (2 pi zeta f).
+
+Where the wear rate rises or falls, the passage wears less or more than its steady states, at most the lag times the
+largest wear over frequency: a part of the error. The damping ratio zeta is that of the structure with its closed pairs
+sticking, as the vibration grows with the joint still at rest; friction damps more where pairs slip. The sweep rate
+|df/dt| / (zeta f)^2 says how fast a passage is.
+
+A vibration passes df in the time df / |df/dt|, in which it does not tell apart frequencies that are closer than
+1 / time: an interval far below sqrt(|df/dt|) is not divided. Without this limit no number of frequencies suffices at
+the resonance of a structure without damping that friction does not limit: its integral is infinite.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -34,21 +43,41 @@ from solver.clock import computing_time
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.start_states import follow_line
-from solver.missions.block_run import BlockCase, BlockRun, not_computed
+from solver.missions.block_run import BlockCase, BlockRun
+from solver.missions.block_start import Begun
 from solver.missions.blocks import Passage, worn
-from solver.missions.delay import Delay, delay_of
-from solver.missions.options import MISSIONS
 from solver.model import ComplexArray, FloatArray
+from solver.modes.modal_model import linear_mode
 from solver.outcome import Outcome
 from solver.packing import in_rows
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import to_complex
-from solver.structure.joint import build_case
+from solver.structure.joint import build_case, friction_of_pairs
 from solver.wear.rate_slope import rate_slope
 from solver.wear.solutions import Like
 from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
+
+FIRST_FREQUENCIES = 17
+"""Frequencies before those that are added."""
+
+MOST_FREQUENCIES = 400
+"""Most frequencies of a passage."""
+
+FINEST_INTERVAL = 0.1
+"""Longest interval of frequencies that is never divided, over sqrt(|df/dt|): a tenth of zeta f where the sweep rate is
+1. Slider without damping, 1 to 10 000 Hz at 10 Hz/s, once: a result after 89 CPU seconds; without this limit the first
+of two solutions was not finished after 100."""
+
+FREQUENCY_ERROR = 0.25
+"""Allowed error of the wear of a passage by its frequencies, as a fraction of rtol."""
+
+LARGEST_SWEEP_RATE = 1.0
+"""|df/dt| / (zeta f)^2 above which a message says how fast a passage is. Wear over that of the steady states,
+integrated in time, and the estimated error: slider 0.999 to 1.000 and 3.4 % at 1, 0.994 to 0.996 and 9 % at 3, 0.967 to
+0.972 and 29 % at 10; dovetail (mesh 1) 0.983 and 5 % at 1.9, 0.95 and 15 % at 6.3, 0.91 and 45 % at 19, 0.95 and 100 %
+at 63."""
 
 
 @dataclass(frozen=True)
@@ -71,17 +100,14 @@ class SweptState:
 
 @dataclass(frozen=True)
 class Swept:
-    """The wear of one passage.
+    """The states of one passage, in the order of their frequencies.
 
-    states: in the order of their frequencies.
-    wear (n_contact,): m.
-    error: estimated error by the number of frequencies, m3.
+    error: estimated error of the wear by the number of frequencies, m3.
     iterations: Newton iterations.
     needed: frequencies without which the error would be too large, Hz.
     """
 
     states: tuple[SweptState, ...]
-    wear: FloatArray
     error: float
     iterations: int
     needed: tuple[float, ...]
@@ -91,48 +117,42 @@ def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
     """Compute a passage, or its reference solution, as `block_run.run_block`."""
     passage = case.block.frequency
     assert isinstance(passage, Passage)
-    first = _swept(case, passage, like)
-    if isinstance(first, Failure):
-        return not_computed(case, first, 0)
-    order = 1 if passage.stop > passage.start else -1
-    states = first.states[::order]
-    area, volume = case.mission.area, float(first.wear @ case.mission.area)
-    by_states = sum(
-        _part(first.states, place) @ area * state.start.wear_rate_error for place, state in enumerate(first.states)
-    )
+    swept = find_states(case, passage, like)
+    if isinstance(swept, Failure):
+        return case.not_computed(swept)
+    ascending, area = swept.states, case.mission.area
+    states = ascending[:: 1 if passage.stop > passage.start else -1]
+    starts, parts = [state.start for state in ascending], parts_of(ascending)
+    volume = float(parts.sum(axis=0) @ area)
     growth, slope = in_order(states, (_slope(case, passage, state) for state in states))
-    by_depth = float(np.abs(growth - first.wear) @ area) ** 2 / volume if volume > 0.0 else 0.0
-    delay = _delay(case, passage, first.states)
-    by_rate = min(delay.lag * max(float(state.density @ area) for state in states), volume)
+    sweep_rate, lag = delay_of(case, passage, ascending)
+    errors = (
+        swept.error,
+        float((parts @ area) @ [start.wear_rate_error for start in starts]),
+        float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0,
+        min(lag * max(float(state.density @ area) for state in states), volume),
+    )
+    inaccurate = [
+        max(start.response_error, start.wear_rate_error) for start in starts if start.outcome is Outcome.INACCURATE
+    ]
     ends = states[0], states[-1]
+    resolutions = tuple((state.frequency, state.start.resolution) for state in ascending)
     found = BlockRun(
         failure=Failure(Outcome.CONVERGED),
         growth=growth,
-        slope=slope if case.with_slope else None,
         response=np.array([state.response for state in ends]),
         peak=np.array([state.peak for state in ends]),
+        slope=slope if case.with_slope else None,
         response_error=max(state.start.response_error for state in ends),
-        growth_error=float(by_states + first.error + by_depth + by_rate) / volume if volume > 0.0 else 0.0,
-        inaccurate=max(
-            (max(state.start.response_error, state.start.wear_rate_error) for state in states if _inaccurate(state)),
-            default=0.0,
-        ),
-        like=Like(
-            tuple((state.frequency, state.start.resolution) for state in first.states), float("nan"), first.iterations
-        ),
+        growth_error=sum(errors) / volume if volume > 0.0 else 0.0,
+        inaccurate=max(inaccurate, default=0.0),
+        like=Like(resolutions, math.nan, swept.iterations),
         last=states[-1].start if case.mission.continued_by(case.place) else None,
-        iterations=first.iterations,
-        sweep_rate=delay.sweep_rate if volume > 0.0 else 0.0,
-        frequencies=first.needed,
+        begun=Begun(None, swept.needed),
+        iterations=swept.iterations,
+        sweep_rate=sweep_rate if volume > 0.0 else 0.0,
     )
     return in_rows(found)
-
-
-def _delay(case: BlockCase, passage: Passage, states: tuple[SweptState, ...]) -> Delay:
-    """The delay of a passage with these states."""
-    frequencies, responses = np.array([state.frequency for state in states]), [state.response for state in states]
-    periodic = [state.start.state for state in states if state.start.state is not None]
-    return delay_of(case.block, passage, frequencies, np.array(responses), periodic)
 
 
 def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -175,41 +195,36 @@ def _joint(case: BlockCase, start: StartState) -> tuple[WearingJoint, WearState]
     return work, work.begin(start.state, start.resolution, NOTHING, accurate=True, step_limit=np.inf)
 
 
-def _inaccurate(state: SweptState) -> bool:
-    return state.start.outcome is Outcome.INACCURATE
+def parts_of(states: Sequence[SweptState]) -> FloatArray:
+    """Wear (n, n_contact), m, that belongs to each of the frequencies, ascending, by the trapezoidal rule."""
+    width = np.diff([state.frequency for state in states])
+    density = np.array([state.density for state in states])
+    return np.asarray(0.5 * (np.append(0.0, width) + np.append(width, 0.0))[:, None] * density)
 
 
-def _part(states: tuple[SweptState, ...], place: int) -> FloatArray:
-    """Wear (n_contact,), m, that belongs to a frequency."""
-    low, high = states[max(place - 1, 0)].frequency, states[min(place + 1, len(states) - 1)].frequency
-    return 0.5 * (high - low) * states[place].density
-
-
-def _swept(case: BlockCase, passage: Passage, like: Like | None) -> Swept | Failure:
-    """The wear of one passage at the depth before it; like: of the history, for its reference solution."""
-    aim = MISSIONS.frequency_error * (1.0 if like is None else RTOL_RATIO)
+def find_states(case: BlockCase, passage: Passage, like: Like | None) -> Swept | Failure:
+    """The states of one passage at the depth before it; like: of the history, for its reference solution."""
+    aim = FREQUENCY_ERROR * (1.0 if like is None else RTOL_RATIO) * case.settings.rtol
     low, high = sorted((passage.start, passage.stop))
-    least = np.linspace(low, high, MISSIONS.first_frequencies).tolist()
+    least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
     # the mission before has found the frequencies that count: a second sweep is then seldom needed
-    wanted = list(case.frequencies or least)
+    wanted = list(case.begun.nodes if case.begun else least)
     states: list[SweptState] = []
     iterations, error, area = 0, np.inf, case.mission.area
     while wanted:
-        found = _states(case, passage, np.array(sorted(wanted)), like)
+        found = states_at(case, passage, np.array(sorted(wanted)), like)
         if isinstance(found, Failure):
             return found
         iterations += max((state.start.newton_iterations for state in found), default=0)
         states = sorted([*states, *found], key=lambda state: state.frequency)
-        errors = interval_errors(states, area)
-        volume = float(sum(_part(tuple(states), place) @ area for place in range(len(states))))
-        allowed, error = aim * case.settings.rtol * max(volume, _negligible(case, passage, states)), float(errors.sum())
-        if error <= allowed or len(states) >= MISSIONS.most_frequencies:
+        errors, volume = interval_errors(states, area), float((parts_of(states) @ area).sum())
+        allowed, error = aim * max(volume, _negligible(case, passage, states)), float(errors.sum())
+        if error <= allowed or len(states) >= MOST_FREQUENCIES:
             break
         wanted = []
         for place in np.flatnonzero(errors > allowed / len(errors)):
-            wanted.extend(_between(states[place], states[place + 1], MISSIONS.finest_interval * passage.rate**0.5))
-    wear = np.sum([_part(tuple(states), place) for place in range(len(states))], axis=0)
-    return Swept(tuple(states), wear, error, iterations, _needed(states, errors, allowed / len(errors), least))
+            wanted.extend(_between(states[place], states[place + 1], FINEST_INTERVAL * passage.rate**0.5))
+    return Swept(tuple(states), error, iterations, _needed(states, errors, allowed / len(errors), least))
 
 
 def _negligible(case: BlockCase, passage: Passage, states: list[SweptState]) -> float:
@@ -239,15 +254,14 @@ def _between(one: SweptState, other: SweptState, finest: float) -> list[float]:
     """Further frequencies between two, Hz: both sides of a jump, or the middle of an interval above `finest`, Hz."""
     low, high = one.frequency, other.frequency
     near = NEGLIGIBLE * low
-    folds = {
-        state.start.fold_frequency for state in (one, other) if low + near < state.start.fold_frequency < high - near
-    }
+    jumps = {state.start.fold_frequency for state in (one, other)}
+    folds = [fold for fold in sorted(jumps) if low + near < fold < high - near]
     if one.start.branch != other.start.branch and folds:
         return [side for fold in folds for side in (fold - near, fold + near)]
     return [0.5 * (low + high)] if high - low > max(2.0 * near, finest) else []
 
 
-def interval_errors(states: list[SweptState], area: FloatArray) -> FloatArray:
+def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArray:
     """Estimated errors (n - 1,) of the trapezoidal rule between neighbouring frequencies, m3, pair by pair.
 
     h^3 / 12 times the larger second derivative of the integrand at both ends, from three neighbours on one branch. An
@@ -256,9 +270,8 @@ def interval_errors(states: list[SweptState], area: FloatArray) -> FloatArray:
     at, density = np.array([state.frequency for state in states]), np.array([state.density for state in states])
     branch = np.array([state.start.branch for state in states])
     width, rise = np.diff(at), np.diff(density, axis=0)
-    slope = rise / width[:, None]
     # divided differences of three states (n - 2, n_contact), NaN across a jump
-    bent = np.abs(np.diff(slope, axis=0)) / (at[2:] - at[:-2])[:, None]
+    bent = np.abs(np.diff(rise / width[:, None], axis=0)) / (at[2:] - at[:-2])[:, None]
     bent[(branch[2:] != branch[1:-1]) | (branch[1:-1] != branch[:-2])] = np.nan
     padded = np.vstack([np.full((1, area.size), np.nan), bent, np.full((1, area.size), np.nan)])
     second = np.fmax(padded[:-1], padded[1:])
@@ -266,8 +279,8 @@ def interval_errors(states: list[SweptState], area: FloatArray) -> FloatArray:
     return np.asarray(errors @ area)
 
 
-def _states(
-    case: BlockCase, passage: Passage, frequencies: FloatArray, like: Like | None
+def states_at(
+    case: BlockCase, passage: Passage, frequencies: FloatArray, like: Like | None = None
 ) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
     line = case.line(passage.sweep)
@@ -281,10 +294,50 @@ def _states(
         if computing_time() - began > case.settings.time_limit:
             return Failure(Outcome.TIME_LIMIT)
         work, begun = _joint(case, start)
-        at = begun.point.evaluation
-        frequency = float(frequencies[index])
+        at, joint, frequency = begun.point.evaluation, work.at(begun), float(frequencies[index])
         density = work.rate(at) * frequency / abs(passage.rate)
-        joint = work.at(begun)
         response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
         found.append(SweptState(frequency, start, density, response, largest_responses(joint, at)))
     return found
+
+
+def delay_of(case: BlockCase, passage: Passage, states: Sequence[SweptState]) -> tuple[float, float]:
+    """Sweep rate `|df/dt| / (zeta f)^2` and lag, Hz, of a passage through states, ascending in frequency.
+
+    With the mode nearest to the largest response, of the joint whose closed pairs stick, or slide or are open where the
+    joint cannot move otherwise. No delay without mass. A structure without damping has the half-power half-width of its
+    response in place of `zeta f`, and an infinite delay where no peak is passed.
+    """
+    size = np.array([np.abs(state.response).max() for state in states])
+    largest = states[int(np.argmax(size))].start.state
+    assert largest is not None
+    friction = friction_of_pairs(case.block.model, case.block.friction_coefficient)
+    closed = largest.contact_force_h[:, 0, 0] > 0.0
+    joints = ((closed, friction), (closed, 0.0 * friction), (np.zeros_like(closed), friction))
+    modes = (linear_mode(case.block.model, *joint, near=largest.omega) for joint in joints)
+    mode = next((found for found in modes if found is not None), None)
+    if mode is None:
+        return 0.0, 0.0
+    width = mode.damping_ratio * mode.omega / (2.0 * math.pi)
+    if width <= 0.0:
+        width = half_width(np.array([state.frequency for state in states]), size)
+    return (math.inf, math.inf) if width == 0.0 else (passage.rate / width**2, passage.rate / (2.0 * math.pi * width))
+
+
+def half_width(frequencies: FloatArray, size: FloatArray) -> float:
+    """Half-power half-width, Hz, of responses (n,), m, at ascending frequencies (n,), Hz; 0 where no peak is passed.
+
+    One side of a bent peak is a jump: the width is that of the wider side.
+    """
+    top = int(np.argmax(size))
+    if top in (0, len(size) - 1):
+        return 0.0
+    sides, half = [0.0], size[top] / np.sqrt(2.0)
+    for places in (np.arange(top, len(size)), np.arange(top, -1, -1)):
+        below = np.flatnonzero(size[places] < half)
+        if below.size:
+            one, other = places[below[0] - 1], places[below[0]]
+            share = (size[one] - half) / (size[one] - size[other])
+            at = frequencies[one] + share * (frequencies[other] - frequencies[one])
+            sides.append(float(abs(at - frequencies[top])))
+    return max(sides)

@@ -16,7 +16,9 @@ falls, and each block has its part of the sum. With the third divided difference
     e = w H (H + a) (H - 1) (H - 1 + a) / (2H - 1 + a).
 
 Z is found by Newton's method. The derivative of R is the product of the flows of the linearised wear rates of the
-blocks, corrected by Broyden's method where a second iteration is needed.
+blocks, corrected by Broyden's method where a second iteration is needed. As the parabola through three nodes before is
+near, one mission is enough for most steps: by how much the derivative misses the change of the wear since the last
+node is a part of the error of the step.
 """
 
 from __future__ import annotations
@@ -30,7 +32,6 @@ from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockRun
 from solver.missions.blocks import Mission
 from solver.missions.course import MissionNode
-from solver.missions.options import MISSIONS
 from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.results.history import StartState
@@ -41,90 +42,110 @@ RunBlock = Callable[[int, FloatArray, StartState | None, bool], BlockRun]
 Allowed = Callable[[float, float, int, int], float]
 """Allowed error of a step, m3: worn volumes at its start and end, m3, number of missions at its start, its length."""
 
+MOST_ITERATIONS = 6
+"""Most missions computed for a step. Sliders and roots need 1 to 3."""
+
+DEPTH_TOLERANCE = 0.1
+"""Error of the depth before the mission, as worn volume, over the allowed error of the step."""
+
 
 @dataclass(frozen=True)
 class Step:
-    """A step that was computed.
-
-    node: its end.
-    runs: of all blocks, in order, once for each mission that was computed.
-    error: estimated local error, as worn volume, m3.
-    """
+    """A step that was computed. node: its end. ratio: estimated local error over the allowed one."""
 
     node: MissionNode
-    runs: tuple[BlockRun, ...]
-    error: float
+    ratio: float
 
 
 def run_mission(
-    mission: Mission,
-    computed: int,
-    depth: FloatArray,
-    carried: StartState | None,
-    run: RunBlock,
-    *,
-    with_slopes: bool = False,
+    mission: Mission, now: MissionNode, number: int, depth: FloatArray, run: RunBlock, *, with_slopes: bool = False
 ) -> tuple[BlockRun, ...] | Failure:
-    """Compute the blocks of one mission. computed: missions before, for messages; depth (n_contact,), m: before."""
+    """Compute the blocks of the mission of a number behind a node. depth (n_contact,): m, before the mission."""
     runs: list[BlockRun] = []
+    carried = now.runs[-1].last if now.runs else None
     for place in range(len(mission.blocks)):
         found = run(place, depth, carried, with_slopes)
         if not found.completed:
-            said = f"in mission {computed + 1}, {mission.called(place)}"
+            said = f"in mission {number}, {mission.called(place)}"
             return Failure(found.failure.outcome, ": ".join(filter(None, (said, found.failure.message))))
         runs.append(found)
         depth, carried = depth + found.growth, found.last
     return tuple(runs)
 
 
-def take_step(
+def attempt_step(
     mission: Mission, nodes: tuple[MissionNode, ...], length: int, run: RunBlock, allowed: Allowed
 ) -> Step | Failure:
-    """A step over missions; over more than one from the third mission on.
-
-    Parameters
-    ----------
-    mission
-        The blocks.
-    nodes
-        Ends of all steps before.
-    length
-        H, missions.
-    run
-        Computes a block.
-    allowed
-        Allowed error of a step.
-    """
+    """A step over missions; over more than one from the third mission on. nodes: ends of all steps before."""
     now = nodes[-1]
     if length == 1:
-        runs = run_mission(mission, now.mission, now.depth, now.carried, run)
-        return (
-            runs
-            if isinstance(runs, Failure)
-            else Step(_node(now, 1, now.growth, runs, np.zeros_like(now.depth)), runs, 0.0)
-        )
-    formula = _Formula.of(nodes, length)
-    found = _solve(mission, now, formula, run, allowed)
-    if isinstance(found, Failure):
-        return found
-    before, runs, left = found
-    rates = np.array([each.growth for each in runs[-len(mission.blocks) :]])
-    # the last correction of the depth is shared by the blocks in proportion to their wear
-    whole, wanted = rates.sum(axis=0), (before - formula.base.sum(axis=0)) / formula.factor
-    rates = rates * np.divide(wanted, whole, out=np.ones_like(whole), where=whole > 0.0)
-    growth = formula.base + formula.factor * rates
-    end = growth.sum(axis=0) + rates.sum(axis=0)
-    error = formula.error_of(end) + left
-    node = _node(now, length, growth, runs[-len(mission.blocks) :], error, rates)
-    return Step(node, runs, float(error @ mission.area))
+        runs = run_mission(mission, now, now.mission + 1, now.depth, run)
+        if isinstance(runs, Failure):
+            return runs
+        rates = np.array([each.growth for each in runs])
+        node = _node(now, 1, now.growth + rates, rates, runs, np.zeros_like(now.depth))
+        return Step(node, _ratio_of_one(nodes, node, mission.area, allowed))
+    formula, unit = _Formula.of(nodes, length), np.eye(now.depth.size)
+    base, factor, depth = formula.base.sum(axis=0), formula.factor, formula.first
+    slope, last, area = np.zeros_like(unit), None, mission.area
+    rate_before = now.rate.sum(axis=0)
+    depth_before = now.depth - rate_before
+    for _ in range(MOST_ITERATIONS):
+        runs = run_mission(mission, now, now.mission + length, depth, run, with_slopes=last is None)
+        if isinstance(runs, Failure):
+            return runs
+        rates = np.array([each.growth for each in runs])
+        rate = rates.sum(axis=0)
+        if last is None:
+            slope = mission_slope(runs)
+        else:
+            moved, change = depth - last[0], rate - last[1]
+            slope = slope + np.outer(change - slope @ moved, moved) / max(float(moved @ moved), 1e-300)
+        last = depth, rate
+        try:
+            ahead = depth + np.linalg.solve(unit - factor * slope, base + factor * rate - depth)
+        except np.linalg.LinAlgError:
+            break
+        if not np.isfinite(ahead).all():
+            break
+        depth = np.maximum(ahead, base)
+        # the last correction of the depth is shared by the blocks in proportion to their wear
+        wanted = (depth - base) / factor
+        rates = rates * np.divide(wanted, rate, out=np.ones_like(rate), where=rate > 0.0)
+        end = depth + rates.sum(axis=0)
+        missed = np.abs(rate - rate_before - slope @ (last[0] - depth_before))
+        part = np.abs(depth - last[0]) @ area / max(float(np.abs(last[0] - depth_before) @ area), 1e-300)
+        left = factor * part * missed
+        error = formula.error_of(end) + left
+        most = allowed(float(now.depth @ area), float(end @ area), now.mission, length)
+        ratio = float(error @ area) / most
+        if ratio > 1.0 or left @ area <= DEPTH_TOLERANCE * most:
+            growth = formula.base + (factor + 1.0) * rates
+            return Step(_node(now, length, growth, rates, runs, error), ratio)
+    said = f"the depth before mission {now.mission + length}, {length} missions at once, was not found"
+    return Failure(Outcome.MARCH_FAILED, said)
+
+
+def _ratio_of_one(nodes: tuple[MissionNode, ...], end: MissionNode, area: FloatArray, allowed: Allowed) -> float:
+    """Ratio of a mission by itself, whose error is 0: from that of two missions, for the length of the next step."""
+    if len(nodes) < 3:
+        return 0.0
+    past, before, now = (node.mission for node in nodes[-3:])
+    a, b, two = float(now - before), float(before - past), _Formula.of(nodes, 2)
+    # the error grows with the third divided difference
+    growth = 2.0 * (2.0 + a) * (2.0 + a + b) / ((1.0 + a) * (1.0 + a + b))
+    error = two.share * growth * float(np.abs(end.depth - two.first) @ area)
+    most = 2.0 * allowed(float(nodes[-1].depth @ area), float(end.depth @ area), now, 1)
+    return min(0.25 * error / most, 1.0)
 
 
 @dataclass(frozen=True)
 class _Formula:
-    """The step from the nodes before: `Z = base + factor R(Z)`, by blocks (n_block, n_contact).
+    """The step from the nodes before: `Z = base + factor R(Z)`.
 
-    first: Z of the parabola through three nodes before, m.
-    ahead: its depth at the end of the step, m.
+    base (n_block, n_contact): m, by blocks.
+    first (n_contact,): Z of the parabola through three nodes before, m.
+    ahead (n_contact,): depth of this parabola at the end of the step, m.
     share: error over the difference of the end to `ahead`.
     """
 
@@ -133,7 +154,6 @@ class _Formula:
     first: FloatArray
     ahead: FloatArray
     share: float
-    length: int
 
     @classmethod
     def of(cls, nodes: tuple[MissionNode, ...], length: int) -> _Formula:
@@ -142,50 +162,15 @@ class _Formula:
         h, a, b = float(length), float(now.mission - before.mission), float(before.mission - past.mission)
         last = (now.growth - before.growth) / a
         turn = (last - (before.growth - past.growth) / b) / (a + b)
-        first, ahead = (now.growth + at * last + at * (at + a) * turn for at in (h - 1.0, h))
+        first, ahead = ((now.growth + at * last + at * (at + a) * turn).sum(axis=0) for at in (h - 1.0, h))
         whole = 2.0 * h - 1.0 + a
         base = now.growth + (h - 1.0) * h / whole * last
-        share = (h - 1.0) * (h - 1.0 + a) / (whole * (h + a + b))
         factor = (h - 1.0) * (h - 1.0 + a) / whole
-        return cls(base, factor, np.maximum(first.sum(axis=0), base.sum(axis=0)), ahead.sum(axis=0), share, length)
+        return cls(base, factor, np.maximum(first, base.sum(axis=0)), ahead, factor / (h + a + b))
 
     def error_of(self, end: FloatArray) -> FloatArray:
         """Local error (n_contact,), m, of the depth at the end of the step."""
         return np.abs(self.share * (end - self.ahead))
-
-
-def _solve(
-    mission: Mission, now: MissionNode, formula: _Formula, run: RunBlock, allowed: Allowed
-) -> tuple[FloatArray, tuple[BlockRun, ...], FloatArray] | Failure:
-    """The depth Z (n_contact,), m, all blocks that were computed, and its last correction (n_contact,), m."""
-    base, factor, depth = formula.base.sum(axis=0), formula.factor, formula.first
-    computed, slope, last = list[BlockRun](), np.zeros((base.size, base.size)), None
-    start, missions = float(now.depth @ mission.area), now.mission + formula.length - 1
-    for iteration in range(MISSIONS.step_iterations):
-        runs = run_mission(mission, missions, depth, now.carried, run, with_slopes=iteration == 0)
-        if isinstance(runs, Failure):
-            return runs
-        computed.extend(runs)
-        rate = np.sum([each.growth for each in runs], axis=0)
-        if last is None:
-            slope = mission_slope(runs)
-        else:
-            moved, change = depth - last[0], rate - last[1]
-            slope = slope + np.outer(change - slope @ moved, moved) / max(float(moved @ moved), 1e-300)
-        last = depth, rate
-        missing = base + factor * rate - depth
-        try:
-            depth = np.maximum(depth + np.linalg.solve(np.eye(base.size) - factor * slope, missing), base)
-        except np.linalg.LinAlgError:
-            break
-        if not np.isfinite(depth).all():
-            break
-        left = np.abs(depth - last[0])
-        end = float((depth + (depth - base) / factor) @ mission.area)
-        if left @ mission.area <= MISSIONS.depth_tolerance * allowed(start, end, now.mission, formula.length):
-            return depth, tuple(computed), left
-    said = f"the depth before mission {missions + 1}, {formula.length} missions at once, was not found"
-    return Failure(Outcome.MARCH_FAILED, said)
 
 
 def mission_slope(runs: tuple[BlockRun, ...]) -> FloatArray:
@@ -199,31 +184,10 @@ def mission_slope(runs: tuple[BlockRun, ...]) -> FloatArray:
 
 
 def _node(
-    now: MissionNode,
-    length: int,
-    before: FloatArray,
-    runs: tuple[BlockRun, ...],
-    error: FloatArray,
-    rates: FloatArray | None = None,
+    now: MissionNode, length: int, growth: FloatArray, rates: FloatArray, runs: tuple[BlockRun, ...], error: FloatArray
 ) -> MissionNode:
-    """The end of a step, from the depths by block before its last mission, m, and the blocks of this mission."""
-    rates = np.array([run.growth for run in runs]) if rates is None else rates
-    values = {
-        f"{name}_{end}": np.array([getattr(run, of)[row] for run in runs])
-        for name, of in (("response", "response"), ("response_peak", "peak"))
-        for row, end in enumerate(("begin", "end"))
-    }
-    values |= {name: np.array([getattr(run, name) for run in runs]) for name in ("response_error", "growth_error")}
+    """The end of a step from its growth, its last mission, (n_block, n_contact), m, and its error (n_contact,), m."""
+    known = np.array([run.growth_error for run in runs])[:, None]
     # the error of a block that wears nothing may be unknown
-    of_blocks = np.where(rates > 0.0, values["growth_error"][:, None] * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
-    return MissionNode(
-        now.mission + length,
-        before + rates,
-        rates,
-        now.local + error + length * of_blocks,
-        values,
-        tuple(run.like for run in runs if run.like is not None),
-        runs[-1].last,
-        tuple(run.frequencies for run in runs),
-        tuple(run.begun for run in runs),
-    )
+    of_blocks = np.where(rates > 0.0, known * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
+    return MissionNode(now.mission + length, growth, rates, now.local + error + length * of_blocks, runs)

@@ -13,8 +13,7 @@ from solver.continuation.options import CONTINUATION
 from solver.continuation.static_state import predicted_at_rest, solve_static_state
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, history_at_rest
-from solver.loading_history.node_resolution import choose_resolution
-from solver.loading_history.options import LOADING
+from solver.loading_history.path import FREE_STEP, choose_resolution, largest_change
 from solver.loading_history.path_of_states import Step
 from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import FloatArray, ReducedModel
@@ -52,7 +51,7 @@ class ModePath:
     @property
     def steps(self) -> tuple[float, float, float]:
         """As in Path: where a smaller ratio is needed the mode is lost; with a tenth of the step modes are equal."""
-        shortest = math.log1p(LOADING.free_step)
+        shortest = math.log1p(FREE_STEP)
         return shortest, math.log(LARGEST_STEP_RATIO), shortest
 
     @property
@@ -88,7 +87,15 @@ class ModePath:
     def change(self, before: ModeState, after: ModeState, wider: float) -> float:
         """As in Path."""
         sticks = all(bool((at.state.evaluation.status_t == STICK).all()) for at in (before, after))
-        return self.differs(before, after) / LOADING.largest_change(self.case.settings.rtol, wider, sticks=sticks)
+        return self.differs(before, after) / largest_change(self.case.settings.rtol, wider, sticks=sticks)
+
+    def rests(self, _: ModeState) -> bool:
+        """As in Path: a mode has a reference sweep from its first amplitude on."""
+        return False
+
+    def forgets(self, _: ModeState) -> bool:
+        """As in Path."""
+        return False
 
     def differs(self, before: ModeState, after: ModeState) -> float:
         """As in Path: of the vibrating predicted force per amplitude."""
@@ -139,7 +146,7 @@ class Rest:
         case, normal_force = self.problem.case, self.state.evaluation.force_h[:, 0, 0]
         limit = np.linalg.norm(friction_limit(case.friction_coefficient, normal_force))
         force = np.linalg.norm(case.joint(self.problem.mode.omega, 1.0).structure.force_h()[:, 1:])
-        return float(LOADING.free_step * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
+        return float(FREE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
 
     def raised(self, amplitude: float, run: Run) -> ModeState | None:
         """The mode at a small amplitude, m sqrt(kg), from rest; None where it is not found.

@@ -51,7 +51,7 @@ class Bordered:
         return self.at.scale
 
     def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
-        """Norm of the residual, dimensionless."""
+        """Norm of all residuals, dimensionless."""
         return float(np.hypot(self.at.scaled_residual(scale), np.linalg.norm(self.errors)))
 
 
@@ -71,30 +71,25 @@ class BorderedProblem(Protocol):
         """Fraction of a Newton step that is taken: 1 for a usual one, NaN to give up."""
 
 
-@dataclass(frozen=True)
-class BorderedStep:
-    """Newton step of all unknowns (n_rel m + k,), and the derivative `reduced` (k, k) as in `Bordered`."""
+def bordered_step(
+    problem: BorderedProblem, here: Bordered, solver: JacobianSolver, rtol: float
+) -> tuple[FloatArray, FloatArray]:
+    """Newton step of all unknowns (n_rel m + k,), and the derivative `reduced` (k, k) as in `Bordered`.
 
-    unknown: FloatArray
-    reduced: FloatArray
-
-
-def bordered_step(problem: BorderedProblem, here: Bordered, solver: JacobianSolver, rtol: float) -> BorderedStep:
-    """Newton step of a balance with further equations. rtol: relative residual of the linear solves."""
+    rtol: relative residual of the linear solves.
+    """
     tangent = here.balance.linearise(here.at)
     slopes, by_values = problem.by_values(here)
-    rights = [-here.at.residual, *(-slope for slope in slopes)]
+    rights = np.array([-here.at.residual, *(-slope for slope in slopes)])
     steps = solver.solve_all(tangent, rights, rtol)
     own, *others = (problem.by_step(here, tangent, step) for step in steps)
     reduced = by_values + np.stack(others, axis=1)
     if not np.isfinite(reduced).all():
-        return BorderedStep(np.full(here.at.residual.size + len(here.values), np.nan), reduced)
-    change = np.linalg.lstsq(reduced, -here.errors - own)[0]
-    weights = np.append(1.0, change)
-    step, right = (np.tensordot(weights, np.array(parts), 1) for parts in (steps, rights))
+        return np.full(here.at.residual.size + len(here.values), np.nan), reduced
+    change = np.asarray(np.linalg.lstsq(reduced, -here.errors - own)[0])
+    step, right = (np.tensordot(np.append(1.0, change), parts, 1) for parts in (steps, rights))
     # the steps may cancel each other, not so their errors
     left = right - tangent.apply(step)
     if np.linalg.norm(left) > rtol * np.linalg.norm(here.at.residual):
         step = step + solver.solve(tangent, left)
-    whole = np.concatenate([step.ravel(), change])
-    return BorderedStep(problem.fraction(here, step, np.asarray(change)) * whole, reduced)
+    return problem.fraction(here, step, change) * np.concatenate([step.ravel(), change]), reduced

@@ -24,14 +24,14 @@ SHORTEST_STEP = 1.0 / 128.0
 
 
 class HasResidual(Protocol):
-    """Required of an evaluation: the scales of its residual, and the residual norm over its own or given scales."""
+    """What the iteration asks of an evaluation."""
 
     @property
     def scale(self) -> tuple[float, float]:
-        """Scales of the residual, in the unit of the residual."""
+        """Scales of the residual."""
 
     def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
-        """Norm of the residual, dimensionless."""
+        """Norm of the residual over its own or given scales."""
 
 
 EvaluationT = TypeVar("EvaluationT", bound=HasResidual)
@@ -39,11 +39,9 @@ EvaluationT = TypeVar("EvaluationT", bound=HasResidual)
 
 @dataclass(frozen=True)
 class NewtonResult(Generic[EvaluationT]):
-    """End of an iteration.
+    """End of an iteration: whether it has met the tolerance, its last unknown and evaluation, number of iterations.
 
-    converged: whether the tolerance was met.
-    unknown, evaluation: last unknown and its evaluation; the ones of the lowest norm where not converged.
-    iterations: number of iterations.
+    Where it has not converged, unknown and evaluation are those of the lowest norm.
     """
 
     converged: bool
@@ -59,35 +57,19 @@ def solve_newton(
     tolerance: float,
     most_iterations: int | None = None,
 ) -> NewtonResult[EvaluationT]:
-    """Iterate `x <- x + t direction(x)` until the scaled residual is below the tolerance.
+    """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance.
 
     The residual is piecewise smooth. A full step that raises the residual often ends in the piece with the solution,
     while a line search takes very short steps at every kink. So full steps come first, as long as the lowest norm is
     improved once in `FULL_STEPS` iterations. Then the iteration returns to the best point and halves its steps
     until the norm decreases.
 
-    Parameters
-    ----------
-    evaluate : callable
-        Evaluation at an unknown (any shape).
-    direction : callable
-        Newton step, of the shape of the unknown, from an evaluation.
-    start : array
-        Unknown to begin with.
-    tolerance : float
-        Tolerance of the scaled residual, dimensionless.
-    most_iterations : int, optional
-        `MOST_ITERATIONS` by default.
-
-    Returns
-    -------
-    NewtonResult
-        Where the tolerance is not met, the point of the lowest norm.
+    direction: Newton step, of the shape of the unknown. most_iterations: `MOST_ITERATIONS` by default.
     """
     most = MOST_ITERATIONS if most_iterations is None else most_iterations
     unknown, current = start, evaluate(start)
     best, best_norm, since_best = (unknown, current), np.inf, 0
-    cutting, shortest = False, SHORTEST_STEP
+    cutting = False
     for iteration in range(most + 1):
         norm = current.scaled_residual()
         if norm <= tolerance:
@@ -105,10 +87,10 @@ def solve_newton(
         if not np.all(np.isfinite(step)):
             break
         length, trial = 1.0, evaluate(unknown + step)
-        while cutting and not trial.scaled_residual(current.scale) < current.scaled_residual() and length > shortest:
+        while cutting and not trial.scaled_residual(current.scale) < current.scaled_residual():
             length *= 0.5
+            if length <= SHORTEST_STEP:
+                return NewtonResult(False, *best, most)
             trial = evaluate(unknown + length * step)
-        if cutting and length <= shortest:
-            break
         unknown, current = unknown + length * step, trial
     return NewtonResult(False, *best, most)

@@ -8,7 +8,6 @@ operator: `solve_gmres` then stops at stagnation, with the least-squares solutio
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -32,22 +31,18 @@ NO_DIRECTION = 1e-11
 """Fraction of a vector, or of a slipping pair: less is no new direction. Double precision has 2e-16."""
 
 Product = Callable[[FloatArray], FloatArray]
+"""An operator applied to a vector (n,)."""
 
 
 def solve_gmres(
-    product: Product,
-    right: FloatArray,
-    rtol: float,
-    restart: int,
-    cycles: float = np.inf,
-    exact: Product | None = None,
+    product: Product, exact: Product, right: FloatArray, rtol: float, restart: int, cycles: float
 ) -> tuple[FloatArray, bool]:
-    """Solve `exact(x) = right` by restarted GMRES from zero.
+    """Solve `exact(x) = right` (n,) by restarted GMRES from zero; returns x and whether it has converged.
 
     Parameters
     ----------
-    product : callable
-        The operator applied to a vector (n,), with small errors allowed.
+    product, exact : callable
+        The operator, with small errors allowed in `product`; `exact` is applied once in a cycle.
     right : array (n,)
         Right-hand side.
     rtol : float
@@ -55,55 +50,34 @@ def solve_gmres(
     restart : int
         Most products of one cycle.
     cycles : float
-        Most cycles; by default until stagnation. A cycle that converges with inexact products only does not count.
-    exact : callable, optional
-        The exact operator, `product` by default; applied once in a cycle.
-
-    Returns
-    -------
-    solution : array (n,)
-    converged : bool
-        Whether the relative residual is below rtol.
+        Most cycles before stagnation. A cycle that converges with inexact products only does not count.
     """
     solution, residual = np.zeros_like(right), right
     size = float(np.linalg.norm(right))
     norms = [size]
-    restart = min(restart, right.size)
-    while cycles > 0:
-        if not (np.isfinite(norms[-1]) and norms[-1] > rtol * size):
-            break
-        cycle = _cycle(product, residual, norms, rtol * size, restart)
-        n_columns = len(cycle.triangle)
-        if n_columns == 0:
+    while cycles > 0 and np.isfinite(norms[-1]) and norms[-1] > rtol * size:
+        basis, triangle, projected = _cycle(product, residual, norms, rtol * size, min(restart, right.size))
+        if not len(triangle):
             break
         # without convergence, directions of the null space would only make the solution large
         least = 0.0 if norms[-1] <= rtol * size else NEGLIGIBLE
-        weights = np.linalg.lstsq(cycle.triangle, cycle.projected, rcond=least)[0]
-        solution = solution + weights @ cycle.basis[:n_columns]
+        solution = solution + np.linalg.lstsq(triangle, projected, rcond=least)[0] @ basis
         cycles -= norms[-1] > rtol * size
-        residual = right - (exact or product)(solution)
+        residual = right - exact(solution)
         norms[-1] = float(np.linalg.norm(residual))
         if _stagnates(norms):
             break
     return solution, norms[-1] <= rtol * size
 
 
-@dataclass(frozen=True)
-class _Cycle:
-    """One cycle of GMRES after k products.
+def _cycle(
+    product: Product, residual: FloatArray, norms: list[float], wanted: float, most: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Products, k of them and at most `most`, until the norm of the residual is `wanted`.
 
-    - basis (k + 1, n): orthonormal.
-    - triangle (k, k): triangular factor of the Hessenberg matrix.
-    - projected (k,): first residual on the basis, after the Givens rotations to this factor.
+    The norms are appended to `norms`. Returns an orthonormal basis (k, n), the triangular factor (k, k) of the
+    Hessenberg matrix, and the first residual (k,) on the basis after the Givens rotations to this factor.
     """
-
-    basis: FloatArray
-    triangle: FloatArray
-    projected: FloatArray
-
-
-def _cycle(product: Product, residual: FloatArray, norms: list[float], wanted: float, most: int) -> _Cycle:
-    """Products until the norm of the residual is `wanted`, at most `most`; the norms are appended to `norms`."""
     basis = np.empty((most + 1, residual.size))
     triangle, rotations, projected = np.zeros((most, most)), np.zeros((most, 2)), np.zeros(most + 1)
     basis[0] = residual / norms[-1]
@@ -120,9 +94,12 @@ def _cycle(product: Product, residual: FloatArray, norms: list[float], wanted: f
         norms.append(abs(float(projected[k])))
         if norms[-1] <= wanted or _stagnates(norms):
             break
-    if lost:
-        basis[k] = 0.0
-    return _Cycle(basis[: k + 1], triangle[:k, :k], projected[:k])
+    return basis[:k], triangle[:k, :k], projected[:k]
+
+
+def _stagnates(norms: list[float]) -> bool:
+    """Whether the residual norm has not been halved over the last products."""
+    return len(norms) > STAGNATION_PRODUCTS and norms[-1] > 0.5 * norms[-1 - STAGNATION_PRODUCTS]
 
 
 def ritz_values(
@@ -133,7 +110,7 @@ def ritz_values(
     Parameters
     ----------
     product : callable
-        The operator applied to a vector (n,).
+        The operator.
     start : array (n,)
         First vector.
     most : int
@@ -154,13 +131,11 @@ def ritz_values(
     basis[0] = start / np.linalg.norm(start)
     values, residuals = np.empty(0, complex), np.empty(0)
     for k in range(1, size + 1):
-        projected[: k + 1, k - 1], lost = extend_basis(
-            basis, k - 1, np.ascontiguousarray(product(basis[k - 1])), NO_DIRECTION
-        )
+        image = np.ascontiguousarray(product(basis[k - 1]))
+        projected[: k + 1, k - 1], lost = extend_basis(basis, k - 1, image, NO_DIRECTION)
         if not np.all(np.isfinite(projected)):
             return np.full(k, np.nan, complex), np.full(k, np.nan)
-        look = enough is not None and k % SIGN_PRODUCTS == 0
-        if not (lost or look or k == size):
+        if not (lost or k == size or (enough is not None and k % SIGN_PRODUCTS == 0)):
             continue
         found, vectors = np.linalg.eig(projected[:k, :k])
         values, residuals = found.astype(complex), (0.0 if lost else projected[k, k - 1]) * np.abs(vectors[-1])
@@ -207,9 +182,3 @@ def rotate_column(column: FloatArray, rotations: FloatArray, k: int) -> bool:
     rotations[k, 0], rotations[k, 1] = column[k] / length, column[k + 1] / length
     column[k], column[k + 1] = length, 0.0
     return True
-
-
-def _stagnates(norms: list[float]) -> bool:
-    """Whether the residual norm has not been halved over the last products."""
-    products = STAGNATION_PRODUCTS
-    return len(norms) > products and norms[-1] > 0.5 * norms[-1 - products]

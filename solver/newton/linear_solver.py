@@ -6,17 +6,16 @@ preconditioner.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import cast
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from solver.harmonic_balance.dlft import Linearisation
-from solver.model import ComplexArray, FloatArray, IntArray
+from solver.model import ComplexArray, FloatArray
 from solver.newton.krylov import MOST_PRODUCTS, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
-from solver.newton.slip_preconditioner import SlipFactor, build_slip_factor, largest_directions
+from solver.newton.slip_preconditioner import SlipFactor, build_slip_factor
 
 FORCING = 1e-3
 """Relative residual of a Newton direction: an iteration gains up to three digits. With half and twice this value the
@@ -45,11 +44,6 @@ SMALL_JOINT = 40
 and directions, and products with any other factorisation are in vain (three pairs with 115 harmonics,
 `tests/solver/test_refinement.py`)."""
 
-MOST_DIRECTIONS = 2500
-"""Most directions of a factorisation in the slip space, 0.4 s. For the sign of a determinant that is not certain
-otherwise, and for sliding masses, to which the march does not apply."""
-
-
 Factor = SlipFactor | PeriodFactor
 """A factorisation of a Jacobian or of a matrix near the Jacobian; each gives the sign of its determinant."""
 
@@ -57,51 +51,64 @@ Factor = SlipFactor | PeriodFactor
 def build_factor(tangent: Linearisation) -> Factor:
     """A march through the period, or the slip space for small joints, masses, and where a sample is singular."""
     small = tangent.joint.component_index.size <= SMALL_JOINT
-    march = None if small else build_period_factor(tangent)
-    return march or build_slip_factor(tangent, largest_directions(tangent, MOST_DIRECTIONS))
+    return (None if small else build_period_factor(tangent)) or build_slip_factor(tangent)
 
 
 @dataclass
 class JacobianSolver:
     """Solver of systems with a `Linearisation` that keeps one factorisation between its calls."""
 
-    _factor: Factor | None = field(default=None, repr=False)
+    _factor: Factor | None = None
 
     def solve(self, tangent: Linearisation, right: FloatArray, rtol: float = FORCING) -> FloatArray:
         """Step (n_rel, m) with Jacobian times step = right (n_rel, m), N, to the relative residual `rtol`."""
-        m = right.shape[1]
-        pairs = tangent.active()
-        rows = tangent.joint.rows_of(pairs)
-        step = np.zeros_like(right)
-        if rows.size:
-            if rows.size * m <= DENSE_UNKNOWNS:
-                step[rows] = _solve_dense(tangent.dense(pairs), right[rows].ravel()).reshape(rows.size, m)
-            else:
-                step[rows] = self._solve_kept(tangent, right, rtol)[rows]
-        # the columns of all other unknowns are those of the identity
-        rest = np.ones(right.shape[0], bool)
-        rest[rows] = False
-        step[rest] = (right - tangent.apply_roughly(step))[rest]
-        return step
+        return np.asarray(self.solve_all(tangent, [right], rtol)[0])
 
     def solve_all(
         self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
-    ) -> list[FloatArray]:
-        """Steps (n_rel, m) for several right-hand sides; a small system is factorised once."""
-        if not _is_dense(tangent, rights[0].shape[1]):
-            return [self.solve(tangent, right, rtol) for right in rights]
-        pairs = tangent.active()
-        rows = tangent.joint.rows_of(pairs)
-        solved = _solve_dense(tangent.dense(pairs), np.stack([right[rows].ravel() for right in rights], axis=1))
-        steps = []
-        for right, column in zip(rights, solved.T, strict=True):
-            step = np.zeros_like(right)
-            step[rows] = column.reshape(rows.size, -1)
-            rest = np.ones(right.shape[0], bool)
-            rest[rows] = False
+    ) -> FloatArray:
+        """Steps (k, n_rel, m) for k right-hand sides; a small system is factorised once."""
+        rows, rest = tangent.active_rows, tangent.passive_rows
+        steps = np.zeros((len(rights), *rights[0].shape))
+        if 0 < rows.size * steps.shape[2] <= DENSE_UNKNOWNS:
+            wanted = np.stack([right[rows].ravel() for right in rights], axis=1)
+            steps[:, rows] = _solve_dense(tangent.dense(tangent.active), wanted).T.reshape(len(rights), rows.size, -1)
+        elif rows.size:
+            for step, right in zip(steps, rights, strict=True):
+                step[rows] = self._solve_kept(tangent, right, rtol)[rows]
+        for step, right in zip(steps, rights, strict=True) if rest.size else ():
+            # the columns of all other unknowns are those of the identity
             step[rest] = (right - tangent.apply_roughly(step))[rest]
-            steps.append(step)
         return steps
+
+    def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
+        """Solution (n_rel, m) in the rows of the active pairs, with the kept factorisation while products are few."""
+        wanted = _cleared(tangent, right.copy())
+
+        def inverse(factor: Factor, vector: FloatArray) -> FloatArray:
+            return _cleared(tangent, factor.solve(vector.reshape(right.shape)))
+
+        def iterate(factor: Factor, products: int, cycles: float) -> tuple[FloatArray, bool]:
+            def of(apply: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:
+                return lambda vector: _cleared(tangent, apply(inverse(factor, vector))).ravel()
+
+            # preconditioned from the right: the residual of GMRES is the true one
+            operators = of(tangent.apply_roughly), of(tangent.apply)
+            solution, found = solve_gmres(*operators, wanted.ravel(), rtol, products, cycles)
+            return inverse(factor, solution), found
+
+        if self._factor is not None:
+            solution, found = iterate(self._factor, KEPT_PRODUCTS, 1)
+            if found:
+                return solution
+        self._factor = factor = build_factor(tangent)
+        if not factor.exact:
+            # convergence is not required: Newton's method judges by the true residual
+            return iterate(factor, MOST_PRODUCTS, np.inf)[0]
+        first = inverse(factor, wanted)
+        # corrects for the shift of neutral directions
+        second = first + inverse(factor, wanted - _cleared(tangent, tangent.apply(first)))
+        return second if np.all(np.isfinite(second)) else first
 
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
@@ -113,90 +120,38 @@ class JacobianSolver:
         """
         kept = self._factor
         if kept is not None and not kept.exact:
-            sign, settled = self._judge(kept, tangent)
+            sign, settled = _judge(kept, tangent)
             if settled:
                 return sign
         self._factor = factor = build_factor(tangent)
         if factor.exact:
             return factor.sign
-        sign, settled = self._judge(factor, tangent)
-        if not settled:
-            whole = largest_directions(tangent, MOST_DIRECTIONS)
-            sign = build_slip_factor(tangent, whole).sign if whole.exact else sign
-        return sign
-
-    def _judge(self, factor: Factor, tangent: Linearisation) -> tuple[float, bool]:
-        """Sign of the determinant from outlying eigenvalues of J P^-1, and whether these eigenvalues have converged."""
-        shape = tangent.joint.component_index.size, tangent.joint.basis.synthesis.shape[0]
-
-        def product(vector: FloatArray) -> FloatArray:
-            return tangent.apply_roughly(factor.solve(vector.reshape(shape))).ravel()
-
-        # a fixed start: the result must not depend on earlier computations
-        start = np.random.default_rng(0).normal(size=shape[0] * shape[1])
-        values, residuals = ritz_values(product, start, MOST_PRODUCTS, _settled)
-        # complex eigenvalues come in conjugate pairs and do not change the sign
-        negative = np.count_nonzero((values.real < 0.0) & (values.imag == 0.0))
-        return factor.sign * float((-1) ** negative), _settled(values, residuals)
-
-    def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
-        """Solution (n_rel, m) in the rows of the active pairs, with the kept factorisation while products are few."""
-        if self._factor is not None:
-            solution, found = self._iterate(self._factor, tangent, right, rtol, KEPT_PRODUCTS, 1)
-            if found:
-                return solution
-        self._factor = factor = build_factor(tangent)
-        if factor.exact:
-            return self._solve_exactly(factor, tangent, right)
-        # convergence is not required: Newton's method judges by the true residual
-        return self._iterate(factor, tangent, right, rtol, MOST_PRODUCTS, np.inf)[0]
-
-    def _solve_exactly(self, factor: Factor, tangent: Linearisation, right: FloatArray) -> FloatArray:
-        """Solution by a factorisation of this Jacobian; a second solve corrects for the shift of neutral directions."""
-        rest = _passive_rows(tangent)
-        right = right.copy()
-        right[rest] = 0.0
-        first = factor.solve(right)
-        # the rows of all other pairs follow from the rows of the active ones
-        first[rest] = 0.0
-        left = right - tangent.apply(first)
-        left[rest] = 0.0
-        solution = first + factor.solve(left)
-        return solution if np.all(np.isfinite(solution)) else first
-
-    def _iterate(
-        self, factor: Factor, tangent: Linearisation, right: FloatArray, rtol: float, products: int, cycles: float
-    ) -> tuple[FloatArray, bool]:
-        """Solution (n_rel, m) by GMRES in the rows of the active pairs, and whether it was found."""
-        rest = _passive_rows(tangent)
-
-        def precondition(vector: FloatArray) -> FloatArray:
-            solved = factor.solve(vector.reshape(right.shape))
-            solved[rest] = 0.0
-            return solved
-
-        def product(vector: FloatArray) -> FloatArray:
-            image = tangent.apply_roughly(precondition(vector))
-            image[rest] = 0.0
-            return image.ravel()
-
-        def exact(vector: FloatArray) -> FloatArray:
-            image = tangent.apply(precondition(vector))
-            image[rest] = 0.0
-            return image.ravel()
-
-        wanted = right.copy()
-        wanted[rest] = 0.0
-        # preconditioned from the right: the residual of GMRES is the true one
-        solution, found = solve_gmres(product, wanted.ravel(), rtol, products, cycles, exact)
-        return precondition(solution), found
+        sign, settled = _judge(factor, tangent)
+        if settled:
+            return sign
+        whole = build_slip_factor(tangent)
+        return whole.sign if whole.exact else sign
 
 
-def _passive_rows(tangent: Linearisation) -> IntArray:
-    """Rows of the pairs that are not active: the columns of their unknowns are those of the identity."""
-    active = np.zeros(tangent.joint.contact.n_contact, bool)
-    active[tangent.active()] = True
-    return np.flatnonzero(~active[tangent.joint.component_index // 3])
+def _cleared(tangent: Linearisation, values: FloatArray) -> FloatArray:
+    """Values (n_rel, m), zero in the rows of the pairs that are not active, in place."""
+    values[tangent.passive_rows] = 0.0
+    return values
+
+
+def _judge(factor: Factor, tangent: Linearisation) -> tuple[float, bool]:
+    """Sign of the determinant from outlying eigenvalues of J P^-1, and whether these eigenvalues have converged."""
+    shape = tangent.joint.component_index.size, tangent.joint.basis.synthesis.shape[0]
+
+    def product(vector: FloatArray) -> FloatArray:
+        return tangent.apply_roughly(factor.solve(vector.reshape(shape))).ravel()
+
+    # a fixed start: the result must not depend on earlier computations
+    start = np.random.default_rng(0).normal(size=shape[0] * shape[1])
+    values, residuals = ritz_values(product, start, MOST_PRODUCTS, _settled)
+    # complex eigenvalues come in conjugate pairs and do not change the sign
+    negative = np.count_nonzero((values.real < 0.0) & (values.imag == 0.0))
+    return factor.sign * float((-1) ** negative), _settled(values, residuals)
 
 
 def _settled(values: ComplexArray, residuals: FloatArray) -> bool:
@@ -205,19 +160,9 @@ def _settled(values: ComplexArray, residuals: FloatArray) -> bool:
     return bool(np.all((residuals < SETTLED * np.abs(values))[doubtful]))
 
 
-def _is_dense(tangent: Linearisation, m: int) -> bool:
-    """Whether the rows of the active pairs, times m unknowns, are few enough for a dense factorisation."""
-    rows = tangent.joint.rows_of(tangent.active()).size
-    return 0 < rows * m <= DENSE_UNKNOWNS
-
-
-def _solve_dense(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Solution of a small system; for a singular matrix the shortest least-squares solution.
-
-    Newton's method goes on and judges by the residual.
-    """
+def _solve_dense(matrix: FloatArray, rights: FloatArray) -> FloatArray:
+    """Solutions (n, k) of a small system; the shortest least-squares ones where it is singular."""
     try:
-        solution = cast("FloatArray", np.linalg.solve(matrix, right))
+        return np.asarray(np.linalg.solve(matrix, rights))
     except np.linalg.LinAlgError:
-        solution = cast("FloatArray", np.linalg.lstsq(matrix, right)[0])
-    return solution
+        return np.asarray(np.linalg.lstsq(matrix, rights)[0])

@@ -26,7 +26,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import cast
 
 import numpy as np
 from numba import njit
@@ -36,7 +35,6 @@ from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
-from solver.structure.identity import Identity
 from solver.structure.joint import Joint
 from solver.structure.rough_forms import SingleArray
 
@@ -50,29 +48,29 @@ class PeriodFactor:
 
     joint, basis: the joint, and the Fourier basis of the N samples.
     pairs (n,): indices of these pairs.
+    coupling (n_rel, 3n): `Z / eps - 1`; columns of displacements that a pair does not have are zero.
     own (N, n, 3, 3): A.
     carried (N, n, 2, 2): B.
-    coupling (n_rel, 3n): `Z / eps - 1`; columns of displacements that a pair does not have are zero.
     row (k,): nonzero rows of A, sample by sample, as `3 place + component` with the place among `pairs`.
     first (N + 1,): index in `row` of the first row of each sample.
     swept (2 n k,): `A (Z / eps - 1)` in these rows and the tangential columns.
     inverse: inverses of `1 + A (Z / eps - 1)` in these rows and columns, sample by sample.
     inverse_first (N + 1,): index in `inverse` of the first value of each sample.
-    exact: False, for this factor is an approximation.
     """
 
     joint: Joint
     basis: FourierBasis
     pairs: IntArray
+    coupling: FloatArray
     own: FloatArray
     carried: FloatArray
-    coupling: FloatArray
     row: IntArray
     first: IntArray
     swept: SingleArray
     inverse: SingleArray
     inverse_first: IntArray
-    exact: bool = False
+
+    exact = False
 
     @property
     def sign(self) -> float:
@@ -100,35 +98,28 @@ class PeriodFactor:
         return right - self.coupling @ (state_t.T @ self.basis.analysis)
 
 
-def fewest_samples(basis: FourierBasis) -> int:
-    """Samples of the march: the fewest that resolve the harmonics, for every sample costs a system."""
-    n_samples, highest = basis.n_samples, max(basis.orders, default=0)
-    while n_samples % 2 == 0 and n_samples // 2 > 2 * highest:
-        n_samples //= 2
-    return n_samples
-
-
 def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     """March of a Jacobian; None for pairs with sliding masses, or where the system of a sample is singular."""
-    joint = tangent.joint
-    if joint.penalty.inertial.any():
+    joint, at = tangent.joint, tangent.at
+    if joint.law.rate_dependent:
         return None
-    n_samples = fewest_samples(joint.basis)
-    at, stride = tangent.at, joint.basis.n_samples // n_samples
+    # the fewest samples that resolve the harmonics, for every sample costs a system
+    n_samples, highest = joint.basis.n_samples, max(joint.basis.orders, default=0)
+    while n_samples % 2 == 0 and n_samples // 2 > 2 * highest:
+        n_samples //= 2
+    stride = joint.basis.n_samples // n_samples
     own, carried = sample_tangents(
         at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.contact.has_normal, stride
     )
     pairs = np.flatnonzero(own.any(axis=(0, 2, 3)))
     own, carried = np.ascontiguousarray(own[:, pairs]), np.ascontiguousarray(carried[:, pairs])
-    size, components = joint.component_index.size, (3 * pairs[:, None] + np.arange(3)).ravel()
-    whole = np.zeros((size, 3 * joint.contact.n_contact))
-    whole[:, joint.component_index] = stiffness_of_most(joint) / joint.relative_penalty
-    whole[np.arange(size), joint.component_index] -= 1.0
-    coupling = np.ascontiguousarray(whole[:, components])
-    # rows of displacements that a pair does not have are zero, like the columns
-    square = np.zeros((3 * joint.contact.n_contact, components.size))
-    square[joint.component_index] = coupling
-    blocks = square[components].reshape(pairs.size, 3, components.size)
+    components = (3 * pairs[:, None] + np.arange(3)).ravel()
+    # rows and columns of displacements that a pair does not have are zero
+    square = np.zeros((3 * joint.contact.n_contact, 3 * joint.contact.n_contact))
+    square[np.ix_(joint.component_index, joint.component_index)] = stiffness_of_most(
+        joint.structure
+    ) / joint.relative_penalty - np.eye(joint.component_index.size)
+    blocks = square[np.ix_(components, components)].reshape(pairs.size, 3, components.size)
     tangential = np.flatnonzero(np.arange(components.size) % 3)
     rows, swept, inverse = [], [], []
     for sample in own:
@@ -145,22 +136,17 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
         rows.append(row)
     sizes = np.array([row.size for row in rows])
     first, inverse_first = (np.concatenate([[0], np.cumsum(part)]) for part in (sizes, sizes**2))
-    basis = build_basis(joint.basis.orders, n_samples)
-    flat = (np.concatenate(part) for part in (rows, swept, inverse))
-    row, all_swept, all_inverse = flat
-    return PeriodFactor(joint, basis, pairs, own, carried, coupling, row, first, all_swept, all_inverse, inverse_first)
-
-
-def stiffness_of_most(joint: Joint) -> FloatArray:
-    """Real stiffness (n_rel, n_rel), N/m: median of all harmonics, which ignores those near a resonance."""
-    return _stiffness_of_most(Identity(joint.structure))
+    all_rows, all_swept, all_inverse = np.concatenate(rows), np.concatenate(swept), np.concatenate(inverse)
+    coupling = np.ascontiguousarray(square[np.ix_(joint.component_index, components)])
+    march = own, carried, all_rows, first, all_swept, all_inverse, inverse_first
+    return PeriodFactor(joint, build_basis(joint.basis.orders, n_samples), pairs, coupling, *march)
 
 
 # the marches of one history need the stiffness of a few structures only
 @lru_cache(maxsize=KEPT_STRUCTURES)
-def _stiffness_of_most(of: Identity) -> FloatArray:
-    structure = cast("CondensedStructure", of.objects[0])
-    moving = (structure.moving.matrix(place).real for place in range(structure.n_harmonics))
+def stiffness_of_most(structure: CondensedStructure) -> FloatArray:
+    """Real stiffness (n_rel, n_rel), N/m: median of all harmonics, which ignores those near a resonance."""
+    moving = (structure.moving.matrix(place).real for place in range(len(structure.dynamic_response)))
     stacked = np.stack([structure.static_stiffness, *moving])
     return np.asarray(np.median(stacked, axis=0, overwrite_input=True))
 
@@ -177,21 +163,9 @@ def march_samples(
     inverse_first: IntArray,
     periods: int,
 ) -> FloatArray:
-    """March through the samples of some periods, from a state without change.
+    """Changes of the state (N, 3n) in the last of some periods, from a state without change.
 
-    Parameters
-    ----------
-    right_t : array (N, 3n)
-        Right-hand sides at the pairs of the march.
-    own, carried, row, first, swept, inverse, inverse_first : array
-        As in `PeriodFactor`.
-    periods : int
-        Number of periods; the result is that of the last one.
-
-    Returns
-    -------
-    array (N, 3n)
-        Changes of the state.
+    right_t (N, 3n): right-hand sides at the pairs of the march. All other arrays as in `PeriodFactor`.
     """
     n_samples, size = right_t.shape
     n_pairs = size // 3

@@ -54,7 +54,7 @@ class Budget:
 
 @dataclass
 class Run:
-    """Solves of one computation, one after the other.
+    """Solves of one computation, one after the other. Each raises OutOfTimeError after the deadline of the budget.
 
     tolerance: of the scaled residual, dimensionless.
     budget: shared by all parts of the computation.
@@ -76,24 +76,12 @@ class Run:
     def solve(self, balance: Balance, start: FloatArray, most: int | None = None) -> NewtonResult[Evaluation]:
         """Solve Eq. (8), with an implicit step Eq. (26), by Newton's method on the exact Jacobian, Eq. (16).
 
-        Parameters
-        ----------
-        balance : Balance
-            The problem.
-        start : array (n_rel, 2H+1)
-            First predicted force, N.
-        most : int, optional
-            Most iterations, `MOST_ITERATIONS` by default.
-
-        Raises
-        ------
-        OutOfTimeError
-            After the deadline of the budget.
+        start (n_rel, 2H+1): first predicted force, N. most: iterations, `MOST_ITERATIONS` by default.
         """
 
         def direction(at: Evaluation) -> FloatArray:
             self.budget.check_time()
-            return self.solver.solve(balance.linearise(at), -at.residual, self._forcing(at.scaled_residual()))
+            return self.step(balance, at, -at.residual, self._forcing(at.scaled_residual()))
 
         end = solve_newton(balance.evaluate, direction, start, self.tolerance, most)
         self.budget.iterations += end.iterations
@@ -109,16 +97,9 @@ class Run:
     def solve_bordered(
         self, problem: BorderedProblem, start: FloatArray, values: FloatArray, most: int | None = None
     ) -> Bordered | None:
-        """Solve a balance with further unknowns and as many further equations; None where Newton's method fails.
+        """Solve a balance with k further unknowns and equations, as `solve`; None where Newton's method fails.
 
-        Parameters
-        ----------
-        problem
-            The balance and the further equations.
-        start, most
-            As in `solve`.
-        values : array (k,)
-            First values of the further unknowns.
+        values (k,): first values of the further unknowns.
         """
         size, last = start.size, None
 
@@ -128,9 +109,8 @@ class Run:
         def direction(here: Bordered) -> FloatArray:
             nonlocal last
             self.budget.check_time()
-            step = bordered_step(problem, here, self.solver, self._forcing(here.scaled_residual()))
-            last = step.reduced
-            return step.unknown
+            step, last = bordered_step(problem, here, self.solver, self._forcing(here.scaled_residual()))
+            return step
 
         end = solve_newton(evaluate, direction, np.concatenate([start.ravel(), values]), self.tolerance, most)
         self.budget.iterations += end.iterations

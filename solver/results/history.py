@@ -103,7 +103,7 @@ class WearHistory(PresentedHistory):
     - harmonics_used, samples_used (n_output,): int, 0 where there is no state.
     - run_time: CPU seconds of the computing thread, start state included.
     - branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
-    - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.step_limit`); inf if
+    - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.rate_slope`); inf if
       there is no limit.
     - final_method: method by which the scheme "final" has found the final state: "active_set" or "march"; empty for the
       other schemes. A final state of an active set has the count inf, and no state between the unworn one and the

@@ -68,8 +68,7 @@ def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> s
     if not math.isfinite(other):
         return f"worn volume {volume:.3g} mm3, {known}: {coarser} the history does not go so far"
     if abs(volume - other) < 0.5 * error * volume:
-        where = "where other pairs wear, or by other values on the way"
-        return f"worn volume {volume:.3g} mm3, {known}: {other:.3g} mm3 {coarser}, {where}"
+        return f"worn volume {volume:.3g} mm3, {known}: {other:.3g} mm3 {coarser}, but worn at other pairs or counts"
     return f"worn volume {volume:.3g} mm3, but {other:.3g} mm3 {coarser}: {known}"
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 from scipy.linalg import eigvals
@@ -33,7 +33,6 @@ from solver.outcome import Outcome
 from solver.settings import ROUND_OFF, Resolution, all_orders, samples_for
 from solver.stability.hill import hill_multipliers, hill_size
 from solver.stability.monodromy import Monodromy, build_monodromy, switching_pairs
-from solver.structure.identity import Identity
 from solver.structure.joint import Case, Joint
 
 SMALL_SAMPLES = 512
@@ -301,14 +300,13 @@ def _growing_exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:
     moves (n,): False for displacements that do not move. The result is empty where mass, damping and stiffness are all
     positive semidefinite: such a structure only loses energy.
     """
-    if _is_passive(Identity(linear)):
+    if _is_passive(linear):
         return np.empty(0, complex)
-    return _growing(Identity(linear), moves.tobytes())
+    return _growing(linear, moves.tobytes())
 
 
 @lru_cache(maxsize=4)
-def _is_passive(of: Identity) -> bool:
-    linear = cast("LinearModel", of.objects[0])
+def _is_passive(linear: LinearModel) -> bool:
     return all(_is_semidefinite(part) for part in (linear.mass, linear.damping, linear.stiffness))
 
 
@@ -322,8 +320,8 @@ def _is_semidefinite(matrix: Matrix) -> bool:
 
 
 @lru_cache(maxsize=4)
-def _growing(of: Identity, moves: bytes) -> ComplexArray:
-    found = _exponents(cast("LinearModel", of.objects[0]), np.frombuffer(moves, bool))
+def _growing(linear: LinearModel, moves: bytes) -> ComplexArray:
+    found = _exponents(linear, np.frombuffer(moves, bool))
     # round-off of a fast vibration is no growth
     growing: ComplexArray = found[found.real > found.size * _EPS * np.abs(found).max(initial=0.0)]
     return growing

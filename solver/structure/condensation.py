@@ -11,8 +11,7 @@ import numpy as np
 
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.structure.fourier import from_complex, to_complex
-from solver.structure.harmonic_stiffness import DenseStiffness, HarmonicStiffness, share_matrices
-from solver.structure.identity import Identity
+from solver.structure.harmonic_stiffness import DenseStiffness, HarmonicStiffness, SharedStiffness
 from solver.structure.rough_forms import multiply_roughly
 
 DENSE_BYTES = 2e6
@@ -24,7 +23,7 @@ KEPT_STRUCTURES = 8
 errors uses six. Does not change results."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CondensedStructure:
     """`Z_r u + lambda = F_r` for each harmonic, Eq. (8), and the responses as functions of u.
 
@@ -53,25 +52,19 @@ class CondensedStructure:
 
     @property
     def dynamic_stiffness(self) -> ComplexArray:
-        """Stiffness (H, n_rel, n_rel), N/m, at the harmonics above the static one."""
+        """Z_r (H, n_rel, n_rel), N/m, at the harmonics above the static one."""
         return self.moving.dense
-
-    @property
-    def n_harmonics(self) -> int:
-        """Number H of harmonics above the static one."""
-        return len(self.dynamic_response)
 
     def force_h(self) -> FloatArray:
         """Reduced force F_r of Eq. (8), (n_rel, 2H+1), N."""
-        amplitudes = np.zeros((self.static_force.size, self.n_harmonics), complex)
+        amplitudes = np.zeros((self.static_force.size, len(self.dynamic_response)), complex)
         if amplitudes.shape[1]:
             amplitudes[:, 0] = self.harmonic_force
         return from_complex(self.static_force, amplitudes)
 
     def apply(self, displacement_h: FloatArray) -> FloatArray:
         """`Z_r u` of Eq. (8), N, (n_rel, 2H+1) from u (n_rel, 2H+1), m."""
-        force = self.moving.apply(displacement_h)
-        return from_complex(self.static_stiffness @ displacement_h[:, 0], force)
+        return from_complex(self.static_stiffness @ displacement_h[:, 0], self.moving.apply(displacement_h))
 
     def apply_roughly(self, displacement_h: FloatArray) -> FloatArray:
         """`Z_r u` to at least three digits in less time, for directions of Newton's method."""
@@ -88,7 +81,7 @@ class CondensedStructure:
 
     def input_work(self, displacement_h: FloatArray) -> float:
         """Work of the excitation over a period, N m, from u (n_rel, 2H+1), m."""
-        if not self.n_harmonics:
+        if not len(self.dynamic_response):
             return 0.0
         return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
 
@@ -114,17 +107,18 @@ def build_structure(
     # bytes that a product with a `SharedStiffness` reads: many where much lies behind the joint
     shared_bytes = 24 * (2 * n - n_rel) * n_rel + 16 * len(orders) * (n - n_rel) ** 2
     shares = 16 * len(orders) * n_rel**2 > max(DENSE_BYTES, shared_bytes)
-    if shares and first is still and _is_real(still) and not model.nodal_diameter:
+    real = not any(np.iscomplexobj(part) for part in (still.mass, still.damping, still.stiffness, still.response))
+    if shares and first is still and real and not model.nodal_diameter:
         moving = _condense_shared(still, relative, omega * np.array(orders, np.float64), excitation_amplitude)
     else:
         moving = _condense_each(model, relative, omega, excitation_amplitude, orders)
-    return CondensedStructure(**_static(Identity(still), tuple(relative.tolist())), **moving)
+    return CondensedStructure(**_static(still, tuple(relative.tolist())), **moving)
 
 
 @lru_cache(maxsize=2)
-def _static(structure: Identity, relative: tuple[int, ...]) -> dict[str, Any]:
+def _static(linear: LinearModel, relative: tuple[int, ...]) -> dict[str, Any]:
     """The static attributes of a `CondensedStructure`, which are the same at all frequencies."""
-    linear, chosen = cast("LinearModel", structure.objects[0]), np.array(relative, np.intp)
+    chosen = np.array(relative, np.intp)
     found = condense(np.real(linear.stiffness), chosen, linear.load_static)
     rows = np.real(linear.response)[:, relative_first(len(linear.mass), chosen)]
     of_pairs, of_others = np.split(rows, [chosen.size], axis=1)
@@ -144,8 +138,7 @@ def _condense_each(
     every = relative_first(len(model.linear[0].mass), relative)
     stiffness = np.empty((len(orders), n_rel, n_rel), complex)
     response = np.empty((len(orders), n_response, n_rel), complex)
-    force, offset = np.zeros(n_rel, complex), np.zeros(n_response, complex)
-    drive, drive_offset = np.zeros(n_rel, complex), 0.0 + 0.0j
+    (force, drive), offset, drive_offset = np.zeros((2, n_rel), complex), np.zeros(n_response, complex), 0.0 + 0.0j
     for linear, places in by_structure(model, orders):
         harmonics = np.array(orders)[places]
         load = np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * linear.load_harmonic[every]
@@ -180,7 +173,7 @@ def _condense_shared(
     by_load = load[others].conj() @ compliance[0]
     held = compliance[0] @ load[others]
     return {
-        "moving": share_matrices(linear, relative, others, rates, compliance),
+        "moving": SharedStiffness(linear, relative, others, rates, compliance),
         "harmonic_force": load[relative] - dynamic_stiffness(linear, rates[:1], relative, others)[0] @ held,
         "dynamic_response": rows[:, relative] - seen @ coupling,
         "harmonic_offset": rows[:, others] @ held,
@@ -208,22 +201,14 @@ def whole_motion(
     For motions and loads with exp(s t), s the `exponent`, 1/s: `i n w` in harmonic n of a periodic motion.
     Raises numpy.linalg.LinAlgError where the structure with its joint held is singular.
     """
-    others = relative_first(len(linear.mass), relative)[relative.size :]
-
-    def behind(columns: IntArray) -> ComplexArray:
-        at = np.ix_(others, columns)
-        found = linear.stiffness[at] + exponent * linear.damping[at] + exponent**2 * linear.mass[at]
-        return cast("ComplexArray", found)
-
-    whole = np.zeros(load.shape, complex)
+    every, n_rel = relative_first(len(linear.mass), relative), relative.size
+    others, whole = every[n_rel:], np.zeros(load.shape, complex)
     whole[relative] = moved
     if others.size:
-        whole[others] = np.linalg.solve(behind(others), load[others] - behind(relative) @ moved)
+        at = np.ix_(others, every)
+        rows = linear.stiffness[at] + exponent * linear.damping[at] + exponent**2 * linear.mass[at]
+        whole[others] = np.linalg.solve(rows[:, n_rel:], load[others] - rows[:, :n_rel] @ moved)
     return whole
-
-
-def _is_real(linear: LinearModel) -> bool:
-    return not any(np.iscomplexobj(part) for part in (linear.mass, linear.damping, linear.stiffness, linear.response))
 
 
 def by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[LinearModel, IntArray]]:

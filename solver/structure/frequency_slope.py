@@ -12,8 +12,9 @@ close to the one that is followed, and there A_ii is nearly singular.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import cast
+from typing import Any
 
 import numpy as np
 
@@ -56,21 +57,18 @@ def frequency_slope(
         behind = dynamic_stiffness(linear, rates, others, others)
         x = np.empty((len(places), len(linear.mass)), complex)
         x[:, relative] = moving[places]
-        pushed = load[:, others] - _each(dynamic_stiffness(linear, rates, others, relative), moving[places])
-        x[:, others] = _solved(behind, pushed)
+        pushed = load[:, others] - _each(np.matmul, dynamic_stiffness(linear, rates, others, relative), moving[places])
+        x[:, others] = _each(np.linalg.solve, behind, pushed)
         slope = 1j * number * (x @ linear.damping.T) - 2.0 * number**2 * omega * (x @ linear.mass.T)
-        turned = -_solved(behind, slope[:, others])
-        force[:, places] = (slope[:, relative] + _each(dynamic_stiffness(linear, rates, relative, others), turned)).T
+        turned = -_each(np.linalg.solve, behind, slope[:, others])
+        force[:, places] = (
+            slope[:, relative] + _each(np.matmul, dynamic_stiffness(linear, rates, relative, others), turned)
+        ).T
         if harmonics[0] == 1:
             product, response = complex(load[0, others].conj() @ turned[0]), linear.response[:, others] @ turned[0]
     return FrequencySlope(from_complex(np.zeros(relative.size), force), product, response)
 
 
-def _each(matrices: ComplexArray, vectors: ComplexArray) -> ComplexArray:
-    """Products (H, n) of matrices (H, n, m) with vectors (H, m)."""
-    return cast("ComplexArray", np.matmul(matrices, vectors[:, :, None])[:, :, 0])
-
-
-def _solved(matrices: ComplexArray, vectors: ComplexArray) -> ComplexArray:
-    """Solutions (H, n) of systems with the matrices (H, n, n) and right-hand sides (H, n)."""
-    return cast("ComplexArray", np.linalg.solve(matrices, vectors[:, :, None])[:, :, 0])
+def _each(of: Callable[[ComplexArray, ComplexArray], Any], matrices: ComplexArray, vectors: ComplexArray) -> Any:
+    """Products or solutions (H, n) of matrices (H, n, m) with vectors (H, m)."""
+    return of(matrices, vectors[:, :, None])[:, :, 0]

@@ -47,6 +47,18 @@ class Joint:
         """The contact law of the pairs."""
         return ContactLaw(self.penalty, self.friction_coefficient, self.contact, self.basis, self.omega)
 
+    @cached_property
+    def pair_rows(self) -> IntArray:
+        """Relative displacement of each component of the pairs (n_contact, 3); -1 where there is none."""
+        rows = np.full(3 * self.contact.n_contact, -1)
+        rows[self.component_index] = np.arange(self.component_index.size)
+        return rows.reshape(-1, 3)
+
+    @cached_property
+    def pair_compliance(self) -> tuple[FloatArray, FloatArray]:
+        """Motion over force (n_contact,), m/N, of elastic pairs: normal and tangential."""
+        return 1.0 / self.penalty.normal, 1.0 / self.penalty.tangential
+
     @property
     def relative_penalty(self) -> FloatArray:
         """Penalty (n_rel,), N/m, of each relative displacement."""

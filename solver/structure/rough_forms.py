@@ -16,14 +16,13 @@ CPU time of an adaptive history of the dovetail with products in double precisio
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
-from solver.structure.identity import Identity
 
 ROUGH_DIRECTIONS = 48
 """Largest number of motions that carry mass, and damping not proportional to stiffness, in rough products."""
@@ -31,6 +30,7 @@ ROUGH_DIRECTIONS = 48
 ROUGH = 1e-3
 """Part of the stiffness that a rough product may leave out. Does not change results."""
 
+_NO_MATRICES = np.empty((0, 0, 0), np.complex64)
 SingleArray = NDArray[np.float32]
 SingleComplex = NDArray[np.complex64]
 
@@ -56,14 +56,7 @@ class RoughStiffness(NamedTuple):
 def rough_of_each(dense: ComplexArray) -> RoughStiffness:
     """Rough form with a matrix for each harmonic, from `dense` (H, n_rel, n_rel), N/m."""
     none = np.empty((0, 0), np.float32)
-    return RoughStiffness(
-        np.ascontiguousarray(dense, np.complex64),
-        none,
-        np.empty(0, np.float32),
-        none,
-        none,
-        np.empty((0, 0, 0), np.complex64),
-    )
+    return RoughStiffness(np.ascontiguousarray(dense, np.complex64), none, none.ravel(), none, none, _NO_MATRICES)
 
 
 def rough_of_shared(
@@ -73,27 +66,21 @@ def rough_of_shared(
 
     held_compliance (H, n_i, n_i): compliance of the displacements `internal` (n_i,) with the pairs held, m/N.
     """
-    common = _common_form(Identity(linear), tuple(relative.tolist()))
+    common = _common_form(linear, tuple(relative.tolist()))
     highest = float(rates.max(initial=0.0))
     left_out = highest**2 * common.mass_left_out + highest * common.drag_left_out
     if left_out > ROUGH * common.size:
         return None
     rate = rates[:, None, None]
-    behind = [
-        common.basis.T @ np.real(part)[relative[:, None], internal]
-        for part in (linear.stiffness, linear.mass, linear.damping)
-    ]
-    coupling = behind[0] - rate**2 * behind[1] + 1j * rate * behind[2]
+    parts = (linear.stiffness, linear.mass, linear.damping)
+    spring, inertia, drag = (common.basis.T @ np.real(part)[relative[:, None], internal] for part in parts)
+    coupling = spring - rate**2 * inertia + 1j * rate * drag
     core = 1j * rate * common.drag - rate**2 * common.mass
     core = core - coupling @ held_compliance @ coupling.transpose(0, 2, 1)
     basis = np.ascontiguousarray(common.basis, np.float32)
+    slope, basis_t = (rates * common.slope).astype(np.float32), np.ascontiguousarray(basis.T)
     return RoughStiffness(
-        np.empty((0, 0, 0), np.complex64),
-        common.stiffness,
-        (rates * common.slope).astype(np.float32),
-        basis,
-        np.ascontiguousarray(basis.T),
-        np.ascontiguousarray(core, np.complex64),
+        _NO_MATRICES, common.stiffness, slope, basis, basis_t, np.ascontiguousarray(core, np.complex64)
     )
 
 
@@ -119,19 +106,17 @@ class _CommonForm(NamedTuple):
 
 
 @lru_cache(maxsize=2)
-def _common_form(structure: Identity, relative: tuple[int, ...]) -> _CommonForm:
-    rows, linear = np.array(relative, np.intp), cast("LinearModel", structure.objects[0])
+def _common_form(linear: LinearModel, relative: tuple[int, ...]) -> _CommonForm:
+    rows = np.array(relative, np.intp)
     internal = np.setdiff1d(np.arange(len(linear.mass)), rows)
     parts = [np.asarray(np.real(part), np.float64) for part in (linear.stiffness, linear.mass, linear.damping)]
     stiffness, mass, damping = (part[rows[:, None], rows] for part in parts)
     norm = float(np.linalg.norm(stiffness))
     slope = float(np.vdot(stiffness, damping)) / norm**2 if norm > 0.0 else 0.0
     drag = damping - slope * stiffness
-    few = ROUGH_DIRECTIONS
-    directions = [
-        _leading(mass, few),
-        _leading(drag, few) if np.linalg.norm(drag) > 1e-6 * slope * norm else mass[:, :0],
-    ]
+    directions = [_leading(mass, ROUGH_DIRECTIONS)]
+    if np.linalg.norm(drag) > 1e-6 * slope * norm:
+        directions.append(_leading(drag, ROUGH_DIRECTIONS))
     directions += [_leading(part[rows[:, None], internal], internal.size) for part in parts]
     left, sizes, _ = np.linalg.svd(np.hstack(directions), full_matrices=False)
     basis = left[:, sizes > 1e-6]

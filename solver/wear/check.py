@@ -17,19 +17,16 @@ from solver.outcome import Outcome
 from solver.results.state_report import StateReport, report_state
 from solver.settings import NEGLIGIBLE, Resolution
 from solver.stability.floquet import find_instability
-from solver.wear.followed import frequency_error
 from solver.wear.jump import creeps, free_slide
-from solver.wear.options import WEAR
 from solver.wear.state import Choice, WearState
 from solver.wear.wearing_joint import WearingJoint
 
+LEFT_OUT_GROWN = 1.5
+"""Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
+which a new choice is possible. Dovetail, 211.5, 211.75, 212.5 Hz: 0.8 to 1.4 over 1e5 cycles."""
 
-@dataclass(frozen=True)
-class Checked:
-    """A state that passed the check, possibly with other harmonics than before, and its report."""
-
-    state: WearState
-    report: StateReport
+Checked = tuple[WearState, StateReport]
+"""A state that passed the check, possibly with other harmonics than before, and its report."""
 
 
 @dataclass(frozen=True)
@@ -45,16 +42,14 @@ class FullCheck:
 
     def __call__(self, work: WearingJoint, state: WearState) -> Checked | Failure:
         """The state with its report, or the reason of a rejection. Raises OutOfTimeError, LinAlgError."""
-        anew = chosen_for_another(work, state)
-        chosen: WearState | Failure = choose_anew(work, state) if anew else state
-        checked = chosen if isinstance(chosen, Failure) else self._report(work, chosen)
-        if isinstance(checked, Failure) and not anew and state.choice.accurate and work.case.settings.automatic:
+        choose = chosen_for_another(work, state)
+        checked = self._report(work, state, choose=choose)
+        if isinstance(checked, Failure) and not choose and state.choice.accurate and work.case.settings.automatic:
             # more harmonics or samples may suffice
-            chosen = choose_anew(work, state)
-            checked = chosen if isinstance(chosen, Failure) else self._report(work, chosen)
+            checked = self._report(work, state, choose=True)
         if isinstance(checked, Failure):
             return checked
-        state = checked.state
+        state, report = checked
         state = _note_accuracy(state)
         joint, at = work.at(state), state.point.evaluation
         if state.hold is not None and creeps(joint, state.hold, at):
@@ -63,11 +58,14 @@ class FullCheck:
             if (unstable := _multipliers(work, state, every=False)) is not None:
                 return unstable
             state = replace(state, judged_h=at.predicted_h)
-        return replace(checked, state=state)
+        return state, report
 
-    def _report(self, work: WearingJoint, state: WearState) -> Checked | Failure:
+    def _report(self, work: WearingJoint, state: WearState, *, choose: bool) -> Checked | Failure:
         """Report with certificate; its estimated errors come from the last choice of the harmonics."""
-        joint, at, estimate = work.at(state), state.point.evaluation, state.choice.estimate
+        chosen = choose_anew(work, state) if choose else state
+        if isinstance(chosen, Failure):
+            return chosen
+        joint, at, estimate = work.at(chosen), chosen.point.evaluation, chosen.choice.estimate
         certificate = replace(
             certify(joint, at),
             response_error=estimate.response,
@@ -76,8 +74,8 @@ class FullCheck:
         if not certificate.holds(work.case.settings.tolerance):
             return Failure(Outcome.CERTIFICATE_FAILED)
         report = report_state(joint, at, certificate, self.loops, with_resonance=self.with_resonance)
-        error = frequency_error(work.follow, state, estimate.response, work.case.settings.rtol)
-        return Checked(state, replace(report, excitation_frequency_error=error))
+        error = work.where.error(chosen, estimate.response, work.case.settings.rtol)
+        return chosen, replace(report, excitation_frequency_error=error)
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,7 @@ class PlainCheck:
         wanted = [resolution for count, resolution in self.resolutions if count <= state.cycle][-1]
         state = with_harmonics(work, state, wanted) or state
         joint, at = work.at(state), state.point.evaluation
-        return Checked(state, report_state(joint, at, NOT_CERTIFIED, with_resonance=self.with_resonance))
+        return state, report_state(joint, at, NOT_CERTIFIED, with_resonance=self.with_resonance)
 
 
 def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution) -> WearState | None:
@@ -108,8 +106,7 @@ def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution)
         return state
     work.at(state)
     old, case = work.case, work.case.at(resolution)
-    joint = case.joint(state.omega, work.excitation_amplitude)
-    point = work.run.move(old, joint, state.point)
+    point = work.run.move(old, case.joint(state.omega, work.excitation_amplitude), state.point)
     if point is None:
         return None
     state_there = work.at_followed(replace(state, point=point, resolution=resolution, change=None))
@@ -133,7 +130,7 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
     if error == 0.0:
         # the last choice was for a joint without slip and separation
         return now > NEGLIGIBLE
-    if now > WEAR.left_out_grown * choice.left_out:
+    if now > LEFT_OUT_GROWN * choice.left_out:
         return error * now > settings.rtol * choice.left_out
     return now < ACCURACY.kept_fraction**2 * choice.left_out
 
@@ -180,10 +177,10 @@ def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failur
 
 def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable. The sweep has judged the start state already."""
-    if state.cycle == 0.0 and work.follow is None and not _vibrates_otherwise(state):
+    if state.cycle == 0.0 and not work.where.follows and not _vibrates_otherwise(state):
         return None
     joint, at = work.at(state), state.point.evaluation
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
-    if free_slide(joint, at) is None and not work.is_stable(state, at):
+    if free_slide(joint, at) is None and not work.is_stable(joint, at):
         return Failure(Outcome.UNSTABLE)
     return _multipliers(work, state, every=True)

@@ -1,11 +1,18 @@
-"""The loop over the slow time: step, jump where the branch ends, check, output, save."""
+"""The loop over the slow time: step, check, output, save, until the history ends.
+
+A history ends at a last count, at a target, where nothing wears any more, or where wear goes on without end. In a
+steady state every pair that slips carries no force. The slowest pair determines how fast a history approaches this
+state. So the history ends where the wear rate of every pair is below a fraction of the largest rate of this pair. A
+joint that slips everywhere under a load that nothing else carries has no steady state: its wear rate is constant.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,20 +20,34 @@ from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.state import Failure
 from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, describe_error
-from solver.packing import in_rows, packable
+from solver.packing import in_rows
+from solver.settings import ROUND_OFF
 from solver.wear.check import Checked
-from solver.wear.control import Control
-from solver.wear.followed import lost_resonance, out_of_range
-from solver.wear.jump import jump
-from solver.wear.options import WEAR
+from solver.wear.control import Steps, one_step
 from solver.wear.output import DenseOutput
 from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
 
 T = TypeVar("T")
 
-Check = Callable[[WearingJoint, WearState], Checked | Failure]
-"""Function that checks a state and reports it, or gives the reason of a rejection."""
+HISTORY_ITERATIONS = 3000
+"""Most Newton iterations of a history, in addition to `near_iterations` for each step, and of its reference solution,
+in addition to those of the history. A travelling wave at its resonance: 1400 in a corner within 500 cycles."""
+
+ITERATIONS_PER_SAVE = 100
+"""Newton iterations after which a history is saved and its factorisation dropped, so that a resumed history is equal to
+the last bit: 1 s of 48 pairs, 17 s of 336. The cost of one more factorisation is negligible."""
+
+STEPS_TO_THE_END, LONGEST_HISTORY = 20_000, 1e25
+"""Most steps and most cycles of a history without a steady state; a joint takes 2 to 10 steps a pair."""
+
+ACTED_BACK = 100.0
+"""Change of the normal force by the depth of one pair alone, all other pairs held, over the normal force of this pair.
+A wear rate counts as steady above only: less wear may not have acted back on the joint yet. Long waves of n pairs are
+about n times as soft."""
+
+AS_ASKED = Failure(Outcome.CONVERGED)
+"""The regular end of a history."""
 
 
 def guarded(compute: Callable[[], T]) -> T | Failure:
@@ -42,96 +63,111 @@ def guarded(compute: Callable[[], T]) -> T | Failure:
         return Failure(Outcome.EXCEPTION, describe_error(error))
 
 
-class Stop(Protocol):
-    """Decides after each state whether the integration ends."""
-
-    def __call__(self, work: WearingJoint, state: WearState, output: DenseOutput) -> Failure | None:
-        """None to go on, else the end; a regular end has the outcome CONVERGED."""
-
-
-@packable
-@dataclass(frozen=True)
-class Progress:
-    """Progress of an integration, from which the integration goes on. n_steps: steps so far."""
-
-    state: WearState
-    n_steps: int
-
-
 @dataclass(frozen=True)
 class Integration:
     """An integration over the slow time, and its parts.
 
-    control: plans the steps.
-    check: checks each state.
-    stop: ends the integration.
+    steps: lengths and scheme of the steps of the joint.
+    check: gives a state with its report, or the reason of its rejection.
     output: stores the states.
-    save: called from time to time with the progress.
+    save: called from time to time with the state and the number of steps so far, from which the integration goes on.
     most_iterations: most Newton iterations, in addition to `near_iterations` for each step.
-    bounded: whether a jump that moves many times the normal forces is refused.
+    end: last count; inf for a history to the steady state.
+    share: `settings.ToTheEnd.final_share` of such a history.
     """
 
-    control: Control
-    check: Check
-    stop: Stop
+    steps: Steps
+    check: Callable[[WearingJoint, WearState], Checked | Failure]
     output: DenseOutput
-    save: Callable[[Progress], None]
+    save: Callable[[WearState, int], None]
     most_iterations: float
-    bounded: bool = True
+    end: float
+    share: float = 0.0
 
-    def begin(self, work: WearingJoint, state: WearState) -> Progress | Failure:
+    def begin(self, state: WearState) -> WearState | Failure:
         """Check and store the first state."""
-        state_there = work.at_followed(state)
-        checked = state_there if isinstance(state_there, Failure) else self.check(work, state_there)
-        if isinstance(checked, Failure):
-            return checked
-        self.output.add(state.cycle, checked.report, work.rate(checked.state.point.evaluation), 0.0)
-        return Progress(self.control.begin(work, checked.state), 0)
+        first = self.steps.work.at_followed(state)
+        stored = first if isinstance(first, Failure) else self._stored(first, 0.0)
+        return stored if isinstance(stored, Failure) else self.steps.begin(stored)
 
-    def run(self, work: WearingJoint, progress: Progress) -> tuple[WearState, Failure]:
-        """Integrate to the end: last state and reason of the end."""
-        state, n_steps, saved = progress.state, progress.n_steps, work.run.budget.iterations
-        while (ended := self.stop(work, state, self.output)) is None:
+    def run(self, state: WearState, n_steps: int = 0) -> tuple[WearState, Failure]:
+        """Integrate from a state after some steps to the end: last state and reason of the end."""
+        work, budget = self.steps.work, self.steps.work.run.budget
+        saved = budget.iterations
+        while (ended := self._ended(state)) is None:
             n_steps += 1
-            if work.run.budget.iterations > self.most_iterations + CONTINUATION.near_iterations * n_steps:
+            if budget.iterations > self.most_iterations + CONTINUATION.near_iterations * n_steps:
                 return state, Failure(Outcome.MARCH_FAILED)
-            after = guarded(partial(self._one, work, state))
+            after = guarded(partial(self._one, state))
             if isinstance(after, Failure):
                 return state, after
             state = after
-            if work.run.budget.iterations >= saved + WEAR.iterations_per_save:
+            if budget.iterations >= saved + ITERATIONS_PER_SAVE:
                 # done in every history, so that an interrupted one gives equal numbers
-                state, saved = in_rows(state), work.run.budget.iterations
+                state, saved = in_rows(state), budget.iterations
                 work.drop_factor()
-                self.save(Progress(state, n_steps))
+                self.save(state, n_steps)
         return state, ended
 
-    def _one(self, work: WearingJoint, state: WearState) -> WearState | Failure:
-        """One step, and the jump where the branch ends within the step."""
-        step = self.control.step(work, state)
+    def _one(self, state: WearState) -> WearState | Failure:
+        work, step = self.steps.work, one_step(self.steps, state)
         if isinstance(step, Failure):
             return step
-        if step.arrived:
-            return self._stored(work, step.state, step.volume_error(work.area))
-        if step.state.cycle > state.cycle:
-            # the last state before the end of the branch counts, too
-            reached = self._stored(work, step.state, step.volume_error(work.area))
-            if isinstance(reached, Failure):
-                return reached
-            step = replace(step, state=reached)
-        behind = jump(work, step, bounded=self.bounded)
-        if isinstance(behind, Failure):
-            return behind if work.follow is None else lost_resonance(work.follow, step.state)
-        behind = work.at_followed(behind)
-        return behind if isinstance(behind, Failure) else self._stored(work, behind, 0.0)
+        return work.where.out_of_range(step.state) or self._stored(step.state, step.volume_error(work.area))
 
-    def _stored(self, work: WearingJoint, state: WearState, error: float) -> WearState | Failure:
-        """Check a state and store it in the output."""
-        if (left := out_of_range(work.follow, state)) is not None:
-            return left
-        checked = self.check(work, state)
+    def _stored(self, state: WearState, error: float) -> WearState | Failure:
+        """Check a state and store it in the output; error: local error of its step, m3."""
+        checked = self.check(self.steps.work, state)
         if isinstance(checked, Failure):
             return checked
-        state = checked.state
-        self.output.add(state.cycle, checked.report, work.rate(state.point.evaluation), error)
+        state, report = checked
+        self.output.add(state.cycle, report, self.steps.work.rate(state.point.evaluation), error)
         return state
+
+    def _ended(self, state: WearState) -> Failure | None:
+        """Why the history ends at a state: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on."""
+        if self.output.reached_target or not state.wears or state.cycle >= self.end * (1.0 - 1e-12):
+            return AS_ASKED
+        if self.end < math.inf:
+            return None
+        if is_over(state, self.share):
+            return AS_ASKED
+        rate, n_steps = float(state.rates[-1]), len(self.output.taken.course.ends) - 1
+        if is_steady(self.steps.work, state, self.output):
+            steady = f"from cycle {state.cycle:.4g} on they wear at a steady rate of {rate:.6g} m3 a cycle"
+            return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
+        if n_steps >= STEPS_TO_THE_END or state.cycle > LONGEST_HISTORY:
+            still = f"the joint still wears at {rate:.6g} m3 a cycle"
+            return Failure(Outcome.NO_FINAL_STATE, f"after {n_steps} steps, at cycle {state.cycle:.4g}, {still}")
+        return None
+
+
+def is_over(state: WearState, share: float) -> bool:
+    """Whether the rate of every pair is below the fraction `share` of its largest rate."""
+    rates, largest = state.rates[:-1], state.largest_rates[:-1]
+    floor = share * float(largest.max(initial=0.0))
+    return bool((rates <= share * np.maximum(largest, floor)).all())
+
+
+def is_steady(work: WearingJoint, state: WearState, output: DenseOutput) -> bool:
+    """Whether wear goes on without end.
+
+    Every pair that carries load slips, and the wear rate is constant although the wear is deep enough to act back.
+    """
+    joint, at = work.at(state), state.point.evaluation
+    normal = at.force_h[:, 0, 0]
+    pressed = normal > ROUND_OFF * float(normal.max(initial=0.0))
+    if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():
+        return False
+    values = output.values()
+    volumes, rates = values["wear_depth"] @ work.area, values["wear_rate"]
+    # over the last nine tenths of the worn volume, to the accuracy of a rate
+    first = max(int(np.searchsorted(volumes, 0.1 * volumes[-1], "right")) - 1, 0)
+    varies = np.abs(rates[first:] - rates[-1]) > work.case.settings.rtol * rates[-1]
+    if volumes[first] > 0.1 * volumes[-1] or varies.any():
+        return False
+    rows = np.flatnonzero(joint.component_index % 3 == 0)
+    rows = rows[pressed[joint.component_index[rows] // 3]]
+    pair = joint.component_index[rows] // 3
+    moved = joint.structure.static_stiffness[rows, rows] * at.wear_depth[pair]
+    return bool((moved >= ACTED_BACK * normal[pair]).all())

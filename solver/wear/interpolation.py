@@ -1,12 +1,23 @@
-"""Worn depth within a step on the slow time scale, between the states at its ends."""
+"""Within a step on the slow time scale: worn depth, and the count at which a target is reached.
+
+A target is a wear depth, a worn volume, or a shift of the resonance.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.model import FloatArray
+from solver.settings import WearTarget
+
+if TYPE_CHECKING:
+    from solver.wear.output import Node
 
 
 def depth_within(
@@ -16,53 +27,116 @@ def depth_within(
     after: tuple[FloatArray, FloatArray],
     smooth: bool,
 ) -> FloatArray:
-    """Worn depth within a step.
+    """Worn depth (n, n_contact), m, at fractions (n,) of a step: linear, or a cubic Hermite polynomial.
 
-    Linear, or a cubic Hermite polynomial. The slopes of the cubic are limited so that the depth never falls: a cubic is
-    monotone where both slopes are at most three times the mean slope (Fritsch and Carlson 1980).
+    The slopes of the cubic are limited so that the depth never falls: a cubic is monotone where both slopes are at most
+    three times the mean slope (Fritsch and Carlson 1980).
 
-    Parameters
-    ----------
-    fraction
-        (n,), fractions of the step.
-    length
-        Length of the step, cycles.
-    before, after
-        Depth, m, and wear rate, m per cycle, both (n_contact,), at the ends of the step.
-    smooth
-        True for the cubic, False for the line.
-
-    Returns
-    -------
-    FloatArray
-        (n, n_contact), m.
+    length: of the step, cycles.
+    before, after: depth, m, and wear rate, m per cycle, both (n_contact,), at the ends of the step.
+    smooth: True for the cubic.
     """
     s = fraction[:, None]
     grown = after[0] - before[0]
     if not smooth or length <= 0.0:
         return np.asarray(before[0] + s * grown)
-    slopes = bent_within(grown, length, before[1], after[1])
-    bent = (1.0 - s) ** 2 * s * slopes[0] - s**2 * (1.0 - s) * slopes[1]
+    first, last = (np.minimum(rate * length, 3.0 * grown) for rate in (before[1], after[1]))
+    bent = (1.0 - s) ** 2 * s * first - s**2 * (1.0 - s) * last
     return np.asarray(before[0] + s**2 * (3.0 - 2.0 * s) * grown + bent)
 
 
-def bent_within(grown: FloatArray, length: float, first: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Slopes of the cubic at both ends of a step, times its length, m, limited so that the depth never falls.
-
-    grown (n_contact,): growth of the depth over the step, m.
-    length: length of the step, cycles.
-    first, last (n_contact,): wear rates at the ends of the step, m per cycle.
-    """
-    return np.minimum(first * length, 3.0 * grown), np.minimum(last * length, 3.0 * grown)
-
-
 def fraction_where(value: float, volume: Callable[[float], float]) -> float:
-    """Fraction of a step at which a monotone function of the fraction reaches a value.
-
-    volume: the function, never falling; 0 or 1 is returned for a value beyond its ends.
-    """
+    """Fraction of a step at which a function that never falls reaches a value; 0 or 1 for a value beyond its ends."""
     if volume(0.0) >= value or volume(1.0) <= value:
         return 0.0 if volume(0.0) >= value else 1.0
     from scipy.optimize import brentq  # where it is used: it takes a while to load
 
     return float(brentq(lambda fraction: volume(fraction) - value, 0.0, 1.0, xtol=1e-12))
+
+
+@dataclass(frozen=True)
+class TargetSearch:
+    """Seeks a target within steps. area (n_contact,): m2. smooth: whether the depth is a cubic within a step."""
+
+    target: WearTarget
+    area: FloatArray
+    smooth: bool
+
+    def within(self, nodes: Sequence[Node], *, straight: bool = False) -> float:
+        """Count at which the last step of some reaches the target, NaN where it does not.
+
+        The resonance is a parabola in the worn volume through both ends of the step and the end before, or straight.
+        """
+        start, end = nodes[-2:]
+        wanted = self.target.value
+        if self._shifts:
+            if not abs(_shift(end, nodes)) >= wanted:
+                return math.nan
+            wanted = self._volume_at_shift(nodes, straight=straight)
+        if self._worn(end) < wanted:
+            return math.nan
+        length = end.cycle - start.cycle
+        ends = [(node.report.wear_depth, node.rate) for node in (start, end)]
+
+        def worn_at(fraction: float) -> float:
+            return self._worn_to(depth_within(np.array([fraction]), length, ends[0], ends[1], self.smooth)[0])
+
+        return start.cycle + fraction_where(wanted, worn_at) * length
+
+    def count(self, nodes: Sequence[Node]) -> float:
+        """Count at which some steps reach the target; if they do not, extrapolated by the mean rate of the last one,
+        inf where this rate is 0.
+        """
+        for end in range(2, len(nodes) + 1):
+            if not math.isnan(found := self.within(nodes[:end])):
+                return found
+        if len(nodes) < 2:
+            return math.inf
+        first, last = (abs(_shift(node, nodes)) if self._shifts else self._worn(node) for node in nodes[-2:])
+        grown, length = last - first, nodes[-1].cycle - nodes[-2].cycle
+        return nodes[-1].cycle + (self.target.value - last) * length / grown if grown > 0.0 else math.inf
+
+    def by_resonance(self, nodes: Sequence[Node], reached: float) -> float:
+        """Error, cycles, of the count `reached` by the errors of the resonance at the end of its step and at the start;
+        0 for other targets.
+        """
+        if not self._shifts:
+            return 0.0
+        start, end = next(step for step in pairwise(nodes) if reached <= step[1].cycle)
+        shifted = abs(end.report.resonance - start.report.resonance) / nodes[0].report.resonance
+        error = max(node.report.resonance_error for node in (nodes[0], end))
+        return error * (end.cycle - start.cycle) / shifted if shifted > 0.0 else math.inf
+
+    @property
+    def _shifts(self) -> bool:
+        return self.target.quantity == "frequency_shift"
+
+    def _volume_at_shift(self, nodes: Sequence[Node], *, straight: bool) -> float:
+        """Worn volume, m3, at which the resonance has shifted to the target, within a step whose end has reached it."""
+        wanted, way = self.target.value, math.copysign(1.0, _shift(nodes[-1], nodes))
+        *before, volume, end_volume = (self._worn(node) for node in nodes[-3:])
+        *earlier, shift, end_shift = (way * _shift(node, nodes) for node in nodes[-3:])
+        if not end_shift > shift:
+            return volume
+        slope = (end_volume - volume) / (end_shift - shift)
+        line = volume + max(wanted - shift, 0.0) * slope
+        if straight or not before or not (before[0] < volume < end_volume and earlier[0] < shift < wanted):
+            return line
+        # Newton's form of the volume as a function of the shift, which has to rise
+        bend = (slope - (volume - before[0]) / (shift - earlier[0])) / (end_shift - earlier[0])
+        found = line + bend * (wanted - shift) * (wanted - end_shift)
+        return found if volume < found < end_volume else line
+
+    def _worn(self, node: Node) -> float:
+        return self._worn_to(node.report.wear_depth)
+
+    def _worn_to(self, depth: FloatArray) -> float:
+        """Wear to compare with the target, from depths (n_contact,), m: the largest depth, m, or the volume, m3."""
+        if self.target.quantity == "wear_depth":
+            return float(depth.max(initial=0.0))
+        return float(depth @ self.area)
+
+
+def _shift(node: Node, nodes: Sequence[Node]) -> float:
+    """Relative change of the resonance since the first of some states; above 0 where it rises."""
+    return node.report.resonance / nodes[0].report.resonance - 1.0

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.model import BoolArray, ComplexArray, FloatArray
+from solver.model import BoolArray, FloatArray
 from solver.packing import packable
 from solver.results.loops import LOOP_PHASES
 from solver.results.state_report import StateReport
 from solver.settings import Resolution, WearTarget
-from solver.wear.interpolation import depth_within, fraction_where
-from solver.wear.options import WEAR
-from solver.wear.target import TargetSearch
+from solver.wear.interpolation import TargetSearch, depth_within, fraction_where
+
+KEPT_STEPS = 800
+"""Most stored steps of a history beside those with an output, and most at whose ends it is compared with its reference
+solution; half as many after the steps with the least progress are dropped. A result has 101 outputs by default, an
+adaptive history of 1e5 cycles about 100 steps."""
 
 INTERPOLATED = (
     "wear_depth",
@@ -65,45 +67,20 @@ class Node:
 @packable
 @dataclass(frozen=True)
 class Course:
-    """The course of a history over its steps.
+    """The steps of a history.
 
-    ends (n_steps,): counts at the first state and at the ends of all steps.
-    cycles (n,): counts at the ends of steps, thinned where the steps are many.
-    depths (n, n_contact): depths at these counts, m.
-    rates (n,): wear rates of the joint at these counts, m3 per cycle.
-    responses, peaks (n, n_response): complex first harmonic and largest magnitude at these counts, m.
-    resonances (n,): resonance of the vibration at these counts, rad/s; NaN where it was not asked for.
+    ends (n_steps + 1,): counts at the first state and at the ends of all steps.
     resolutions: cycle count from which on a resolution holds, and this resolution.
     """
 
     ends: tuple[float, ...] = ()
-    cycles: tuple[float, ...] = ()
-    depths: tuple[FloatArray, ...] = ()
-    rates: tuple[float, ...] = ()
-    responses: tuple[ComplexArray, ...] = ()
-    peaks: tuple[FloatArray, ...] = ()
-    resonances: tuple[float, ...] = ()
     resolutions: tuple[tuple[float, Resolution], ...] = ()
 
-    def after(self, cycle: float, report: StateReport, rate: float) -> Course:
-        """The course with the end of another step; rate: wear rate of the joint, m3 per cycle."""
-        kept = slice(0, None, 2 if len(self.cycles) >= WEAR.kept_steps else 1)
-        changed = not self.resolutions or self.resolutions[-1][1] != report.resolution
-        return Course(
-            ends=(*self.ends, cycle),
-            cycles=(*self.cycles[kept], cycle),
-            depths=(*self.depths[kept], report.wear_depth),
-            rates=(*self.rates[kept], rate),
-            responses=(*self.responses[kept], report.response),
-            peaks=(*self.peaks[kept], report.response_peak),
-            resonances=(*self.resonances[kept], report.resonance),
-            resolutions=(*self.resolutions, (cycle, report.resolution)) if changed else self.resolutions,
-        )
-
-    def values(self) -> dict[str, Any]:
-        """Values at `cycles`, by their names in `DenseOutput.read`; the first axis is that of the counts."""
-        names = {"wear_depth": self.depths, "wear_rate": self.rates, "response": self.responses}
-        return {name: np.array(found) for name, found in (names | {"response_peak": self.peaks}).items()}
+    def after(self, cycle: float, resolution: Resolution) -> Course:
+        """The course with the end of another step."""
+        changed = not self.resolutions or self.resolutions[-1][1] != resolution
+        resolutions = (*self.resolutions, (cycle, resolution)) if changed else self.resolutions
+        return Course((*self.ends, cycle), resolutions)
 
 
 @packable
@@ -111,7 +88,7 @@ class Course:
 class OutputState:
     """Data of a dense output.
 
-    nodes: ends of the stored steps, ascending; the counts to be read lie within these steps.
+    nodes: first state and ends of the steps, ascending, thinned where the steps are many.
     course: course of all steps.
     reached: count at which the target was reached, NaN until then.
     reached_within: estimated error of this count by the interpolation within the step.
@@ -122,7 +99,13 @@ class OutputState:
     reached: float = math.nan
     reached_within: float = 0.0
 
+    @property
+    def cycles(self) -> FloatArray:
+        """Counts (n,) of the nodes."""
+        return np.array([node.cycle for node in self.nodes])
 
+
+@dataclass
 class DenseOutput:
     """Takes the state after every step and stores the steps that are read later.
 
@@ -132,18 +115,17 @@ class DenseOutput:
     pressure.
 
     area (n_contact,): m2.
-    counts (n_output,): ascending counts to be read; only steps that contain one of them are stored. None for counts not
-        known beforehand: then steps are stored evenly along the history.
     smooth: whether the depth is a cubic within a step.
+    counts (n_output,): ascending counts to be read, whose steps are stored; empty for counts not known beforehand.
     target: wear whose count is sought within the steps; None for none.
     taken: data stored so far.
     """
 
-    def __init__(
-        self, area: FloatArray, counts: FloatArray | None, *, smooth: bool, target: WearTarget | None = None
-    ) -> None:
-        self.area, self.counts, self.smooth, self.target = area, counts, smooth, target
-        self.taken = OutputState()
+    area: FloatArray
+    smooth: bool
+    counts: FloatArray = field(default_factory=lambda: np.zeros(0))
+    target: WearTarget | None = None
+    taken: OutputState = OutputState()
 
     @property
     def last(self) -> Node | None:
@@ -158,39 +140,38 @@ class DenseOutput:
     def add(self, cycle: float, report: StateReport, rate: FloatArray, error: float) -> None:
         """Take the state at the end of a step.
 
-        Parameters
-        ----------
-        cycle
-            Count at the end of the step, never lower than the last one.
-        report
-            Report of the state.
-        rate
-            (n_contact,), wear rates of the state, m per cycle.
-        error
-            Estimated local error of the step, as worn volume, m3.
+        cycle: count at the end of the step, never lower than the last one. report: of the state.
+        rate (n_contact,): wear rates, m per cycle. error: estimated local error of the step, as worn volume, m3.
         """
-        last, nodes, reached, within = self.last, list(self.taken.nodes), self.taken.reached, self.taken.reached_within
-        node = Node(cycle, report, rate, error + (0.0 if last is None else last.local))
-        if last is not None:
-            if math.isnan(reached) and self._search is not None:
-                reached = self._search.within(last, node, self.taken.course)
-                within = abs(reached - self._search.within(last, node, self.taken.course, straight=True))
-            before = nodes[-2].cycle if len(nodes) > 1 else -math.inf
-            read = self._is_read(before, last.cycle) or self._is_read(last.cycle, cycle)
-            if not read and not before < reached <= cycle:
-                del nodes[-1]
-        nodes.append(node)
-        if self.counts is None and len(nodes) > WEAR.kept_steps:
-            nodes = self._thinned(nodes)
-        course = self.taken.course.after(cycle, report, float(rate @ self.area))
-        self.taken = OutputState(tuple(nodes), course, reached, within)
+        last, reached, within = self.last, self.taken.reached, self.taken.reached_within
+        nodes = (*self.taken.nodes, Node(cycle, report, rate, error + (0.0 if last is None else last.local)))
+        if math.isnan(reached) and last is not None and self._search is not None:
+            reached = self._search.within(nodes)
+            within = abs(reached - self._search.within(nodes, straight=True))
+        course = self.taken.course.after(cycle, report.resolution)
+        self.taken = OutputState(nodes, course, reached, within)
+        if len(nodes) > KEPT_STEPS + 2 * self.counts.size:
+            self.taken = replace(self.taken, nodes=self._thinned())
 
-    def _is_read(self, before: float, cycle: float) -> bool:
-        """Whether a count to be read is larger than `before` and at most `cycle`."""
-        if self.counts is None:
-            return True
-        place = int(np.searchsorted(self.counts, before, "right"))
-        return place < self.counts.size and bool(self.counts[place] <= cycle)
+    def _thinned(self) -> tuple[Node, ...]:
+        """The nodes without those of little progress, see `even_counts`, between which nothing is read."""
+        nodes, at = self.taken.nodes, self.taken.cycles
+        read = np.append(self.counts, self.taken.reached)
+        ends = np.searchsorted(at, read[read <= at[-1]])
+        needed = {0, len(nodes) - 1, *ends, *(ends - 1)}
+        volumes = self.values()["wear_depth"] @ self.area
+        way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
+        least, kept = 2.0 * way[-1] / KEPT_STEPS, [0]
+        for place in range(1, len(nodes)):
+            if place in needed or way[place + 1] - way[kept[-1]] > least:
+                kept.append(place)
+        return tuple(nodes[place] for place in kept)
+
+    def values(self) -> dict[str, Any]:
+        """Values at the nodes, by their names in `read`; the first axis is that of the counts."""
+        nodes, names = self.taken.nodes, ("wear_depth", "response", "response_peak")
+        found = {name: np.array([getattr(node.report, name) for node in nodes]) for name in names}
+        return found | {"wear_rate": np.array([node.rate @ self.area for node in nodes])}
 
     @property
     def _search(self) -> TargetSearch | None:
@@ -200,7 +181,7 @@ class DenseOutput:
         """Count at which the stored steps reach the target; if they do not, extrapolated by the mean rate of the last
         one, inf where this rate is 0.
         """
-        return math.inf if self._search is None else self._search.count(self.taken.nodes, self.taken.course)
+        return math.inf if self._search is None else self._search.count(self.taken.nodes)
 
     def target_within(self) -> float:
         """Error, cycles, of the count at which the target was reached by the interpolation within the step, and by the
@@ -208,11 +189,6 @@ class DenseOutput:
         """
         by_resonance = 0.0 if self._search is None else self._search.by_resonance(self.taken.nodes, self.taken.reached)
         return self.taken.reached_within + by_resonance
-
-    def _depth(self, start: Node, end: Node, fraction: FloatArray) -> FloatArray:
-        """Depths (n, n_contact), m, at fractions (n,) of a step."""
-        ends = [(node.report.wear_depth, node.rate) for node in (start, end)]
-        return depth_within(fraction, end.cycle - start.cycle, ends[0], ends[1], self.smooth)
 
     def read(self, counts: FloatArray) -> dict[str, Any]:
         """All values at ascending counts (n,), by name; the first axis is that of the counts.
@@ -222,10 +198,9 @@ class DenseOutput:
         - `depth_rate` (n, n_contact): wear rate of each pair, m per cycle.
         - `local` (n,): sum of the local errors, m3.
 
-        Values beyond the last step are NaN, whole numbers 0.
+        Values beyond the last step are NaN, whole numbers 0; empty before the first state.
         """
-        nodes = self.taken.nodes
-        cycles = np.array([node.cycle for node in nodes])
+        nodes, cycles = self.taken.nodes, self.taken.cycles
         reached = counts <= (cycles[-1] if nodes else -math.inf)
         places = np.searchsorted(cycles, counts[reached], "left")
         rows = [
@@ -238,7 +213,7 @@ class DenseOutput:
         """Values at a count within a step."""
         length = end.cycle - start.cycle
         fraction = (count - start.cycle) / length if length > 0.0 else 1.0
-        depth = self._depth(start, end, np.array([fraction]))[0]
+        depth = self._depth(start, end, fraction)
         if self.smooth and length > 0.0:
             whole = float((end.report.wear_depth - start.report.wear_depth) @ self.area)
             fraction = float((depth - start.report.wear_depth) @ self.area) / whole if whole > 0.0 else fraction
@@ -252,11 +227,15 @@ class DenseOutput:
         # a step may be much longer than the history to the count
         between["local"] = start.local + fraction * (end.local - start.local)
         for name in CERTIFIED:
-            # within a step, the larger violation of its two ends
             between[name] = np.fmax(getattr(one.certificate, name), getattr(other.certificate, name))
         between["harmonics_used"], between["samples_used"] = other.resolution.highest, other.resolution.samples
         between["stable"] = other.certificate.stable
         return between
+
+    def _depth(self, start: Node, end: Node, fraction: float) -> FloatArray:
+        """Depths (n_contact,), m, at a fraction of a step."""
+        ends = [(node.report.wear_depth, node.rate) for node in (start, end)]
+        return np.asarray(depth_within(np.array([fraction]), end.cycle - start.cycle, ends[0], ends[1], self.smooth)[0])
 
     def even_counts(self, n_outputs: int) -> FloatArray:
         """Counts (n_outputs,) that divide the progress of the history evenly, up to its end or its target.
@@ -268,7 +247,7 @@ class DenseOutput:
         end = self.taken.reached if self.reached_target else nodes[-1].cycle
         found = np.zeros(n_outputs)
         found[-1] = end
-        at, volumes = np.array([node.cycle for node in nodes]), self._volumes(nodes)
+        at, volumes = self.taken.cycles, self.values()["wear_depth"] @ self.area
         if len(nodes) < 2 or volumes[-1] <= 0.0:
             return found
         last = int(np.clip(np.searchsorted(at, end), 1, len(nodes) - 1))
@@ -289,28 +268,13 @@ class DenseOutput:
 
     def _volume_at(self, start: Node, end: Node, count: float) -> float:
         """Worn volume at a count within a step, m3."""
-        fraction = np.array([(count - start.cycle) / (end.cycle - start.cycle)])
-        return float(self._depth(start, end, fraction)[0] @ self.area)
-
-    def _volumes(self, nodes: Sequence[Node]) -> FloatArray:
-        return np.array([node.report.wear_depth @ self.area for node in nodes])
-
-    def _thinned(self, nodes: list[Node]) -> list[Node]:
-        """The nodes without those of little progress, see `even_counts`."""
-        at, volumes = np.array([node.cycle for node in nodes]), self._volumes(nodes)
-        way = at / at[-1] + volumes / max(volumes[-1], 1e-300)
-        least, kept = 2.0 * way[-1] / WEAR.kept_steps, [0]
-        for place in range(1, len(nodes) - 1):
-            if way[place + 1] - way[kept[-1]] > least:
-                kept.append(place)
-        return [nodes[place] for place in (*kept, len(nodes) - 1)]
+        return float(self._depth(start, end, (count - start.cycle) / (end.cycle - start.cycle)) @ self.area)
 
 
 def _column(values: list[Any], reached: BoolArray) -> NDArray[np.generic]:
-    """Values of one name at all counts; NaN at counts that are not reached, or 0 for whole numbers.
+    """Values of one name at all counts: those at the counts that are reached, NaN, or 0 for whole numbers, at others.
 
-    values: values at the counts that are reached.
-    reached (n,): whether a count is reached.
+    values: at the counts that are reached. reached (n,).
     """
     found = np.array(values)
     column = np.full((reached.size, *found.shape[1:]), np.nan if found.dtype.kind in "fc" else 0, found.dtype)

@@ -1,7 +1,16 @@
-"""Derivative of the wear rates of a state with respect to the depths of the pairs, at a given tangential history.
+"""How wear acts back: derivatives of the wear rates, the limit of explicit steps, and the load that a step moves.
 
-The motion follows the depth as dp = -J^-1 Z E dW, where E puts the depths into the static normal displacements, and the
-rates follow the motion as dg = G dp. A table of factors adds its own derivative with respect to the depth.
+The motion follows the depths as dp = -J^-1 Z E dW, where E puts the depths into the static normal displacements, and
+the rates follow the motion as dg = G dp. A table of factors adds its own derivative with respect to the depth.
+
+Explicit limit: the wear rate falls where wear takes load off a pair. An explicit Euler step, Eq. (20), multiplies a
+disturbance of W by 1 + h dg/dW. It grows where h exceeds 2 / mu, with mu the largest positive eigenvalue of -dg/dW.
+
+Largest meaningful step: uniform wear brings the parts closer, nonuniform wear takes load off a pair. A step is rejected
+where its wear would move many times all normal forces at once. An explicit step then uses a wear rate that the pairs
+have lost during the step, an implicit step a rate that they only have at its end. The moved fraction of the normal
+forces is that of the linear static structure, with free tangents of pairs that slip: it does not depend on the
+vibration, which may change arbitrarily at the end of a branch, and is zero where wear does not act back on the joint.
 """
 
 from __future__ import annotations
@@ -10,11 +19,50 @@ from dataclasses import replace
 
 import numpy as np
 
+from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.wear_law import WearingWork
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
+from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
+from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
 from solver.structure.joint import Joint
+
+LARGEST_MOVED_LOAD = 10.0
+"""Largest change of the normal forces in a step, over these forces, both as norms. For smaller changes the error of the
+worn volume is a sufficient warning (27 % with 0.6)."""
+
+
+def rate_changes(
+    joint: Joint,
+    at: Evaluation,
+    gain: FloatArray,
+    wearing: WearingWork,
+    depths: FloatArray,
+    run: Run,
+    rtol: float = FORCING,
+) -> FloatArray:
+    """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths.
+
+    joint, at: the joint and its converged state, whose tangential history is given.
+    gain (n_contact,): growth of the depth over wearing work in one cycle, m/J.
+    wearing: part of the slip work that wears.
+    depths (k, n_contact): changes of the depths, m.
+    run, rtol: solves with the Jacobian of the state, and their relative residual.
+    """
+    balance = Balance(joint, at.history, at.wear_depth)
+    growth = replace(balance, wear_gain=gain, wearing=replace(wearing, depth_held=True)).linearise(at).growth_tangent
+    found = depths * (gain * wearing.slopes(*worn_by(at))[2])
+    closing = np.where(joint.component_index % 3 == 0, depths[:, joint.component_index // 3], 0.0)
+    # nothing acts back on a constant normal force
+    acting = closing.any(axis=1)
+    if acting.any():
+        rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
+        rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
+        steps = run.solver.solve_all(balance.linearise(at), rights, rtol)
+        moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
+        found[acting] += (growth * moved).sum(axis=2)
+    return found
 
 
 def rate_slope(
@@ -22,30 +70,74 @@ def rate_slope(
 ) -> FloatArray:
     """Derivative dg/dW (n_contact, n_contact), 1 per cycle; column: pair whose depth changes.
 
-    Parameters
-    ----------
-    joint, at
-        The joint and its converged state.
-    gain
-        (n_contact,), `archard.wear_gain` of one cycle, m/J.
-    wearing
-        Part of the slip work that wears.
-    pairs
-        (n_contact,), the pairs whose depths change; the columns of all others are 0.
-    run
-        Solves with the Jacobian of the state.
+    pairs (n_contact,): those whose depths change; the columns of all others are 0. Others as in `rate_changes`.
     """
-    balance = Balance(joint, at.history, at.wear_depth)
-    plain = balance.linearise(at)
-    growth = replace(balance, wear_gain=gain, wearing=replace(wearing, depth_held=True)).linearise(at).growth_tangent
-    slope = np.diag(gain * wearing.slopes(*worn_by(at))[2] * pairs)
-    normal = np.flatnonzero((joint.component_index % 3 == 0) & pairs[joint.component_index // 3])
-    if not normal.size:
-        # nothing acts back on a constant normal force
-        return slope
-    rights = np.zeros((normal.size, *at.predicted_h.shape))
-    rights[:, :, 0] = -joint.structure.static_stiffness[:, normal].T
-    for row, step in zip(normal, run.solver.solve_all(plain, rights), strict=True):
-        moved = joint.to_pairs(step).reshape(growth.shape)
-        slope[:, joint.component_index[row] // 3] += (growth * moved).sum(axis=1)
+    slope = np.zeros((pairs.size, pairs.size))
+    slope[:, pairs] = rate_changes(joint, at, gain, wearing, np.eye(pairs.size)[pairs], run).T
     return slope
+
+
+def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, run: Run) -> float:
+    """Largest stable explicit step of Eq. (20) at a state, cycles; inf where the wear rate of no pair falls.
+
+    The eigenvalues come from Arnoldi's method with at most `SIGN_PRODUCTS` solves. A complex eigenvalue counts where
+    its real part is larger than its imaginary part. Arguments as in `rate_changes`; that the wearing work depends on
+    the depth itself is neglected.
+    """
+    wears, held = gain * wearing.work(*worn_by(at)) > 0.0, replace(wearing, depth_held=True)
+
+    def product(depths: FloatArray) -> FloatArray:
+        return np.asarray(-rate_changes(joint, at, gain, held, depths[None], run)[0])
+
+    # depths of pairs whose rates follow no depth do not matter
+    start = product(np.where(wears, np.random.default_rng(0).normal(size=wears.size), 0.0))
+    if not np.isfinite(start).all() or not start.any():
+        return float("inf")
+    values = ritz_values(product, start, min(SIGN_PRODUCTS, int(np.count_nonzero(wears))))[0]
+    falling = values.real[np.isfinite(values) & (values.real > np.abs(values.imag))]
+    # a value below the round-off of the largest one is zero
+    fastest = float(falling.max(initial=0.0))
+    return 2.0 / fastest if fastest > 1e-12 * float(np.abs(values).max(initial=0.0)) else float("inf")
+
+
+def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, free_tangents: bool = True) -> float:
+    """Change of the mean normal forces by wear, relative to these forces, both as norms.
+
+    Pairs that are open throughout the period carry no force.
+
+    before: state at the start of the step.
+    wear_depth (n_contact,): depth at the end of the step, m.
+    free_tangents: whether the tangents of pairs that slip are free; if not, the result is a bound, which is cheaper.
+    """
+    pair, component = joint.component_index // 3, joint.component_index % 3
+    stuck = (before.status_t == STICK).all(axis=1)
+    opened = (before.status_t == SEPARATED).all(axis=1)
+    free = np.where(component == 0, opened[pair], ~stuck[pair])
+    normal = (component == 0) & ~free
+    preload = float(np.linalg.norm(before.force_h[pair[normal], 0, 0]))
+    stiffness = joint.structure.static_stiffness
+    force = stiffness @ np.where(normal, (wear_depth - before.wear_depth)[pair], 0.0)
+    if free_tangents and free.any():
+        # a root that is free to slide along its slot has neither stiffness nor force in this direction
+        force = force - stiffness[:, free] @ np.linalg.lstsq(stiffness[np.ix_(free, free)], force[free])[0]
+    moved = float(np.linalg.norm(force[normal]))
+    return moved / preload if preload > 0.0 else 0.0
+
+
+def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: float, length: float) -> str | None:
+    """Why a step or a jump is rejected because of its wear, and which length would be accepted; None if it is not.
+
+    joint, before: the joint and its state at the start. wear_depth (n_contact,): at the end, m.
+    cycle, length: count at the start, and length, cycles.
+    """
+    if moved_fraction(joint, before, wear_depth, free_tangents=False) <= LARGEST_MOVED_LOAD:
+        return None
+    fraction = moved_fraction(joint, before, wear_depth)
+    if fraction <= LARGEST_MOVED_LOAD:
+        return None
+    # a hundredth of the limit; a usual step of the dovetail root moves 0.001 to 0.01 of the normal forces
+    advised = length * LARGEST_MOVED_LOAD / 100.0 / fraction
+    return (
+        f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {fraction:.2g} times the"
+        f" normal forces of the joint: at most {advised:.2g} cycles at once would do"
+    )

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
-from solver.accuracy.reference import RTOL_RATIO, coarser
+from solver.accuracy.reference import RTOL_RATIO, coarser, finer
 from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
 from solver.continuation.options import CONTINUATION
@@ -22,13 +22,12 @@ from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution, Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case
 from solver.wear.check import FullCheck, PlainCheck, unstable_at_end
-from solver.wear.control import AdaptiveSteps, Control, GivenSteps
-from solver.wear.integrate import Integration, Progress, guarded
-from solver.wear.options import WEAR
+from solver.wear.control import Adaptive, Given, Growing, LargestDepth, Steps
+from solver.wear.integrate import HISTORY_ITERATIONS, Integration, guarded
 from solver.wear.output import DenseOutput, OutputState
 from solver.wear.state import WearState
-from solver.wear.stop import AtCount, InSteadyState
 from solver.wear.wearing_joint import WearingJoint
+from solver.wear.where import Fixed, Following
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class SlowTime:
     """Scheme, counts and wear law of a wear history, Eqs. (20) to (26).
 
     wear_coefficient: k_w, 1/Pa.
-    scheme: "explicit" (Eq. (20)), "implicit" (Eq. (24)) or "adaptive" (`solver.wear.bdf2`).
+    scheme: "explicit" (Eq. (20)), "implicit" (Eq. (24)) or "adaptive" (`solver.wear.step`).
     cycles (n_output,): ascending counts to report, the first 0. Values are interpolated within the steps; the last
         Euler step ends at the last count. Or `ToTheEnd`: until nothing wears any more, at counts chosen from the
         result. Then the steps grow without bound, which is not allowed for explicit steps.
@@ -64,6 +63,26 @@ class SlowTime:
     def end(self) -> float:
         """Last cycle count; inf where it is not known."""
         return math.inf if isinstance(self.cycles, ToTheEnd) else float(self.cycles[-1])
+
+    @property
+    def where(self) -> Fixed:
+        """At which frequency the joint is excited."""
+        return Fixed() if self.follow is None else Following(self.follow)
+
+    def steps(self, work: WearingJoint) -> Steps:
+        """The steps of the history."""
+        if self.scheme == "adaptive":
+            return Adaptive(work, work.case.settings.rtol, self.last_step_end(self.end))
+        given = work, self.scheme, self.step, self.end
+        if isinstance(self.cycles, ToTheEnd):
+            return Growing(*given)
+        if self.scheme == "explicit" and self.largest_depth is not None:
+            return LargestDepth(*given, self.largest_depth)
+        return Given(*given)
+
+    def last_step_end(self, last: float) -> float:
+        """Count beyond which no adaptive step goes; last: last count of the integration."""
+        return last if self.ends_at_last else math.inf
 
 
 @packable
@@ -103,12 +122,13 @@ class Like:
 class Saved:
     """The progress of the computation of a history, from which the computation goes on.
 
-    progress, output, iterations: state of the present integration.
+    state, n_steps, output, iterations: of the present integration.
     fine: the finished history, while its reference solution is integrated; else None.
     spent: CPU seconds so far.
     """
 
-    progress: Progress
+    state: WearState
+    n_steps: int
     output: OutputState
     iterations: int
     fine: Ended | None
@@ -123,7 +143,6 @@ class Solutions:
     keep: called from time to time with the packed progress; None for no calls.
     saved: progress to go on from; None to begin.
     began: CPU time, s, at which the computation would have begun without an interruption.
-    fine: the history, if finished before an interruption.
     """
 
     case: Case
@@ -131,47 +150,40 @@ class Solutions:
     asked: SlowTime
     keep: Callable[[Packed], None] | None = None
     saved: Saved | None = None
-    began: float = field(init=False, default_factory=computing_time)
-    fine: Ended | None = field(init=False)
+    fine: Ended | None = field(init=False, default=None)
+    began: float = field(init=False)
 
     def __post_init__(self) -> None:
-        self.fine = None
+        self.began = computing_time()
         if self.saved is not None:
-            self.began -= self.saved.spent
             self.fine = self.saved.fine
+            self.began -= self.saved.spent
 
     @property
     def spent(self) -> float:
         """CPU seconds so far, those before an interruption included."""
         return computing_time() - self.began
 
-    def history(self) -> Ended:
-        """Integrate the history."""
+    def history(self, *, stable_end: bool = True) -> Ended:
+        """Integrate the history. stable_end: whether the stability of its last state is tested."""
         if self.fine is not None:
             return self.fine
-        asked, settings = self.asked, self.case.settings
-        work, smooth = self._joint(), asked.scheme == "adaptive"
-        counts = None if isinstance(asked.cycles, ToTheEnd) else asked.cycles
-        control: Control = GivenSteps(asked.scheme, asked.step, asked.end, asked.largest_depth)
-        if smooth:
-            control = AdaptiveSteps(settings.rtol, end=self._last_step_end(asked.end))
-        stop = InSteadyState(asked.cycles.final_share) if isinstance(asked.cycles, ToTheEnd) else AtCount(asked.end)
+        asked, start = self.asked, self.start
+        work = self._joint()
         integration = Integration(
-            control,
+            asked.steps(work),
             FullCheck(asked.loops, with_resonance=self._shifts),
-            stop,
-            DenseOutput(work.area, counts, smooth=smooth, target=asked.until),
-            lambda progress: self._save(integration, work, progress, None),
-            WEAR.history_iterations,
+            DenseOutput(work.area, asked.scheme == "adaptive", self._given_counts, asked.until),
+            lambda state, n_steps: self._save(integration, state, n_steps, None),
+            HISTORY_ITERATIONS,
+            asked.end,
+            asked.cycles.final_share if isinstance(asked.cycles, ToTheEnd) else 0.0,
         )
-        start = self.start
-        assert start.state is not None
         estimate, accurate = Estimate(start.response_error, start.wear_rate_error), start.outcome is Outcome.CONVERGED
         first = start.state
-        ended = self._run(
-            integration, work, lambda: work.begin(first, start.resolution, estimate, accurate=accurate), asked.end
-        )
-        if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
+        assert first is not None
+        ended = self._run(integration, lambda: work.begin(first, start.resolution, estimate, accurate=accurate))
+        if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED or not stable_end:
             return ended
         state = ended.state
         unstable = guarded(lambda: unstable_at_end(work, state))
@@ -181,7 +193,10 @@ class Solutions:
         """Integrate the reference solution of a history, for all counts at which both are compared or read."""
         assert fine.state is not None
         like = Like(fine.output.course.resolutions, fine.state.step_limit, fine.iterations)
-        return self.follow(like, self._compared(fine), fine)
+        reached = min(fine.output.course.ends[-1], self.asked.end)
+        # NaN where no target was reached
+        counts = np.concatenate([[0.0, fine.output.reached], self.counts(fine), fine.output.cycles])
+        return self.follow(like, np.unique(counts[counts <= reached]), fine)
 
     def follow(self, like: Like, compared: FloatArray, fine: Ended | None = None) -> Ended:
         """Integrate the reference solution of a history of which the start state may be another one.
@@ -189,31 +204,25 @@ class Solutions:
         compared (n,): ascending counts at which it is read, the first 0.
         fine: the history, to be saved with the progress.
         """
-        assert self.start.state is not None
-        work, end = self._joint(), float(compared[-1])
-        resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in like.resolutions)
+        work, asked, end = self._joint(), self.asked, float(compared[-1])
+        other, ratio = (coarser, RTOL_RATIO) if asked.scheme == "adaptive" else (finer, 1.0)
+        resolutions = tuple((count, other(resolution, self.case.model)) for count, resolution in like.resolutions)
         # a short history may consist of its first steps, which do not depend on rtol
-        first = 2.0 if self.asked.ends_at_last else 1.0
-        steps = AdaptiveSteps(RTOL_RATIO * self.case.settings.rtol, self._last_step_end(end), first)
+        first = 2.0 if asked.ends_at_last else 1.0
         integration = Integration(
-            steps,
+            Adaptive(work, ratio * self.case.settings.rtol, asked.last_step_end(end), first, bounded=False),
             PlainCheck(resolutions, with_resonance=self._shifts),
-            AtCount(end),
-            DenseOutput(work.area, compared, smooth=True),
-            lambda progress: self._save(integration, work, progress, fine),
-            bounded=False,
-            most_iterations=like.iterations + WEAR.history_iterations,
+            DenseOutput(work.area, smooth=True, counts=compared),
+            lambda state, n_steps: self._save(integration, state, n_steps, fine),
+            like.iterations + HISTORY_ITERATIONS,
+            end,
         )
-        return self._run(integration, work, lambda: begin_reference(work, self.start, like.step_limit), end)
+        return self._run(integration, lambda: begin_reference(work, self.start, like.step_limit))
 
     @property
     def _shifts(self) -> bool:
         """Whether the history ends at a shift of the resonance of the vibration."""
         return self.asked.until is not None and self.asked.until.quantity == "frequency_shift"
-
-    def _last_step_end(self, last: float) -> float:
-        """Count beyond which no adaptive step goes; last: last count of the integration."""
-        return last if self.asked.ends_at_last else math.inf
 
     def counts(self, fine: Ended) -> FloatArray:
         """Counts (n_output,) at which the history is read."""
@@ -222,6 +231,10 @@ class Solutions:
         if not fine.output.nodes:
             return np.zeros(self.asked.cycles.n_outputs)
         return self.output_of(fine).even_counts(self.asked.cycles.n_outputs)
+
+    @property
+    def _given_counts(self) -> FloatArray:
+        return np.zeros(0) if isinstance(self.asked.cycles, ToTheEnd) else self.asked.cycles
 
     def output_of(self, fine: Ended) -> DenseOutput:
         """The output of the history, to be read."""
@@ -232,47 +245,40 @@ class Solutions:
         return self._output(ended, smooth=True)
 
     def _output(self, ended: Ended, *, smooth: bool) -> DenseOutput:
-        output = DenseOutput(self.case.model.contact.area, None, smooth=smooth, target=self.asked.until)
-        output.taken = ended.output
-        return output
-
-    def _compared(self, fine: Ended) -> FloatArray:
-        """Ascending counts at which the reference solution is read, the first 0."""
-        reached = min(fine.output.course.ends[-1], self.asked.end)
-        # NaN where no target was reached
-        counts = np.concatenate([[0.0, fine.output.reached], self.counts(fine), fine.output.course.cycles])
-        return np.unique(counts[counts <= reached])
+        return DenseOutput(self.case.model.contact.area, smooth, np.zeros(0), self.asked.until, ended.output)
 
     def _joint(self) -> WearingJoint:
         """The joint, with the rest of the time limit."""
-        assert self.start.state is not None
         asked = self.asked
-        work = WearingJoint.of(self.case, self.start.state, asked.wear_coefficient, asked.law, asked.follow)
+        assert self.start.state is not None
+        work = WearingJoint.of(self.case, self.start.state, asked.wear_coefficient, asked.law, asked.where)
         work.run.budget.deadline = self.began + self.case.settings.time_limit
         return work
 
-    def _run(self, integration: Integration, work: WearingJoint, begin: Callable[[], WearState], end: float) -> Ended:
-        """Run an integration from its first or its saved state to the count `end` (inf: open)."""
-        progress: Progress | Failure
-        if self.saved is not None:
-            work.run.budget.iterations, integration.output.taken = self.saved.iterations, self.saved.output
-            progress, self.saved = self.saved.progress, None
+    def _run(self, integration: Integration, begin: Callable[[], WearState]) -> Ended:
+        """Run an integration from its first or its saved state."""
+        output, budget = integration.output, integration.steps.work.run.budget
+        n_steps, saved, self.saved = 0, self.saved, None
+        first: WearState | Failure
+        if saved is not None:
+            budget.iterations, output.taken = saved.iterations, saved.output
+            first, n_steps = saved.state, saved.n_steps
         else:
-            progress = guarded(lambda: integration.begin(work, begin()))
-        if isinstance(progress, Failure):
-            return Ended(None, progress, integration.output.taken, work.run.budget.iterations)
-        state, failure = integration.run(work, progress)
-        last, over = integration.output.last, state.cycle < end < math.inf and not work.wears(state)
+            first = guarded(lambda: integration.begin(begin()))
+        if isinstance(first, Failure):
+            return Ended(None, first, output.taken, budget.iterations)
+        state, failure = integration.run(first, n_steps)
+        last, over = output.last, state.cycle < integration.end < math.inf and not state.wears
         if failure.outcome is Outcome.CONVERGED and last is not None and over:
             # nothing wears any more: the state holds for all later counts
-            integration.output.add(end, last.report, last.rate, 0.0)
-        return Ended(state, failure, integration.output.taken, work.run.budget.iterations)
+            output.add(integration.end, last.report, last.rate, 0.0)
+        return Ended(state, failure, output.taken, budget.iterations)
 
-    def _save(self, integration: Integration, work: WearingJoint, progress: Progress, fine: Ended | None) -> None:
+    def _save(self, integration: Integration, state: WearState, n_steps: int, fine: Ended | None) -> None:
         """Pass the progress of an integration to `keep`."""
         if self.keep is not None:
-            saved = Saved(progress, integration.output.taken, work.run.budget.iterations, fine, self.spent)
-            self.keep(pack(saved))
+            iterations = integration.steps.work.run.budget.iterations
+            self.keep(pack(Saved(state, n_steps, integration.output.taken, iterations, fine, self.spent)))
 
 
 def begin_reference(work: WearingJoint, start: StartState, step_limit: float) -> WearState:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.harmonic_balance.state import State
@@ -34,15 +34,12 @@ class Choice:
 @packable
 @dataclass(frozen=True)
 class WearState:
-    """A wearing joint at one cycle count.
-
-    The next step depends on this state only. A factorisation that is kept between two solves only saves time.
+    """A wearing joint at one cycle count; the next step depends on this state only.
 
     cycle: cycle count.
     omega: angular frequency of the excitation, rad/s.
     lag: phase lag of the vibration where the frequency is followed, rad (`solver.continuation.phase_lag`).
-    half_width: change of the frequency over the change of the phase lag, rad/s: half the width of the resonance that
-        the frequency follows; 0 for a given frequency.
+    half_width: change of a followed frequency over the change of the phase lag, rad/s; 0 for a given frequency.
     point: periodic state, its worn depth (`point.evaluation.wear_depth`) and the tangential history for the next one.
     resolution: harmonics and samples of the periodic state.
     choice: last choice of the resolution.
@@ -53,8 +50,7 @@ class WearState:
     change: length of the last step, cycles, and changes of predicted force (n_rel, 2H+1), N, and frequency, rad/s, in
         this step, for the extrapolation to the next state; None after a jump and after a change of the harmonics.
     previous: length of the last step, cycles, and depth at its start (n_contact,), m, for BDF2; None after a jump.
-    length: length of the next step, cycles, planned by the control.
-    first_length: length of the first step, cycles.
+    length, first_length: lengths of the next step, planned by the last one, and of the first step, cycles.
     judged_h (n_rel, 2H+1): predicted force at the last stability check, N; None before.
     hold: soft hold of the mean position of a joint that slides as a whole; None for none.
     held_from: count from which on the joint is held, NaN if never.
@@ -95,18 +91,15 @@ class WearState:
         """Wear rate below which a joint sticks, m3 per cycle."""
         return _NO_WEAR * self.most_rate
 
-    def planned(self, length: float) -> WearState:
-        """The state with another length of the next step, cycles."""
-        return replace(self, length=length)
+    @property
+    def wears(self) -> bool:
+        """Whether the wear rate is above the round-off of the slip by the static load."""
+        return bool(self.rates[-1] > self.least_rate)
 
 
 @dataclass(frozen=True)
 class Reached:
-    """End of a step.
-
-    point: periodic state.
-    omega, lag, half_width: as in `WearState`.
-    """
+    """End of a step: its periodic state; omega, lag and half_width as in `WearState`."""
 
     point: State
     omega: float

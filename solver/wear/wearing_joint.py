@@ -8,22 +8,20 @@ import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.period_events import left_out
-from solver.contact.archard import volume_rate, wear_gain, wear_rate
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
-from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import FloatArray
 from solver.newton.iteration import MOST_ITERATIONS
 from solver.newton.run import Run
+from solver.outcome import Outcome
 from solver.results.history import PeriodicState
-from solver.settings import FollowedFrequency, Resolution
+from solver.settings import Resolution
 from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Hold, Joint
-from solver.wear.followed import end_at_resonance, lost_resonance
-from solver.wear.friction_history import history_along
+from solver.wear.rate_slope import explicit_step_limit
 from solver.wear.state import Choice, Reached, WearState
-from solver.wear.step_limit import explicit_step_limit
+from solver.wear.where import Fixed
 
 
 @dataclass
@@ -31,21 +29,19 @@ class WearingJoint:
     """The joint of one wear history.
 
     case: model, friction and settings, with the resolution and the hold of the last state that was used.
-    omega: angular frequency of the unworn state, rad/s.
     excitation_amplitude: N.
     wear_coefficient: 1/Pa.
     wearing: part of the slip work that wears.
-    follow: what the frequency follows; None for a constant frequency.
+    where: at which frequency.
     run: counts the iterations, limits the time, and keeps a factorisation from one solve to the next.
     usual_work: N m, lower bound of the slip work to which errors are relative in the choice of harmonics.
     """
 
     case: Case
-    omega: float
     excitation_amplitude: float
     wear_coefficient: float
     wearing: WearingWork
-    follow: FollowedFrequency | None = None
+    where: Fixed
     run: Run = field(init=False)
     usual_work: float = 0.0
     _joint: Joint | None = field(default=None, repr=False)
@@ -60,11 +56,11 @@ class WearingJoint:
         state: PeriodicState,
         wear_coefficient: float,
         law: WearLaw = ARCHARD,
-        follow: FollowedFrequency | None = None,
+        where: Fixed | None = None,
     ) -> WearingJoint:
-        """The joint of a case at the frequency and load of its unworn state."""
+        """The joint of a case at the load of its unworn state."""
         wearing = wearing_work(law, case.model.contact, case.friction_coefficient)
-        return cls(case, state.omega, state.excitation_amplitude, wear_coefficient, wearing, follow)
+        return cls(case, state.excitation_amplitude, wear_coefficient, wearing, where or Fixed())
 
     @property
     def area(self) -> FloatArray:
@@ -90,25 +86,17 @@ class WearingJoint:
         """Drop the kept factorisation, so that the next solve depends on the state alone."""
         self.run = self.run.fresh()
 
-    def is_stable(self, state: WearState, at: Evaluation) -> bool:
-        """Whether a state of the joint of another one is stable at fixed wear depth."""
-        return is_stable_when_held(self.at(state), at, self.run)
-
-    def wearing_work(self, at: Evaluation) -> FloatArray:
-        """Work (n_contact,) that wears in a cycle, J."""
-        return self.wearing.work(*worn_by(at))
+    def is_stable(self, joint: Joint, at: Evaluation) -> bool:
+        """Whether a state is stable at constant wear depth."""
+        return is_stable(Balance(joint, at.history, at.wear_depth), at, self.run)
 
     def rate(self, at: Evaluation) -> FloatArray:
         """Wear rate (n_contact,), m per cycle, Eqs. (7), (21), (25)."""
-        return wear_rate(self.wear_coefficient, self.area, self.wearing_work(at))
+        return self.gain(1.0) * self.wearing.work(*worn_by(at))
 
     def gain(self, cycles: float) -> FloatArray:
-        """Growth of the depth over wearing work (n_contact,), m/J, in a number of cycles."""
-        return wear_gain(self.wear_coefficient, self.area, cycles)
-
-    def wears(self, state: WearState) -> bool:
-        """Whether the wear rate is above the round-off of the slip by the static load."""
-        return bool(state.rates[-1] > state.least_rate)
+        """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
+        return cycles * self.wear_coefficient / self.area
 
     def begin(
         self,
@@ -125,22 +113,19 @@ class WearingJoint:
         accurate: whether these errors are below rtol.
         step_limit: largest stable explicit step, cycles; NaN if unknown.
         """
-        joint = self.joint(resolution, None, start.omega)
-        balance = Balance(joint, start.start_history, start.wear_depth)
+        balance = Balance(self.joint(resolution, None, start.omega), start.start_history, start.wear_depth)
         at = balance.evaluate(balance.predict(start.displacement_h, start.contact_force_h))
         unknown = np.full(self.area.size + 1, np.nan)
-        choice = Choice(left_out(resolution.orders, at), estimate, accurate)
-        point = State(at, final_history(balance, at))
-        # the stability of a start state has been checked
         begun = WearState(
             0.0,
             start.omega,
-            point,
+            State(at, final_history(balance, at)),
             resolution,
-            choice,
+            Choice(left_out(resolution.orders, at), estimate, accurate),
             rates=unknown,
             largest_rates=np.zeros_like(unknown),
             step_limit=step_limit,
+            # the stability of a start state has been checked
             judged_h=at.predicted_h,
         )
         return self.noted(begun)
@@ -164,53 +149,22 @@ class WearingJoint:
         # the static slip included: where all pairs stick, the vibration alone is round-off
         pressed = np.abs(at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(at.displacement_h[:, 1:], axis=(1, 2)))
-        most = volume_rate(self.wear_coefficient, self.wearing.largest_factor * moved)
+        most = self.wear_coefficient * (self.wearing.largest_factor * moved)
         rates = np.append(volumes, volumes.sum())
         largest = np.maximum(state.largest_rates, np.abs(rates))
         state = replace(state, rates=rates, largest_rates=largest, most_rate=max(state.most_rate, most))
-        if np.isnan(state.step_limit) and self.wears(state):
+        if np.isnan(state.step_limit) and state.wears:
             limit = explicit_step_limit(self.at(state), at, self.gain(1.0), self.wearing, self.run)
             state = replace(state, step_limit=limit)
         return state
 
-    def solved(self, state: WearState, start: FloatArray, balance: Balance) -> Reached | None:
-        """End of a step from a state, with values from `predicted`; None where it is not found."""
-        if self.follow is not None:
-            return end_at_resonance(self.case, balance, start, state, self.follow, self.run)
-        point = self.run.state(balance, start, most=CONTINUATION.near_iterations)
-        return None if point is None else Reached(point, state.omega, state.lag, state.half_width)
-
     def at_followed(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depths and its tangential history."""
-        if self.follow is None:
+        if not self.where.follows:
             return state
         at = state.point.evaluation
         balance = Balance(self.at(state), at.history, at.wear_depth)
-        found = end_at_resonance(self.case, balance, at.predicted_h, state, self.follow, self.run, MOST_ITERATIONS)
+        found = self.where.solve(self.case, balance, at.predicted_h, state, self.run, MOST_ITERATIONS)
         if found is None:
-            return lost_resonance(self.follow, state)
+            return self.where.lost(state) or Failure(Outcome.RESONANCE_LOST)
         return replace(state, **vars(found))
-
-    def predicted(self, state: WearState, balance: Balance, length: float) -> tuple[FloatArray, Balance]:
-        """First predicted force of a solve (n_rel, m), N, and the balance at the first frequency.
-
-        Both are extrapolated from the last step, or those of the state.
-        """
-        now = state.point.evaluation.predicted_h
-        if state.change is None:
-            return now, balance
-        before, change, faster = state.change
-        ahead, there = now + (length / before) * change, balance
-        if self.follow is not None:
-            omega = state.omega + (length / before) * faster
-            there = replace(balance, joint=self.case.joint(omega, self.excitation_amplitude))
-        found = there.evaluate(ahead)
-        if found.scaled_residual() > balance.evaluate(now).scaled_residual():
-            return now, balance
-        history = history_along(there.joint, state.point.evaluation, state.point.history, found)
-        return ahead, replace(there, history=history)
-
-
-def is_stable_when_held(joint: Joint, at: Evaluation, run: Run) -> bool:
-    """Whether a state is stable at fixed wear depth."""
-    return is_stable(Balance(joint, at.history, at.wear_depth), at, run)

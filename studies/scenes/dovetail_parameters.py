@@ -30,7 +30,7 @@ class Parameters(BaseModel):
     retention_stiffness: float | None = Field(
         None,
         ge=0,
-        description="retainer along the slot, N/m; default: 1e7 under a travelling wave, else 0",
+        description="retainer along the slot; default 1e7 under a travelling wave and else 0, N/m",
     )
     mesh: int = Field(2, ge=1, le=8, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs, -")
     stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")

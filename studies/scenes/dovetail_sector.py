@@ -86,7 +86,7 @@ def define_sector(parameters: Parameters) -> tuple[MeshModel, JointDefinition]:
     friction alone. Once every pair slips at some time of the period, vibration carries the root along. Under a
     travelling wave it walks, and without a retainer there is no periodic state (measured: at the resonance of nodal
     diameter 3 and 0.5 N of excitation a force of about 100 N holds it). At nodal diameter 0 nothing but unequal wear
-    drives it one way, by 1e-7 of the friction: its mean position is not determined (`solver.wear.free_slide`).
+    drives it one way, by 1e-7 of the friction: its mean position is not determined (`solver.wear.jump`).
 
     Raises SceneError where the parameters do not go together.
     """

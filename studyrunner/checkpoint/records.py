@@ -1,4 +1,4 @@
-"""The record of a wear history: one element of an array of numpy with all values of a result."""
+"""The record of a result: one element of an array of numpy with all values of a result."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.packing import Packed
-from studyrunner.plan.planning import march_variables
-from studyrunner.plan.results import MarchResult
+from studyrunner.kinds.kind import kind_of
+from studyrunner.kinds.task import PointResult
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.variables import COUNTS, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
@@ -27,10 +26,10 @@ def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
 
 
 def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
-    """Data type of the record of a history: all values of a result."""
+    """Data type of the record of a point: all values of a result."""
     sizes = variable_sizes(study, facts)
     fields: list[tuple[str, str, tuple[int, ...]]] = [(name, entry.dtype, ()) for name, entry in study.kept.items()]
-    for name in march_variables(study):
+    for name in kind_of(study).variables(study):
         # of all pairs, only those asked for have a loop
         lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
         entry = {**study.variables, **LOOPS, **COUNTS}[name]
@@ -38,25 +37,13 @@ def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
     return np.dtype(fields)
 
 
-def record_of(kind: np.dtype[np.void], result: MarchResult) -> NDArray[np.void]:
-    """Record (1,) of a history. Pairs that its scene does not have are NaN, or 0 in whole numbers."""
+def record_of(kind: np.dtype[np.void], result: PointResult) -> NDArray[np.void]:
+    """Record (1,) of a point. Pairs that its scene does not have are NaN, or 0 in whole numbers."""
     records = empty_record(kind)
     for name, values in result.values.items():
         own = tuple(slice(size) for size in np.shape(values))
         records[name][0:1][(slice(None), *own)] = values
     return records
-
-
-def pack_record(record: NDArray[np.void]) -> Packed:
-    """The bytes of a record (1,), whose data type is part of its key."""
-    return Packed("", (np.frombuffer(record.tobytes(), np.uint8),))
-
-
-def record_in(packed: Packed | None, kind: np.dtype[np.void]) -> bytes | None:
-    """The bytes of the record (1,) in an entry; None where there is none of `kind`."""
-    if packed is None or len(packed.arrays) != 1 or packed.arrays[0].nbytes != kind.itemsize:
-        return None
-    return packed.arrays[0].tobytes()
 
 
 def empty_record(kind: np.dtype[np.void]) -> NDArray[np.void]:

@@ -1,31 +1,35 @@
 """What a study has computed so far, in one SQLite file beside the result, from which a later run goes on.
 
 The file has one table with the columns kind, key and blob. Rank 0 alone uses the file. What arrives within a moment
-goes into one transaction.
+goes into one transaction. A rollback journal and an exclusive lock share no memory with other processes, as WAL does:
+this works on file systems of a network. With `synchronous=FULL` a finished transaction survives a power cut.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
+import io
 import json
 import os
 import socket
 import sqlite3
 import time
 import zlib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
+from typing import Any
+from urllib.parse import quote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver.packing import Packed
-from studyrunner.checkpoint.database import RUN, faults_told, open_file, run_in, transaction
 from studyrunner.system.endings import uninterrupted
+from studyrunner.system.files import sync_folder
 from studyrunner.user_error import StorageError
 
 STARTS, PROGRESS, RESULTS, COMPUTED = "start", "progress", "result", "computed"
-"""Kinds of entries: start states; progress of tasks; finished wear histories; what is computed once for a study."""
+"""Kinds of entries: start states; progress of tasks; results of points; what is computed once for a study."""
 
 LARGEST = 9 * 10**8
 """Largest size of an entry, bytes. SQLite has no larger ones."""
@@ -35,47 +39,56 @@ SECONDS_A_TRANSACTION = 0.25
 
 _SHARE_OF_WRITING = 0.1  # of the time of rank 0, on a disk that is slow
 _BYTES_A_TRANSACTION = 8e6
-_HEAD_BYTES = 8
-_KINDS = frozenset("biufcSU")  # of numpy: numbers and texts, no objects
 _LEVEL = 1  # of zlib: the rank that compresses hands out the tasks as well
+_SECONDS_TO_DIE = 5.0  # after which all ranks of a run that was killed have noticed
+_PAUSE = 0.1
+_RUN = "run"  # kind of the only entry about the file itself
+_SCHEMA = "CREATE TABLE entries (kind TEXT NOT NULL, key TEXT NOT NULL, blob BLOB NOT NULL, PRIMARY KEY (kind, key))"
+_APPLICATION = int.from_bytes(b"wear", "big")
+_VERSION = 3
+_PRAGMAS = ("trusted_schema=OFF", "temp_store=MEMORY", "locking_mode=EXCLUSIVE", "synchronous=FULL")
+_DAMAGES = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_FORMAT)
+_FAULTS = {
+    sqlite3.SQLITE_FULL: errno.ENOSPC,
+    sqlite3.SQLITE_IOERR: errno.EIO,
+    sqlite3.SQLITE_READONLY: errno.EACCES,
+    sqlite3.SQLITE_PERM: errno.EACCES,
+    sqlite3.SQLITE_CANTOPEN: errno.EACCES,
+    sqlite3.SQLITE_NOMEM: errno.ENOMEM,
+}
 
-Name = tuple[str, str]
+
+class StoreInUseError(Exception):
+    """Another run works with the file, or the file system has no locks; the text says which run."""
+
+
+class _OtherFileError(Exception):
+    """The file is none of this version, or is damaged; the text says which."""
 
 
 def to_blob(packed: Packed) -> bytes:
-    """The text, type and shape of the arrays of a value as JSON, then their bytes, compressed by zlib.
+    """The text and the arrays of a value, each in the format of `numpy.save`, compressed by zlib.
 
-    Raises TypeError for arrays of anything but numbers and texts: a bug.
+    Raises ValueError for arrays of objects: a bug.
     """
-    for array in packed.arrays:
-        if array.dtype.kind not in _KINDS:
-            raise TypeError(f"arrays of {array.dtype} are not kept")
-    head = json.dumps([packed.text, [[array.dtype.str, array.shape] for array in packed.arrays]]).encode()
-    raw = (len(head).to_bytes(_HEAD_BYTES, "little"), head, *(array.tobytes() for array in packed.arrays))
-    return zlib.compress(b"".join(raw), _LEVEL)
+    file = io.BytesIO()
+    for array in (np.frombuffer(json.dumps(packed.text).encode(), np.uint8), *packed.arrays):
+        np.lib.format.write_array(file, array, allow_pickle=False)
+    return zlib.compress(file.getbuffer(), _LEVEL)
 
 
 def from_blob(blob: bytes) -> Packed:
-    """The value of `to_blob`. Raises ValueError where the bytes are no such value."""
-    try:
-        compressed = zlib.decompressobj()
-        raw = compressed.decompress(blob, LARGEST)
-        if not compressed.eof:
-            raise ValueError("not all of it, or too much")
-        place = _HEAD_BYTES + int.from_bytes(raw[:_HEAD_BYTES], "little")
-        text, layout = json.loads(raw[_HEAD_BYTES:place])
-        arrays = []
-        for kind, shape in layout:
-            array: NDArray[np.generic] = np.ndarray(tuple(shape), np.dtype(kind), raw, place)
-            arrays.append(array.copy())
-            place += array.nbytes
-        return Packed(text, tuple(arrays))
-    except (zlib.error, TypeError, OverflowError) as error:
-        raise ValueError("not written by a run") from error
+    """The value of `to_blob`. Raises ValueError or zlib.error where the bytes are no such value."""
+    content = zlib.decompress(blob)
+    file, arrays = io.BytesIO(content), []
+    while file.tell() < len(content):
+        arrays.append(np.lib.format.read_array(file, allow_pickle=False))
+    text, *others = arrays
+    return Packed(json.loads(text.tobytes()), tuple(others))
 
 
 class Store:
-    """The open file of a run. Raises StoreInUseError, NoLocksError and StorageError.
+    """The open file of a run. Raises StoreInUseError and StorageError.
 
     path: of the file.
     notes: lines for the user on what was found.
@@ -86,23 +99,27 @@ class Store:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.notes: list[str] = []
-        self._waiting: dict[Name, bytes | None] = {}
+        self._waiting: dict[tuple[str, str], bytes | None] = {}
         self._n_bytes = 0  # that wait
         self._used: set[str] = set()
         self._next_write = 0.0
-        with faults_told(path):
-            self._is_new = not path.exists()
-            self._database, said = open_file(path)
-            self.notes += [said] if said else []
+        with _faults_told(path):
+            try:
+                self._database = _open_locked(path)
+            except _OtherFileError as error:
+                aside = path.with_name(f"{path.name}.old")
+                path.rename(aside)
+                path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
+                self.notes.append(f"{path.name} {error}: it is kept as {aside.name}, and the study begins anew")
+                self._database = _open_locked(path)
             self._file = path.stat().st_ino
-            self._keys: dict[str, set[str]] = {kind: set() for kind in (STARTS, PROGRESS, RESULTS, COMPUTED, RUN)}
+            self._keys: dict[str, set[str]] = {kind: set() for kind in (STARTS, PROGRESS, RESULTS, COMPUTED, _RUN)}
             for kind, key in self._database.execute("SELECT kind, key FROM entries"):
                 self._keys.setdefault(kind, set()).add(key)
-        before = run_in(self._database)
+        before = _run_in(self._database)
         self.ended_hard = bool(before.get("open"))
-        under_way = frozenset(before.get("under_way", ())) if self.ended_hard else frozenset()
         self.crashes: dict[str, int] = dict(before.get("crashes", {}))
-        for key in under_way:
+        for key in before.get("under_way", ()) if self.ended_hard else ():
             self.crashes[key] = self.crashes.get(key, 0) + 1
         self._study: dict[str, str] = {name: before[name] for name in ("name", "scene") if name in before}
         self._under_way: set[str] = set()
@@ -112,7 +129,6 @@ class Store:
     def note_study(self, name: str, scene: str) -> None:
         """Writes which study the file belongs to."""
         self._study = {"name": name, "scene": scene}
-        self._is_new = False
         self._is_noted = False
         self.flush()
 
@@ -131,19 +147,20 @@ class Store:
             self._is_noted = False
 
     def put(self, kind: str, key: str, packed: Packed) -> None:
-        """Adds an entry, in place of an earlier one. Raises StorageError."""
+        """Adds an entry, in place of an earlier one; nothing where an entry that only saves time is too large.
+
+        Raises StorageError.
+        """
         if packed.n_bytes > LARGEST:
+            if kind in (PROGRESS, COMPUTED):
+                return
             raise StorageError(self.path, ValueError(f"{packed.n_bytes:.3g} bytes in one entry"), "use a smaller model")
-        self._put(kind, key, to_blob(packed))
+        blob = to_blob(packed)
+        self._waiting[kind, key] = blob
+        self._keys[kind].add(key)
+        self._n_bytes += len(blob)
         if self._n_bytes > _BYTES_A_TRANSACTION:
             self.flush()
-
-    def put_if_small(self, kind: str, key: str, packed: Packed) -> None:
-        """Adds an entry that only saves time; nothing where it is too large."""
-        if kind == COMPUTED:
-            self._used.add(key)
-        if packed.n_bytes <= LARGEST:
-            self.put(kind, key, packed)
 
     def has(self, kind: str, key: str) -> bool:
         """Whether there is an entry, on the disk or on its way."""
@@ -159,17 +176,18 @@ class Store:
             return None
         blob = self._waiting.get((kind, key))
         if blob is None:
-            with faults_told(self.path):
+            with _faults_told(self.path):
                 query = "SELECT blob FROM entries WHERE kind=? AND key=?"
                 (blob,) = self._database.execute(query, [kind, key]).fetchone() or (b"",)
-        with contextlib.suppress(ValueError, TypeError):
+        with contextlib.suppress(zlib.error, ValueError, TypeError):
             return from_blob(blob)
         self.forget(kind, key)
         return None
 
     def keep_computed(self, key: str, value: Packed) -> None:
         """Keeps what is computed once for a study. key: hash of its inputs."""
-        self.put_if_small(COMPUTED, key, value)
+        self._used.add(key)
+        self.put(COMPUTED, key, value)
 
     def read_computed(self, key: str) -> Packed | None:
         """What `keep_computed` has kept, in this run or an earlier one; None where there is nothing."""
@@ -188,8 +206,8 @@ class Store:
         used: keys by kind. What was kept or read by `read_computed` in this run is used as well.
         """
         self.flush()
-        named = {RUN: frozenset({""}), COMPUTED: self._used, **used}
-        with faults_told(self.path):
+        named = {_RUN: frozenset({""}), COMPUTED: self._used, **used}
+        with _faults_told(self.path):
             rows = self._database.execute("SELECT kind, key, length(blob) FROM entries ORDER BY rowid").fetchall()
         idle = [(kind, key, size) for kind, key, size in rows if key not in named.get(kind, ())]
         too_much = sum(size for *_, size in idle) - most
@@ -199,11 +217,6 @@ class Store:
             too_much -= size
             self.forget(kind, key)
         self.flush()
-
-    def shrink(self) -> None:
-        """Gives the room of what was removed back to the disk. A full disk only keeps the file larger."""
-        with contextlib.suppress(StorageError), faults_told(self.path), uninterrupted():
-            self._database.executescript("PRAGMA incremental_vacuum")
 
     def tick(self) -> None:
         """Called many times a second: writes what waits, when it has waited long enough. Raises StorageError."""
@@ -215,45 +228,129 @@ class Store:
         if not self._waiting and self._is_noted:
             return
         if not self._is_noted:
-            self._waiting[RUN, ""] = self._describe_run()
+            self._waiting[_RUN, ""] = self._describe_run()
         began = time.monotonic()
-        with uninterrupted(), faults_told(self.path):
+        with uninterrupted(), _faults_told(self.path):
             if self.path.stat().st_ino != self._file:
                 raise FileNotFoundError(None, "another file has taken its place")
-            with transaction(self._database):
+            with self._database as database:
                 for (kind, key), blob in self._waiting.items():
                     if blob is None:
-                        self._database.execute("DELETE FROM entries WHERE kind=? AND key=?", [kind, key])
+                        database.execute("DELETE FROM entries WHERE kind=? AND key=?", [kind, key])
                     else:
-                        self._database.execute("INSERT OR REPLACE INTO entries VALUES (?, ?, ?)", [kind, key, blob])
+                        database.execute("INSERT OR REPLACE INTO entries VALUES (?, ?, ?)", [kind, key, blob])
             self._waiting, self._n_bytes, self._is_noted = {}, 0, True
         now = time.monotonic()
         self._next_write = now + max(SECONDS_A_TRANSACTION, (now - began) / _SHARE_OF_WRITING)
 
     def close(self) -> None:
-        """Writes what waits, as far as there is room, and closes the file. A new file without a study is removed."""
+        """Writes what waits, as far as there is room, and closes the file. A file without a study is removed."""
         self._is_open, self._is_noted = False, False
         # an error was said before, or there is nothing that waits for an answer
         with contextlib.suppress(StorageError):
             self.flush()
         with contextlib.suppress(sqlite3.Error):
             self._database.close()
-        if self._is_new and not any(keys for kind, keys in self._keys.items() if kind != RUN):
+        if not self._study and not any(keys for kind, keys in self._keys.items() if kind != _RUN):
             # the run has ended before it began: the scene or the disk is at fault
             with contextlib.suppress(OSError):
                 self.path.unlink()
 
-    def _put(self, kind: str, key: str, blob: bytes) -> None:
-        self._waiting[kind, key] = blob
-        self._keys[kind].add(key)
-        self._n_bytes += len(blob)
-
     def _describe_run(self) -> bytes:
-        noted = {
+        run = {
             **self._study,
             "run": f"process {os.getpid()} on {socket.gethostname()}",
             "open": self._is_open,
             "under_way": sorted(self._under_way),
             "crashes": self.crashes,
         }
-        return json.dumps(noted).encode()
+        return json.dumps(run).encode()
+
+
+def read_study(path: Path) -> tuple[str, str] | None:
+    """Name and scene of the study that a file belongs to, without its lock; None where the file does not say so."""
+    found = _read_run(path)
+    return (str(found["name"]), str(found["scene"])) if "name" in found and "scene" in found else None
+
+
+def _read_run(path: Path) -> dict[str, Any]:
+    """What a file that another run may use says of itself; nothing where it is none of this version."""
+    address = f"file:{quote(os.fsencode(path))}?mode=ro&immutable=1"
+    with contextlib.suppress(sqlite3.Error), contextlib.closing(sqlite3.connect(address, uri=True)) as database:
+        return _run_in(database)
+    return {}
+
+
+def _run_in(database: sqlite3.Connection) -> dict[str, Any]:
+    """What the file says of its last run; nothing where it does not say so."""
+    with contextlib.suppress(sqlite3.Error, ValueError, TypeError):
+        (blob,) = database.execute("SELECT blob FROM entries WHERE kind=? AND key=''", [_RUN]).fetchone()
+        found = json.loads(blob)
+        return found if isinstance(found, dict) else {}
+    return {}
+
+
+def _open_locked(path: Path) -> sqlite3.Connection:
+    """The file, new or of an earlier run. Its lock stays until the process ends, however it ends, or closes it."""
+    latest = time.monotonic() + _SECONDS_TO_DIE
+    while True:
+        database = sqlite3.connect(path, timeout=0.0, isolation_level="IMMEDIATE")
+        try:
+            for pragma in _PRAGMAS:
+                database.execute(f"PRAGMA {pragma}").fetchall()
+            database.execute("BEGIN EXCLUSIVE")
+            _check(database)
+            database.commit()
+        except BaseException as error:
+            database.close()
+            if not isinstance(error, sqlite3.Error):
+                raise
+            if _code(error) in _DAMAGES:
+                raise _OtherFileError("is damaged") from error
+            if _code(error) != sqlite3.SQLITE_BUSY:
+                raise
+        else:
+            sync_folder(path.parent)
+            return database
+        if time.monotonic() > latest:
+            raise StoreInUseError(str(_read_run(path).get("run", "no run that is known")))
+        time.sleep(_PAUSE)
+
+
+def _check(database: sqlite3.Connection) -> None:
+    """Checks the table of a file; creates it in an empty file. Raises _OtherFileError and sqlite3.Error."""
+    found = [sql for (sql,) in database.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL")]
+    (version,) = database.execute("PRAGMA user_version").fetchone()
+    (application,) = database.execute("PRAGMA application_id").fetchone()
+    if not found and (version, application) == (0, 0):
+        database.execute(_SCHEMA)
+        database.execute(f"PRAGMA application_id={_APPLICATION}")
+        database.execute(f"PRAGMA user_version={_VERSION}")
+    elif application == _APPLICATION and version != _VERSION:
+        raise _OtherFileError("is of another version of this program")
+    elif found != [_SCHEMA] or application != _APPLICATION:
+        raise _OtherFileError("is no file of a run")
+    elif database.execute("PRAGMA quick_check(1)").fetchall() != [("ok",)]:
+        raise _OtherFileError("is damaged")
+
+
+@contextlib.contextmanager
+def _faults_told(path: Path) -> Iterator[None]:
+    """Raises StorageError where the disk, or what is on it, is at fault."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        if _code(error) in _DAMAGES:
+            remedy = "the next run keeps it aside and begins anew"
+            raise StorageError(path, ValueError("is damaged"), remedy) from error
+        number = _FAULTS.get(_code(error))
+        raise StorageError(
+            path, ValueError(error) if number is None else OSError(number, os.strerror(number))
+        ) from error
+    except OSError as error:
+        raise StorageError(path, error) from error
+
+
+def _code(error: sqlite3.Error) -> int:
+    """Primary result code of SQLite."""
+    return getattr(error, "sqlite_errorcode", 0) & 0xFF

@@ -1,23 +1,23 @@
 """The ranks of a run: processes that a launcher has started together, or one process alone.
 
 Only this module imports mpi4py, and only where a launcher is at work: `run-study` alone needs no MPI library. All MPI
-calls come from the main thread, so that any MPI library works (MPI_THREAD_FUNNELED).
-
-By hand: mpi4py needs an MPI library, and leaves signals to its user. The loss of a rank ends all, as MPI has it.
+calls come from the main thread, so that any MPI library works (MPI_THREAD_FUNNELED). The loss of a rank ends all.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import platform
 import sys
 import time
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
-from studyrunner.mpi.launcher import LauncherError, has_launcher, launcher_size, load_packaged_library
 from studyrunner.system.endings import uninterrupted
+from studyrunner.system.source_digest import package_digest
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -25,29 +25,56 @@ if TYPE_CHECKING:
 POLL_SECONDS = 1e-3
 """Time between two looks for a message, s. A blocking receive would keep a core busy."""
 
+_SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
+_RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK", "SLURM_PROCID")
+_JOBS = ("SLURM_NTASKS", "PBS_NP", "LSB_DJOB_NUMPROC", "NSLOTS")
+_SIGNS = (*_SIZES, *_RANKS[:-1], "PMI_FD", "PMI_CONTROL_PORT", "PALS_RANKID")
 _SECONDS_TO_PRINT = 1.0
+_SECONDS_TO_ANSWER = 300.0  # a rank imports the solver first, from a slow disk for one
 _SHARED = "/dev/shm/mpich_shm_"
 _MANY_SENT = 64
-
 _REMEDY = (
     "start run-study with the mpiexec of the environment it is installed in or, on a cluster, install mpi4py against"
     " the site's MPI"
 )
 
 
-class Ranks(Protocol):
-    """Processes that send each other Python objects. Messages between two ranks arrive in the order of sending."""
+class LauncherError(Exception):
+    """The launcher started processes that cannot work together: each would compute the whole study."""
 
-    @property
-    def rank(self) -> int:
-        """Number of this process; process 0 hands out the work."""
 
-    @property
-    def size(self) -> int:
-        """Number of processes."""
+def launcher_rank(environment: Mapping[str, str] = os.environ) -> int:
+    """Number of this process according to the launcher, 0 without launcher."""
+    return _largest(environment, _RANKS)
+
+
+def launcher_size(environment: Mapping[str, str] = os.environ) -> int:
+    """Number of processes according to the launcher, 0 without launcher."""
+    return _largest(environment, _SIZES)
+
+
+def job_size(environment: Mapping[str, str] = os.environ) -> int:
+    """Number of processes that a batch system has room for, without launcher; 0 if unknown."""
+    return 0 if launcher_size(environment) else _largest(environment, _JOBS)
+
+
+def _largest(environment: Mapping[str, str], names: tuple[str, ...]) -> int:
+    texts = (environment.get(name, "") for name in names)
+    return max((int(text) for text in texts if text.isdecimal()), default=0)
+
+
+class Ranks:
+    """Processes that send each other Python objects, in the order of sending; this class: one process, without MPI.
+
+    rank: number of this process; process 0 hands out the work. size: number of processes.
+    """
+
+    rank = 0
+    size = 1
 
     def send(self, message: object, rank: int) -> None:
         """Sends without waiting for the receiver."""
+        raise ValueError(f"no rank {rank} for {message!r} in a run of one process")
 
     def flush(self) -> None:
         """Waits until all messages are received, or need this process no more; called before a rank goes on computing.
@@ -55,11 +82,9 @@ class Ranks(Protocol):
         The receiver has to look for messages: a large message moves only while its sender is in the MPI library.
         """
 
-    def receive(self, rank: int | None = None) -> tuple[int, object] | None:
-        """Sender and content of the next message, or None where there is none yet.
-
-        rank: sender; messages of other senders stay where they are. None for any sender.
-        """
+    def receive(self) -> tuple[int, object] | None:
+        """Sender and content of the next message, or None where there is none yet."""
+        return None
 
     def close(self) -> None:
         """Ends the communication; every rank calls this once."""
@@ -68,37 +93,12 @@ class Ranks(Protocol):
         """Ends all ranks at once; returns only where there is no other rank."""
 
 
-class Alone:
-    """A run of one process, without MPI."""
-
-    rank = 0
-    size = 1
-
-    def send(self, message: object, rank: int) -> None:
-        """There is no receiver: a call is a bug."""
-        raise ValueError(f"no rank {rank} for {message!r} in a run of one process")
-
-    def flush(self) -> None:
-        """Does nothing."""
-
-    def receive(self, rank: int | None = None) -> tuple[int, object] | None:  # noqa: ARG002 - as in Ranks
-        """There is no sender."""
-        return None
-
-    def close(self) -> None:
-        """Does nothing."""
-
-    def abort(self, status: int) -> None:
-        """Does nothing."""
-
-
-class MpiRanks:
+class MpiRanks(Ranks):
     """All ranks of MPI's world. Raises ImportError or RuntimeError where mpi4py or an MPI library is missing."""
 
     def __init__(self) -> None:
         import mpi4py
 
-        load_packaged_library()
         # Started and ended here rather than by the import: the launcher is compared with the library before.
         mpi4py.rc(initialize=False, finalize=False)
         from mpi4py import MPI
@@ -114,15 +114,14 @@ class MpiRanks:
         self._world = MPI.COMM_WORLD
         self._sent: list[MPI.Request] = []
         self._many = _MANY_SENT
-        self.rank: int = self._world.Get_rank()
-        self.size: int = self._world.Get_size()
+        self.rank = self._world.Get_rank()
+        self.size = self._world.Get_size()
         if library == "MPICH":
             # behind the barrier all ranks have mapped the memory
             self._world.Barrier()
             _unlink_shared_memory()
 
-    def send(self, message: object, rank: int) -> None:
-        """As in Ranks."""
+    def send(self, message: object, rank: int) -> None:  # noqa: D102
         if len(self._sent) >= self._many:
             # Not at every message: with thousands of ranks as many may be on their way.
             self._forget_sent()
@@ -131,30 +130,25 @@ class MpiRanks:
             # the request holds the memory that the message is sent from
             self._sent.append(self._world.isend(message, dest=rank))
 
-    def flush(self) -> None:
-        """As in Ranks."""
+    def flush(self) -> None:  # noqa: D102
         self._forget_sent()
         while self._sent:
             time.sleep(POLL_SECONDS)
             self._forget_sent()
 
-    def receive(self, rank: int | None = None) -> tuple[int, object] | None:
-        """As in Ranks."""
+    def receive(self) -> tuple[int, object] | None:  # noqa: D102
         with uninterrupted():
             status = self._mpi.Status()
-            source = self._mpi.ANY_SOURCE if rank is None else rank
             # The matched probe takes the message out at once: a receive after it gets this one and no other.
-            matched = self._world.improbe(source, status=status)
+            matched = self._world.improbe(self._mpi.ANY_SOURCE, status=status)
             return None if matched is None else (status.Get_source(), matched.recv())
 
-    def close(self) -> None:
-        """As in Ranks."""
+    def close(self) -> None:  # noqa: D102
         self.flush()
         self._mpi.Finalize()
 
-    def abort(self, status: int) -> None:
-        """As in Ranks."""
-        # The launcher passes on what a rank prints; what it has not passed on when it is told to end all is lost.
+    def abort(self, status: int) -> None:  # noqa: D102
+        # The launcher passes on what a rank prints; what it has not passed on when it ends all is lost.
         sys.stderr.flush()
         time.sleep(_SECONDS_TO_PRINT)
         self._world.Abort(status)
@@ -181,14 +175,14 @@ def start_ranks() -> Ranks:
     LauncherError
         Where the launcher started more processes than the MPI library knows of.
     """
-    if not has_launcher():
-        return Alone()
+    if not any(name in os.environ for name in _SIGNS):
+        return Ranks()
     announced = launcher_size()
     try:
         ranks = MpiRanks()
     except (ImportError, RuntimeError, LauncherError) as error:
         if announced <= 1:
-            return Alone()
+            return Ranks()
         raise LauncherError(f"{announced} processes were started that cannot talk ({error}): {_REMEDY}") from error
     if announced > ranks.size:
         ranks.close()
@@ -201,3 +195,52 @@ def wait_for_message(ranks: Ranks) -> object:
     while (received := ranks.receive()) is None:
         time.sleep(POLL_SECONDS)
     return received[1]
+
+
+def ask_all(ranks: Ranks, question: object) -> dict[int, object]:
+    """Rank 0: the answers of all other ranks to a message, by rank; None for a rank that is silent.
+
+    Raises KeyboardInterrupt where a rank was interrupted.
+    """
+    answers: dict[int, object] = dict.fromkeys(range(1, ranks.size))
+    for rank in answers:
+        ranks.send(question, rank)
+    latest = time.monotonic() + _SECONDS_TO_ANSWER
+    while None in answers.values() and time.monotonic() < latest:
+        received = ranks.receive()
+        if received is None:
+            time.sleep(POLL_SECONDS)
+        elif isinstance(received[1], RankInterrupted):
+            raise KeyboardInterrupt
+        else:
+            answers[received[0]] = received[1]
+    return answers
+
+
+class RankInterrupted:
+    """Message of a rank that was ended from outside; all ranks end."""
+
+
+class WhatSoftware:
+    """Question of rank 0: which software a rank runs. Answered by `describe_software`."""
+
+
+def describe_software() -> tuple[str, str]:
+    """Name of this machine, and a hash of what this process runs."""
+    packages = ("solver", "studies", "studyrunner")
+    return platform.node(), " ".join((platform.machine(), *map(package_digest, packages)))
+
+
+def check_software(ranks: Ranks) -> None:
+    """Rank 0: raises LauncherError where a rank runs other software, with which numbers may differ, or is silent."""
+    if ranks.size == 1:
+        return
+    host, own = describe_software()
+    for rank, answer in ask_all(ranks, WhatSoftware()).items():
+        if not isinstance(answer, tuple):
+            said = f"has not said within {_SECONDS_TO_ANSWER:.0f} s what it runs"
+        elif answer[1] != own:
+            said = f"on {answer[0]} runs other versions of this program, of Python or of numpy than rank 0 on {host}"
+        else:
+            continue
+        raise LauncherError(f"rank {rank} {said}: install the same software for all ranks")

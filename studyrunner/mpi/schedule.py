@@ -17,9 +17,17 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from studyrunner.mpi.cost_model import CostModel
 from studyrunner.mpi.dispatch import Assignment, Dispatcher, Work
-from studyrunner.mpi.ranks import POLL_SECONDS, Ranks, wait_for_message
-from studyrunner.plan.cost_model import CostModel
+from studyrunner.mpi.mapped_file import WhetherSeen
+from studyrunner.mpi.ranks import (
+    POLL_SECONDS,
+    RankInterrupted,
+    Ranks,
+    WhatSoftware,
+    describe_software,
+    wait_for_message,
+)
 from studyrunner.system.endings import begin_ending, raise_ending, uninterrupted
 from studyrunner.system.mailbox import LONGEST_WAIT, Mailbox
 
@@ -54,15 +62,10 @@ class _Delivery(Generic[Result]):
 
 @dataclass(frozen=True)
 class _Progress:
-    """Progress of a task: data to continue from, or words."""
+    """Progress of a task: data to continue from, words, or the share that is done."""
 
     number: int
     progress: object
-
-
-@dataclass(frozen=True)
-class RankInterrupted:
-    """Message of a rank that was ended from outside; all ranks end."""
 
 
 Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
@@ -85,7 +88,7 @@ def _work(
 
     def keep(progress: object) -> None:
         check()
-        in_words, now = isinstance(progress, str), time.perf_counter()
+        in_words, now = isinstance(progress, str | float), time.perf_counter()
         # a task that has given all its results has no progress
         if n_given < task.n_results and now > sent[in_words] + (SECONDS_TO_WORDS if in_words else seconds_to_progress):
             send(_Progress(assignment.number, progress))
@@ -102,23 +105,20 @@ def _work(
 
 
 class _LocalWorker(Generic[Task, Result]):
-    """The computing thread of rank 0."""
+    """The computing thread of rank 0. assign: takes tasks. given_up: the thread ends at the next step of its task."""
 
     def __init__(self, run: Run[Task, Result], seconds_to_progress: float) -> None:
         self._run = run
-        self._ended = False
         self._seconds_to_progress = seconds_to_progress
-        self._waiting: queue.SimpleQueue[Assignment[Task] | None] = queue.SimpleQueue()
+        self._tasks: queue.SimpleQueue[Assignment[Task] | None] = queue.SimpleQueue()
         self._sent: Mailbox[object] = Mailbox()
+        self.given_up = False
+        self.assign = self._tasks.put
         # A daemon: an exception in the main thread ends the process although a task still runs.
         self._thread = threading.Thread(target=self._compute, name="tasks of rank 0", daemon=True)
         self._thread.start()
 
-    def assign(self, assignment: Assignment[Task]) -> None:
-        """Puts a task behind those that wait."""
-        self._waiting.put(assignment)
-
-    def receive(self, seconds: float) -> object:
+    def receive(self, seconds: float = 0.0) -> object:
         """The next message; None where none comes within `seconds`. Raises the exception of a task."""
         if seconds:
             self._sent.wait(seconds)
@@ -129,24 +129,20 @@ class _LocalWorker(Generic[Task, Result]):
 
     def stop(self) -> None:
         """Ends the thread after its last task. Raises an exception that the last task raised after its last result."""
-        self._waiting.put(None)
+        self._tasks.put(None)
         with uninterrupted():
             self._thread.join()
-        self.receive(0.0)
-
-    def give_up(self) -> None:
-        """Ends the thread without its results, at the next step of its task."""
-        self._ended = True
+        self.receive()
 
     def _compute(self) -> None:
         try:
-            while (assignment := self._waiting.get()) is not None:
+            while (assignment := self._tasks.get()) is not None:
                 _work(assignment, self._run, self._send, self._seconds_to_progress, self._check)
         except BaseException as error:  # handed to the main thread, which raises it
             self._sent.put(error)
 
     def _check(self) -> None:
-        if self._ended:
+        if self.given_up:
             raise KeyboardInterrupt
 
     def _send(self, message: object) -> None:
@@ -154,98 +150,74 @@ class _LocalWorker(Generic[Task, Result]):
         self._sent.put(message)
 
 
-@dataclass(frozen=True)
-class Handlers(Generic[Task, Result]):
-    """What rank 0 does with results and messages. All of them are called in the main thread.
+class Office(Generic[Task, Result]):
+    """What rank 0 does with tasks, results and messages. All of it is called in the main thread."""
 
-    take: called with a task and each of its results, in the order in which results arrive; returns the tasks that the
-        result makes possible.
-    tick: called many times a second with a function that returns the running tasks, as `Dispatcher.running`.
-    keep: called with a task and its progress, or words on its progress; never after the last result of the task.
-    is_sick: whether a result of a rank shows that the rank should get no more tasks.
-    prepare: the task as a rank gets it; called once for each task that is sent, in the order of sending.
-    """
+    def begin(self) -> Iterable[Task]:
+        """Tasks that are possible at the beginning; taken one by one, when ranks can use more."""
+        raise NotImplementedError
 
-    take: Callable[[Task, Result], Iterable[Task]]
-    tick: Callable[[Callable[[], Sequence[tuple[Task, int, float]]]], None] = lambda _: None
-    keep: Callable[[Task, object], None] = lambda *_: None
-    is_sick: Callable[[int, Result], bool] = lambda *_: False
-    prepare: Callable[[int, Task], Task] = lambda _, task: task
+    def take(self, task: Task, result: Result) -> Iterable[Task]:
+        """Takes a result, in the order in which results arrive; returns the tasks that the result makes possible."""
+        raise NotImplementedError
+
+    def prepare(self, rank: int, task: Task) -> Task:  # noqa: ARG002
+        """The task as a rank gets it; called once for each task that is sent, in the order of sending."""
+        return task
+
+    def is_sick(self, rank: int, result: Result) -> bool:  # noqa: ARG002
+        """Whether a result shows that its rank should get no more tasks."""
+        return False
+
+    def keep(self, task: Task, progress: object) -> None:
+        """Takes the progress of a task, or words on it; never after the last result of the task."""
+
+    def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
+        """Called many times a second. running: returns the running tasks, as `Dispatcher.running`."""
 
 
 def serve_tasks(
-    ranks: Ranks,
-    tasks: Iterable[Task],
-    run: Run[Task, Result],
-    handlers: Handlers[Task, Result],
-    costs: CostModel,
+    ranks: Ranks, office: Office[Task, Result], run: Run[Task, Result], costs: CostModel | None = None
 ) -> None:
     """Rank 0: has all tasks done and computes some of them.
 
     An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here.
-
-    Parameters
-    ----------
-    ranks
-        All ranks.
-    tasks
-        Taken one by one, when ranks can use more.
-    run
-        Gives the results of a task one by one.
-    handlers
-        What is done with results and messages.
-    costs
-        Learns the run times of tasks.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        Where another rank was interrupted.
+    run: gives the results of a task one by one. costs: learns the run times of tasks.
+    Raises KeyboardInterrupt where another rank was interrupted.
     """
-    server = _Server(ranks, tasks, run, handlers, costs)
+    server = _Server(ranks, office, run, costs or CostModel())
     try:
         with uninterrupted():
-            server.begin()
+            server.hand_out()
         while not server.done:
             with uninterrupted():
                 server.look()
     except BaseException:
-        server.give_up()
+        server.local.given_up = True
         raise
-    server.stop()
+    server.local.stop()
 
 
 class _Server(Generic[Task, Result]):
     """Rank 0: sends tasks, receives results."""
 
-    def __init__(
-        self,
-        ranks: Ranks,
-        tasks: Iterable[Task],
-        run: Run[Task, Result],
-        handlers: Handlers[Task, Result],
-        costs: CostModel,
-    ) -> None:
+    def __init__(self, ranks: Ranks, office: Office[Task, Result], run: Run[Task, Result], costs: CostModel) -> None:
         self._ranks = ranks
-        self._waiting = iter(tasks)
-        self._handlers = handlers
+        self._office = office
+        self._waiting = iter(office.begin())
         self._dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
-        self._local = _LocalWorker(run, _seconds_to_progress(ranks))
+        self.local = _LocalWorker(run, _seconds_to_progress(ranks))
 
     @property
     def done(self) -> bool:
         """Whether all tasks are done."""
         return self._dispatcher.done
 
-    def begin(self) -> None:
-        """Sends the first tasks."""
-        self._hand_out()
-
     def look(self) -> None:
         """Receives what there is; waits a moment where there is nothing."""
         quiet = False
         for _ in range(_LOOKS_A_TICK):
-            received, message = self._ranks.receive(), self._local.receive(0.0)
+            received, message = self._ranks.receive(), self.local.receive()
             if received is not None:
                 self._accept(*received)
             if message is not None:
@@ -254,59 +226,55 @@ class _Server(Generic[Task, Result]):
             if quiet:
                 break
         self._dispatcher.watch()
-        self._handlers.tick(self._dispatcher.running)
+        self._office.tick(self._dispatcher.running)
         wait = POLL_SECONDS if self._ranks.size > 1 else LONGEST_WAIT
-        if quiet and (message := self._local.receive(wait)) is not None:
+        if quiet and (message := self.local.receive(wait)) is not None:
             self._accept(0, message)
 
-    def give_up(self) -> None:
-        """Ends the computing thread of rank 0 before its task is done."""
-        self._local.give_up()
-
-    def stop(self) -> None:
-        """Ends the computing thread of rank 0 and the work of the other ranks."""
-        self._local.stop()
-        for rank in range(1, self._ranks.size):
-            self._ranks.send(None, rank)
-
-    def _hand_out(self) -> None:
+    def hand_out(self) -> None:
+        """Sends tasks to the ranks that have none."""
         while self._dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
             self._dispatcher.add(more)
         for rank, assigned in self._dispatcher.assign():
-            assignment = Assignment(assigned.number, self._handlers.prepare(rank, assigned.task))
+            assignment = Assignment(assigned.number, self._office.prepare(rank, assigned.task))
             if rank == 0:
-                self._local.assign(assignment)
+                self.local.assign(assignment)
             else:
                 self._ranks.send(assignment, rank)
 
     def _accept(self, rank: int, message: object) -> None:
         if isinstance(message, _Progress):
-            self._handlers.keep(self._dispatcher.task(message.number), message.progress)
+            self._office.keep(self._dispatcher.task(message.number), message.progress)
             return
         if isinstance(message, RankInterrupted):
             begin_ending()
             raise KeyboardInterrupt
         if not isinstance(message, _Delivery):
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
-        sick = self._handlers.is_sick(rank, message.result)
+        sick = self._office.is_sick(rank, message.result)
         if sick:
             self._dispatcher.shun(rank)
         task = self._dispatcher.deliver(rank, message.number, message.seconds, typical=not sick)
-        self._dispatcher.add(self._handlers.take(task, message.result))
-        self._hand_out()
+        self._dispatcher.add(self._office.take(task, message.result))
+        self.hand_out()
 
 
-def work_on_tasks(ranks: Ranks, run: Run[Task, Result]) -> None:
-    """Any other rank: does the tasks that rank 0 sends, until rank 0 sends None."""
+def follow_rank_0(ranks: Ranks, run: Run[Task, Result]) -> None:
+    """Any other rank: answers questions and does the tasks that rank 0 sends, until rank 0 sends None."""
 
     def send(reply: object) -> None:
         ranks.send(reply, 0)
         ranks.flush()
 
     while (message := wait_for_message(ranks)) is not None:
-        if not isinstance(message, Assignment):
+        if isinstance(message, Assignment):
+            _work(message, run, send, _seconds_to_progress(ranks))
+        elif isinstance(message, WhatSoftware):
+            send(describe_software())
+        elif isinstance(message, WhetherSeen):
+            send(message.answer())
+        else:
             raise TypeError(f"rank 0 sent {message!r} instead of a task")
-        _work(message, run, send, _seconds_to_progress(ranks))
 
 
 def _seconds_to_progress(ranks: Ranks) -> float:

@@ -65,7 +65,12 @@ def _on_low_frequencies(study: Study, facts: SceneFacts | None) -> str:
     highest = max((max(each.axes.frequency) for each in study.block_studies or (study,)), default=0.0)
     passed = [block.frequency for block in study.mission if isinstance(block.frequency, dict)]
     highest = max(highest, *(max(each["start"], each["stop"]) for each in passed)) if passed else highest
-    if study.has_modes or stuck is None or not _FAR_BELOW * highest < stuck < math.inf:
+    if (
+        not study.kind.counted
+        or study.axes.frequency_ratio
+        or stuck is None
+        or not _FAR_BELOW * highest < stuck < math.inf
+    ):
         return ""
     ratio = stuck / highest
     kilohertz = 1000.0 * highest

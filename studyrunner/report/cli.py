@@ -8,8 +8,9 @@ import sys
 import time
 import traceback
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from studyrunner.system.endings import raise_ending, take_endings
 from studyrunner.system.streams import keep_talking
@@ -18,7 +19,7 @@ from studyrunner.user_error import UserError
 if TYPE_CHECKING:
     from rich.status import Status
 
-    from studyrunner.report.drawing import Drawing, Missing, Table
+    from studyrunner.report.drawing import Item
 
 WRITTEN, UNEXPECTED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 """Exit statuses."""
@@ -33,6 +34,7 @@ examples:
   study-report results/worn.nc -o figures     the same into the folder figures
   study-report dovetail.nc --vtu              also dovetail-report/root.pvd, the worn root for ParaView
   study-report dovetail.nc --point frequency=211.75,scheme=implicit    figures of single points show this one
+  study-report dovetail.nc --worn-response --loops 25    computes what the file does not hold of the worn joint
   study-report scar.nc --measured profile.csv the wear scar beside a measured one
 
 exit status:
@@ -80,6 +82,21 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
         help="the point that root, maps, loops and --vtu show (default: the most worn one)",
     )
     parser.add_argument(
+        "--worn-response",
+        action="store_true",
+        help="compute the response curve of the joint worn as that point",
+    )
+    parser.add_argument(
+        "--loops",
+        metavar="PAIR,...",
+        type=_read_pairs,
+        default=(),
+        help="compute fretting loops of these pairs",
+    )
+    parser.add_argument(
+        "--natural-frequencies", action="store_true", help="compute natural frequencies over the nodal diameter"
+    )
+    parser.add_argument(
         "--measured",
         metavar="PROFILE.csv",
         type=Path,
@@ -95,6 +112,14 @@ def _read_point(text: str) -> dict[str, str]:
         if not equals:
             raise UserError("command line", "--point", name, "give AXIS=VALUE, as frequency=211.75")
     return {name.strip(): value.strip() for name, _, value in parts}
+
+
+def _read_pairs(text: str) -> tuple[int, ...]:
+    """Numbers of contact pairs. Raises UserError."""
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise UserError("command line", "--loops", text, "give numbers of contact pairs, as 25,26") from None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -133,7 +158,7 @@ def _report(options: argparse.Namespace) -> int:
         from studyrunner.report.contents import draw_report
         from studyrunner.report.page.page import write_page
         from studyrunner.report.root.vtu import find_writer
-        from studyrunner.result.schema_check import check_numbers, reading_errors
+        from studyrunner.result.opening import check_numbers, reading_errors
         from studyrunner.result.view import open_for_report
         from studyrunner.system.progress import count, format_seconds
 
@@ -143,7 +168,13 @@ def _report(options: argparse.Namespace) -> int:
             write_series = find_writer(result) if options.vtu else None
             folder = options.folder or Path(f"{options.result.stem}-report")
             _make_folder(folder)
-            page = folder / "index.html"
+            page, what = folder / "index.html", _to_compute(options)
+            if any(what.values()):
+                from studyrunner.worn_joint import compute_worn_joint
+
+                status.stop()
+                result = replace(result, again=compute_worn_joint(options.result, folder, point=options.point, **what))
+                status.start()
             summary = write_page(result, _say(draw_report(result), status), page)
             series = write_series(folder) if write_series else None
     shown = f"{count(summary.n_drawings, 'figure')}, {count(summary.n_tables, 'table')}, {summary.n_missing} left out"
@@ -154,7 +185,13 @@ def _report(options: argparse.Namespace) -> int:
     return WRITTEN
 
 
-def _say(items: Iterable[Drawing | Missing | Table], status: Status) -> Iterator[Drawing | Missing | Table]:
+def _to_compute(options: argparse.Namespace) -> dict[str, Any]:
+    """What `compute_worn_joint` is asked for."""
+    names = {"loops": "loops", "response": "worn_response", "natural_frequencies": "natural_frequencies"}
+    return {name: getattr(options, option) for name, option in names.items()}
+
+
+def _say(items: Iterable[Item], status: Status) -> Iterator[Item]:
     """The items; tells on the terminal which of them is done."""
     from rich.markup import escape
 

@@ -1,93 +1,151 @@
-"""Figures and tables of the report, in the order of the page."""
+"""The table of figures: all figures and tables of the report, in the order of the page."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 from studyrunner.report.drawing import Item, Missing, style
-from studyrunner.report.figures.history import draw_excitation, draw_history
-from studyrunner.report.figures.loops import draw_fretting, draw_motion, draw_normal
-from studyrunner.report.figures.missions import draw_missions
-from studyrunner.report.figures.modes import draw_modes
-from studyrunner.report.figures.outcome import draw_outcomes, list_certificates
-from studyrunner.report.figures.pairs import draw_numbers, draw_pairs, draw_wear
-from studyrunner.report.figures.precision import draw_precision
-from studyrunner.report.figures.response import draw_after_wear, draw_responses
-from studyrunner.report.figures.scatter import draw_scatter
-from studyrunner.report.figures.sector import OF_SECTOR, draw_sector
-from studyrunner.report.figures.trends import draw_trends
-from studyrunner.report.figures.volume import draw_final, draw_map
-from studyrunner.report.root.figures import draw_mode_fractions, draw_root
-from studyrunner.result.scene_pairs import of_shown_scene
+from studyrunner.report.figures import (
+    history,
+    loops,
+    missions,
+    modes,
+    outcome,
+    pairs,
+    precision,
+    response,
+    scatter,
+    sector,
+    trends,
+    volume,
+)
+from studyrunner.report.root import figures as root
+from studyrunner.result.scene_pairs import OF_PAIRS, of_shown_scene
 from studyrunner.result.view import Result
 
-_Part = Callable[[Result], Iterator[Item]]
+WEAR, MISSIONS, MODES = "wear histories", "missions", "modes"
+"""Kinds of results."""
 
 
-def _one(draw: Callable[[Result], Item | None], name: str = "", title: str = "", *needs: str) -> _Part:
-    """A figure; a sentence where the file lacks variables that it needs."""
+@dataclass(frozen=True)
+class Entry:
+    """A line of the table: one figure or table of the report.
 
-    def part(result: Result) -> Iterator[Item]:
-        if lacks := result.lacks(*needs):
-            yield Missing(name, title, lacks)
-        elif (item := draw(result)) is not None:
-            yield item
+    name: of its files. shows: in words. draw: makes it; None where there is nothing to see. needs: variables without
+    which a sentence says what to ask for. kinds: of the results that have it. scene: where scenes of a study differ in
+    these variables, that of the shown point is drawn. always: also where no point has a result.
+    """
 
-    return part
+    name: str
+    shows: str
+    draw: Callable[[Result], Item | None]
+    needs: tuple[str, ...]
+    kinds: tuple[str, ...]
+    scene: tuple[str, ...] = ()
+    always: bool = False
+
+    def make(self, result: Result) -> Item | None:
+        """The figure, a sentence in its place, or None."""
+        if lacks := result.lacks(*self.needs):
+            return Missing(self.name, self.shows[0].upper() + self.shows[1:], lacks)
+        return self.draw(of_shown_scene(result, self.scene) if self.scene else result)
 
 
+def _of(*kinds: str, rows: tuple[tuple[Any, ...], ...], **options: Any) -> tuple[Entry, ...]:
+    """Entries of these kinds of results. rows: name, what it shows, function, and what it needs."""
+    return tuple(Entry(name, shows, draw, tuple(needs), kinds, **options) for name, shows, draw, *needs in rows)
+
+
+_BLOCKS = (
+    ("blocks", "blocks of a mission with their wear (table)", missions.list_blocks),
+    ("block_shares", "wear by block over the missions", missions.draw_shares),
+    ("block_responses", "vibration of each block over the missions", missions.draw_responses),
+)
+_MODES = (
+    ("natural_frequency", "natural frequency of a mode over its amplitude",
+     partial(modes.draw_mode, name="natural_frequency"), "natural_frequency"),
+    ("damping_ratio", "damping ratio of a mode over its amplitude",
+     partial(modes.draw_mode, name="damping_ratio"), "damping_ratio"),
+)  # fmt: skip
+_SAMPLES = (
+    ("worn_volume_bands", "worn volume of the samples over cycles, with bands", scatter.draw_bands),
+    ("worn_volume_bands_course", "the same over frequency at the last count", scatter.draw_bands_over_course),
+    ("exceedance", "probability of more wear", scatter.draw_exceedance),
+    ("deciding_inputs", "what each input decides, with its interval", scatter.draw_deciding_inputs),
+    ("deciding_input", "samples over the input that decides most", scatter.draw_deciding_input),
+)
 _VOLUMES = (
-    _one(draw_history, "worn_volume", "Worn volume over cycles", "worn_volume"),
-    _one(draw_final, "final_worn_volume", "Final worn volume", "worn_volume"),
-    _one(lambda result: draw_map(result, "worn_volume"), "worn_volume_map", "Map of the worn volume", "worn_volume"),
-    _one(
-        lambda result: draw_map(result, "wear_rate"),
-        "wear_rate_map",
-        "Map of the wear rate",
-        "worn_volume",
-        "wear_rate",
-    ),
-)
+    ("worn_volume", "worn volume over cycles", history.draw_history, "worn_volume"),
+    ("final_worn_volume", "worn volume at the last count over frequency", volume.draw_final, "worn_volume"),
+    ("worn_volume_map", "worn volume over frequency and cycles",
+     partial(volume.draw_map, name="worn_volume"), "worn_volume"),
+    ("wear_rate_map", "wear rate over frequency and cycles",
+     partial(volume.draw_map, name="wear_rate"), "worn_volume", "wear_rate"),
+)  # fmt: skip
 _RESPONSES = (
-    _one(draw_responses, "frequency_response", "Frequency response", "response_amplitude"),
-    _one(draw_after_wear, "response_after_own_wear", "Response of different joints", "response_amplitude"),
-    _one(draw_excitation),
+    ("frequency_response", "response curve of the new joint and of one worn joint", response.draw_responses,
+     "response_amplitude"),
+    ("response_after_own_wear", "response of different joints, each after wear at its own frequency",
+     response.draw_after_wear, "response_amplitude"),
+    ("excitation_frequency", "frequency of an excitation that follows the resonance", history.draw_excitation),
+)  # fmt: skip
+_ROOT = (
+    ("worn_root", "worn root in three dimensions, wear exaggerated", root.draw_root),
+    ("whole_disk", "all sectors of the disk", root.draw_disk),
+    ("wear_depth", "wear depth of each pair", pairs.draw_depths),
+    ("worn_profile", "wear depth on the flanks, or the scar over x", pairs.draw_profile),
 )
-_LOOPS = (_one(draw_fretting), _one(draw_normal), _one(draw_motion))
+_PAIRS = (
+    ("mean_pressure", "mean pressure, first and last count", pairs.draw_pressure, "mean_pressure"),
+    ("fretting_loops", "tangential force over displacement through a period", loops.draw_fretting),
+    ("normal_load", "normal force through a period", loops.draw_normal),
+    ("pair_motion", "motion of pairs in the contact plane", loops.draw_motion),
+)
+_FRACTIONS = (
+    ("slip_fraction", "fraction of the period in slip, on the root", root.draw_slip, "slip_fraction"),
+    ("open_fraction", "fraction of the period open, on the root", root.draw_open, "open_fraction"),
+)
+_SECTOR = (("natural_frequencies", "sector and its natural frequencies", sector.draw_sector),)
+
+FIGURES = (
+    *_of(MISSIONS, rows=_BLOCKS),
+    *_of(MODES, rows=_MODES),
+    *_of(WEAR, MISSIONS, rows=_SAMPLES + _VOLUMES),
+    *_of(WEAR, rows=_RESPONSES),
+    *_of(WEAR, MISSIONS, rows=(("trends", "wear, peak and its shift along every axis", trends.draw_trends),)),
+    *_of(WEAR, MISSIONS, rows=_ROOT, scene=OF_PAIRS),
+    *_of(WEAR, rows=_PAIRS, scene=OF_PAIRS),
+    *_of(MODES, rows=_FRACTIONS, scene=OF_PAIRS),
+    *_of(WEAR, MISSIONS, MODES, rows=(("pair_numbers", "numbers of the pairs", pairs.draw_numbers),), scene=OF_PAIRS),
+    *_of(WEAR, MISSIONS, rows=_SECTOR, scene=sector.OF_SECTOR, always=True),
+    *_of(WEAR, MISSIONS, MODES, rows=(("outcome_map", "how the points ended", outcome.draw_outcomes),), always=True),
+    *_of(WEAR, MISSIONS, rows=(("certificates", "worst certificates (table)", outcome.list_certificates),)),
+    *_of(WEAR, rows=(("precision", "error against run time", precision.draw_precision),)),
+    *_of(WEAR, rows=(("precision_settings", "all settings with their errors (table)", precision.list_settings),)),
+)
+"""The figures of all results."""
 
 
 def draw_report(result: Result) -> Iterator[Item]:
     """Figures, tables, and sentences about what is missing: the results, then how far they are to be trusted."""
-    for part in _choose_parts(result):
-        # The style is that of the whole process: it is not left on while the caller has the word.
-        with style():
-            items = list(part(result))
-        yield from items
+    kind = MODES if result.has_modes else WEAR if result.blocks is None else MISSIONS
+    has_results = bool(result.held.any())
+    for entry in FIGURES:
+        if kind in entry.kinds and (has_results or entry.always):
+            # the style is that of the whole process: it is not left on while the caller has the word
+            with style():
+                item = entry.make(result)
+            if item is not None:
+                yield item
+    if not has_results:
+        yield Missing("results", "Results", "No point was computed: the file holds no results to draw.")
 
 
-def _choose_parts(result: Result) -> tuple[_Part, ...]:
-    """What draws the items: of wear histories, of missions, or of nonlinear modes; no results where there are none."""
-    if not result.held.any():
-        return (draw_outcomes, _draw_sector, _tell_nothing)
-    if result.has_modes:
-        return (draw_modes, *map(_of_pairs, (draw_mode_fractions, draw_numbers)), draw_outcomes)
-    if result.blocks is not None:
-        of_pairs = map(_of_pairs, (draw_root, draw_wear, draw_numbers))
-        own = (draw_missions, draw_scatter, draw_trends, *_VOLUMES, *of_pairs)
-        return (*own, _draw_sector, draw_outcomes, list_certificates)
-    of_pairs = map(_of_pairs, (draw_root, draw_pairs, *_LOOPS, draw_numbers))
-    own = (draw_scatter, *_VOLUMES, *_RESPONSES, draw_trends, *of_pairs)
-    return (*own, _draw_sector, draw_outcomes, list_certificates, draw_precision)
-
-
-def _of_pairs(part: _Part) -> _Part:
-    """Where scenes differ in their pairs, figures of pairs show the scene of the shown point."""
-    return lambda result: part(of_shown_scene(result))
-
-
-def _draw_sector(result: Result) -> Iterator[Item]:
-    return draw_sector(of_shown_scene(result, OF_SECTOR))
-
-
-def _tell_nothing(_result: Result) -> Iterator[Item]:
-    yield Missing("results", "Results", "No point was computed: the file holds no results to draw.")
+def list_figures() -> str:
+    """The table of figures for the page REPORT."""
+    only: dict[tuple[str, ...], str] = {(MISSIONS,): f" ({MISSIONS})", (MODES,): f" ({MODES})"}
+    rows = [f"| `{entry.name}` | {entry.shows}{only.get(entry.kinds, '')} |" for entry in FIGURES]
+    return "\n".join(("| file | shows |", "|---|---|", *rows))

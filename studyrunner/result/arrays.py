@@ -33,13 +33,12 @@ class SmallArray:
 def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, object]:
     """Attributes of a variable of the file. of_modes: whether it is a file of nonlinear modes."""
     content = "coordinate" if name in COORDINATES else entry.content
-    found: dict[str, object] = {
-        "units": entry.units,
-        "long_name": entry.long_name,
-        "coverage_content_type": content,
-    }
-    if entry.comment:
-        found["comment"] = entry.comment
+    found: dict[str, object] = {"units": entry.units, "long_name": entry.long_name, "coverage_content_type": content}
+    comment = entry.comment
+    if name in ASKED and "cycle" in entry.dimensions and not entry.dtype.startswith("float"):
+        comment = " ".join(filter(None, (comment, "0 where there is no result, see last_cycle.")))
+    if comment:
+        found["comment"] = comment
     if entry.flags:
         found["flag_values"] = np.arange(len(entry.flags), dtype=entry.dtype)
         found["flag_meanings"] = " ".join(entry.flags)
@@ -47,42 +46,35 @@ def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, 
         found["flag_values"] = np.array(list(Outcome), dtype=entry.dtype)
         found["flag_meanings"] = " ".join(flag.meaning for flag in Outcome)
         found["sentences"] = "\n".join(flag.sentence_of_mode if of_modes else flag.sentence for flag in Outcome)
-    if name in ASKED and "cycle" in entry.dimensions and not entry.dtype.startswith("float"):
-        found["comment"] = " ".join(filter(None, (entry.comment, "0 where there is no result, see last_cycle.")))
     return found
 
 
-def coordinate_entry(study: Study, name: str) -> Variable:
-    """Entry of a coordinate in the list of variables."""
+def _coordinate_entry(study: Study, name: str) -> Variable:
     if name == "cycle" and study.to_the_end:
         comment = "Spaced evenly in worn volume and cycles, to the last; cycle_count has the counts of each point."
         return Variable((), "1", "number of the output", comment=comment)
-    if name == "sweep" and study.has_modes:
+    if name == "sweep" and not study.kind.counted:
         comment = "up: the modal amplitude is raised from zero; down: raised to a larger one, then lowered."
         return Variable((), "1", "how the amplitude is reached", comment=comment)
-    axis = next((axis for axis in study.scene_axes if axis.name == name), None)
-    if axis is not None:
-        return Variable((), axis.units, axis.meaning, comment=f"Key {axis.table}.{axis.dotted} of the study.")
+    for axis in study.scene_axes:
+        if axis.name == name:
+            return Variable((), axis.units, axis.meaning, comment=f"Key {axis.table}.{axis.dotted} of the study.")
     return COORDINATES[name]
 
 
 def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[SmallArray]:
     """Coordinates of the file."""
-    along: dict[str, NDArray[np.generic]] = {name: _labels(values) for name, values in study.dimensions.items()}
-    if study.has_missions:
-        along["mission"] = np.array(study.missions_kept, dtype=np.int32)
-        along["block"] = _labels([block.name for block in study.mission])
-    else:
-        along.setdefault("cycle", np.array(study.cycles_kept))
-    along["contact"] = np.arange(len(facts.area), dtype=np.int32)
-    along["response"] = _labels(facts.response_names)
+    along: dict[str, Sequence[object] | NDArray[np.generic]] = dict(study.dimensions)
+    counted = study.missions_kept if study.mission else np.array(study.cycles_kept)
+    along.setdefault(study.kind.counted or "cycle", counted)
+    along |= {"block": [block.name for block in study.mission]} if study.mission else {}
+    along |= {"contact": range(len(facts.area)), "response": facts.response_names}
     if study.outputs.loops:
-        along["phase"] = 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES
-        along["component"] = _labels(LOOP_COMPONENTS)
+        along |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}
     for name, values in along.items():
-        yield SmallArray(name, (name,), values, coordinate_entry(study, name))
+        yield SmallArray(name, (name,), _labels(values), _coordinate_entry(study, name))
     of_pairs: dict[str, NDArray[np.generic]] = {
-        name: pairs.position[..., column] for column, name in enumerate(("contact_x", "contact_y", "contact_z"))
+        f"contact_{axis}": pairs.position[..., column] for column, axis in enumerate("xyz")
     }
     of_pairs |= {"contact_area": pairs.area, "contact_surface": pairs.surface}
     if pairs.exists is not None:
@@ -101,7 +93,7 @@ def scene_arrays(study: Study, of_scene: Sequence[SceneVariable]) -> Iterator[Sm
         yield SmallArray(each.name, dimensions, each.values, each.entry, over_axes=each.axes)
 
 
-def _labels(values: Sequence[object]) -> NDArray[np.generic]:
+def _labels(values: Sequence[object] | NDArray[np.generic]) -> NDArray[np.generic]:
     """Values of an axis: whole numbers in 32 bits, which every NetCDF reader knows; text where one value is text.
 
     True and false, which NetCDF does not have, are 1 and 0.

@@ -14,7 +14,7 @@ from studyrunner.advice import Used, advise, advise_error
 from studyrunner.percent import show_percent, show_rtol
 from studyrunner.result.points import WELL_ENOUGH
 from studyrunner.result.units import show_cycles
-from studyrunner.result.view import Point, Result
+from studyrunner.result.view import Result
 from studyrunner.system.progress import count
 
 _MOST_NAMED = 10
@@ -25,22 +25,17 @@ _OF_ADVICE = ("scheme", "sweep", "harmonics", "samples", "rtol")
 
 @dataclass(frozen=True)
 class Certainty:
-    """How well the numbers of a result are known.
+    """How well the numbers of a result are known. n_known, n_less, n_unknown: of points computed to the end."""
 
-    of: what, as "worn volume". n_points: of the study. n_known, n_less, n_unknown: computed to the end and known to
-    `rtol`, less well, never estimated. rtol: NaN where it is an axis. worst: largest relative error, NaN without one.
-    where: its point in words. advice: what would make it smaller; empty where all are known to `rtol`.
-    """
-
-    of: str
-    n_points: int
-    n_known: int
+    of: str  # what, as "worn volume"
+    n_points: int  # of the study
+    n_known: int  # known to rtol
     n_less: int
-    n_unknown: int
-    rtol: float
-    worst: float
-    where: str
-    advice: str
+    n_unknown: int  # never estimated
+    rtol: float  # NaN where it is an axis
+    worst: float  # largest relative error, NaN without one
+    where: str  # its point in words
+    advice: str  # what would make it smaller; empty where all are known to rtol
 
     @property
     def n_short(self) -> int:
@@ -62,8 +57,9 @@ class Certainty:
         text += f", {self.n_unknown} without an estimate" if self.n_unknown else ""
         if not self.worst > 0.0:
             return text
-        at = f" at {self.where}" if self.where else ""
-        return f"{text}; the least certain is {known}{at}{advice}"
+        where = f"{self.where}, " if self.where else ""
+        advice = f"; {self.advice}" if self.advice else ""
+        return f"{text}; least certain: {where}{known.removeprefix('known ')}{advice}"
 
 
 def certainty_of(result: Result, *, wore: bool = True) -> Certainty | None:
@@ -74,7 +70,8 @@ def certainty_of(result: Result, *, wore: bool = True) -> Certainty | None:
     if result.has_modes:
         return _certainty(result, "point", _of_modes(result))
     responses = result.has("response_error") and result.blocks is None
-    if result.tells_volumes and (wore or not responses):
+    has_errors = result.has("error_estimate") and np.isfinite(result.rtol).any() and result.computed.any()
+    if result.wears and has_errors and (wore or not responses):
         return _certainty(result, "worn volume", result.errors)
     if responses:
         last = result.over_points("response_error", lambda values: values[:, -1])
@@ -104,7 +101,7 @@ def _certainty(result: Result, of: str, errors: NDArray[np.float64]) -> Certaint
     if above.any() or known.any():
         order = np.where(above if above.any() else known, errors, -1.0)
         place = tuple(int(index) for index in np.unravel_index(int(np.argmax(order)), order.shape))
-        worst, where = float(errors[place]), result.describe(_point(result, place)) if result.varying else ""
+        worst, where = float(errors[place]), result.describe(result.point_at(place)) if result.varying else ""
         if above.any():
             found = advise_volume(result, place) if of == "worn volume" else "set a smaller solver.rtol"
             advice = f"for {show_rtol(float(result.rtol[place]))} {found}"
@@ -123,7 +120,7 @@ def tell_ends(result: Result) -> str:
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
     n_early = int(np.count_nonzero(result.held & ~result.computed))
     text = f"{count(n_points, 'point')}, {n_computed} computed to the end"
-    text += f", {n_early} ended early and hold what was computed until then" if n_early else ""
+    text += f", {n_early} ended early with values up to there" if n_early else ""
     n_without = n_points - n_computed - n_early
     return f"{text}, {n_without} without a result." if n_without else f"{text}."
 
@@ -145,7 +142,7 @@ def describe_ended(result: Result, number: int) -> list[str]:
             )
             known = f"worn volume known within {show_error(result, place)}" if 0.0 < error <= WELL_ENOUGH else ""
             said = ", ".join(filter(None, (end, known, said)))
-        where = result.describe(_point(result, place))
+        where = result.describe(result.point_at(place))
         lines += [f"{where}: {said}"] if said else []
     if len(found) > _MOST_NAMED and lines:
         lines.append(f"and {len(found) - _MOST_NAMED} more")
@@ -172,13 +169,13 @@ def advise_volume(result: Result, place: tuple[int, ...]) -> str:
     """What would make the error of the worn volume of a point smaller, in a few words."""
     rates: list[float] = []
     if result.has("wear_rate_error"):
-        rates = result.at("wear_rate_error", _point(result, place)).values.tolist()
+        rates = result.at("wear_rate_error", result.point_at(place)).values.tolist()
     return advise_error(float(result.errors[place]), rates, settings_of(result, place))
 
 
 def settings_of(result: Result, place: tuple[int, ...]) -> Used:
     """Settings of a point, as far as the file tells."""
-    dataset, point = result.dataset, _point(result, place)
+    dataset, point = result.dataset, result.point_at(place)
     solver: Mapping[str, Any] = result.study.get("solver", {})
     slow_time: Mapping[str, Any] = result.study.get("slow_time", {})
 
@@ -200,7 +197,3 @@ def settings_of(result: Result, place: tuple[int, ...]) -> Used:
         by_depth="largest_depth" in slow_time,
         until="until" in slow_time,
     )
-
-
-def _point(result: Result, place: tuple[int, ...]) -> Point:
-    return dict(zip(result.axes, place, strict=True))

@@ -6,12 +6,12 @@ import contextlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from studies.hdf5 import is_hdf5, open_hdf5, read_attribute
 from studies.scene_error import SceneError
 from studies.scene_file import has_mesh
-from studyrunner.checkpoint.database import read_study
+from studyrunner.checkpoint.store import read_study
 from studyrunner.result.paths import progress_file
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.study.toml_text import read_toml
@@ -19,6 +19,8 @@ from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
     from studyrunner.study.study import Study
+
+_UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, KeyError, SceneError, UserError)
 
 
 @dataclass(frozen=True)
@@ -54,27 +56,13 @@ class Target:
 def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how: str = "--overwrite") -> Target:
     """Path of a result, after a test that nothing forbids to replace what exists there; nothing is changed.
 
-    Parameters
-    ----------
-    option
-        The option of the command line that gave the path.
-    path
-        As `check_output` gives it; the file need not exist.
-    study
-        The study of the new result.
-    overwrite
-        Whether a result of another study may be replaced.
-    how
-        How the user asks for that, in words.
-
-    Raises
-    ------
-    UserError
-        Where the file is no result of run-study, or the file or its progress belongs to another study.
+    option: of the command line, that gave the path. path: as `check_output` gives it. study: of the new result.
+    overwrite: whether a result of another study may be replaced. how: the user asks for that, in words. Raises
+    UserError where the file is no result of run-study, or the file or its progress belongs to another study.
     """
-    standing, finished = _read_result(option, path)
-    own = Label.of(study)
-    for what, found in ((path, standing), (progress_file(path), _read_note(path))):
+    own, (standing, finished), in_progress = Label.of(study), _read_result(option, path), progress_file(path)
+    note = read_study(in_progress)
+    for what, found in ((path, standing), (in_progress, note and Label(*note))):
         if found is not None and found != own and not overwrite:
             remedy = f"give another name or {how}: {what.name} is of {found}, this is {own}"
             raise UserError("command line", option, str(path), remedy)
@@ -83,7 +71,7 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
 
 def check_scene_file(option: str, path: Path) -> None:
     """Raises UserError where a file exists that is no scene file."""
-    with contextlib.suppress(OSError, RuntimeError, ValueError, TypeError, KeyError, SceneError):
+    with contextlib.suppress(*_UNREADABLE):
         if not path.exists() or path.stat().st_size == 0:
             return
         if is_hdf5(path):
@@ -94,33 +82,18 @@ def check_scene_file(option: str, path: Path) -> None:
     raise UserError("command line", option, str(path), "give another name: this is no scene file, and is left as it is")
 
 
-def _read_note(target: Path) -> Label | None:
-    """The identity in the file beside a result; None where there is none."""
-    found = read_study(progress_file(target))
-    return None if found is None else Label(*found)
-
-
 def _read_result(option: str, path: Path) -> tuple[Label | None, bool]:
     """Identity of the study of an existing result, None without one, and whether the result is finished."""
-    try:
+    with contextlib.suppress(*_UNREADABLE):
+        # damaged, or unreadable: it may be anything
         if not path.exists() or path.stat().st_size == 0:
             return None, False
-        if is_hdf5(path):
-            with open_hdf5(path) as file:
-                text, left = read_attribute(file, "study"), read_attribute(file, POINTS_LEFT)
-                if text is not None:
-                    return _label_in(text.item()), left is None or left.size != 1 or left.item() == 0
-    except (OSError, RuntimeError, ValueError, TypeError, KeyError, SceneError, UserError):
-        # damaged, or unreadable: it may be anything
-        pass
+        with open_hdf5(path) as file:
+            text, left = read_attribute(file, "study"), read_attribute(file, POINTS_LEFT)
+            stored: Any = b"" if text is None else text.item()
+            table: Any = read_toml(stored if isinstance(stored, bytes) else stored.encode(), "")
+            label = Label(str(table["study"]["name"]), os.path.basename(str(table["scene"]["model"])))  # noqa: PTH119
+            # version 0.4.0 does not say how many points are left
+            return label, left is None or left.item() == 0
     remedy = "remove the file or give another name: it is no result of run-study that can be read, and is left as it is"
     raise UserError("command line", option, str(path), remedy)
-
-
-def _label_in(text: str | bytes) -> Label:
-    """The identity in the attributes of a result. Raises UserError, TypeError and KeyError."""
-    table = read_toml(text if isinstance(text, bytes) else text.encode(), "")
-    study, scene = table["study"], table["scene"]
-    if not isinstance(study, dict) or not isinstance(scene, dict):
-        raise TypeError("no study")
-    return Label(str(study["name"]), os.path.basename(str(scene["model"])))  # noqa: PTH119

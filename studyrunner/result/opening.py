@@ -1,29 +1,82 @@
-"""Opens result files: the one way to read a result, as it is, or what the report knows of it."""
+"""Opens result files: the one way to read a result, after a check of its sizes, dimensions and types.
+
+Texts of the file stay texts: without control characters and line breaks, and as long as a sentence at most.
+
+By hand: `xarray-schema` has no limits of sizes, and leaves texts as they are.
+"""
 
 from __future__ import annotations
 
+import functools
+import math
 import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
-from studyrunner.result.schema_check import check_dataset, reading_errors
+from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
+from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS
+from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
+from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.study_of_result import check_result_file
+from studyrunner.study.toml_text import NoTomlError, read_toml
+from studyrunner.user_error import UserError, Verbatim, show_text
+from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, KEPT, LOOPS, Variable
+
+_MOST_POINTS = 10**6
+_MOST_VALUES = 2**27  # of a variable without contact pairs, which may be read as a whole
+_MOST_NAMES = 2**20  # values along any dimension
+_LARGEST_READ = 2**24  # bytes
+_LARGEST_NUMBER = 1e30
+_INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", *CERTIFICATE)
+"""Ends of the names of variables that may be infinite: errors that are not known, what comes after any cycle."""
+_LONGEST_NAME, _LONGEST_SENTENCE = 120, 400
+_DEEPEST, _INTEGERS = 3, 2.0**63  # of what is nested in a study
+_REMEDY = "give a result file of run-study that is whole"
+
+_WITHOUT_AXES = SCENE["mesh"] | SCENE["natural_frequency"] | {"stuck_frequency": STUCK_FREQUENCY}
+_OF_CONTACTS = {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
+_TEXTS = ("scheme", "sweep", "response", "component", "block")
+
+
+class _WrongError(Exception):
+    """A variable of a file is wrong. name: of the variable. found: what is wrong."""
+
+    def __init__(self, name: str, found: str) -> None:
+        super().__init__(name, found)
+        self.name = name
+        self.found = found
 
 
 def open_result(path: str | Path) -> xr.Dataset:
     """Open a result file after a check that it is a result of `run-study`: sizes, dimensions and types.
 
-    The dataset is that of `xarray.open_dataset(path)`, read when it is needed, and has the accessor `fretwear`. It
-    keeps the file open until it is closed: use it in a `with` statement, or call its `load` and `close`. A file that is
-    replaced meanwhile, by another run, stays as it was for this dataset.
+    The dataset is that of `xarray.open_dataset(path)`, read when it is needed, and has the accessor `fretwear`. Loops
+    have the dimension `loop_contact`, the pairs that have loops, in place of `contact`, along which most are NaN. The
+    file stays open until the dataset is closed: use it in a `with` statement, or call its `load` and `close`. A file
+    that is replaced meanwhile, by another run, stays as it was for this dataset.
 
     Raises
     ------
     UserError
         Where there is no such file, it is no result of `run-study`, or it is damaged: one line.
     """
-    return _open(path)[0]
+    opened = _open(path)[0]
+    loops = [name for name in LOOPS if name in opened]
+    asked = study_tables(opened.attrs).get("outputs", {}).get("loops")
+    pairs = [pair for pair in opened["contact"].values.tolist() if isinstance(asked, list) and pair in asked]
+    if not loops or not pairs:
+        return opened
+    others = [name for name, array in opened.coords.items() if "contact" in array.dims and name != "contact"]
+    own = opened[loops].drop_vars(others).sel(contact=pairs).rename(contact="loop_contact")
+    own["loop_contact"].attrs["long_name"] = "index of a contact pair whose loops are kept, see outputs.loops"
+    kept = opened.drop_vars(loops).assign(own.data_vars)
+    kept.encoding = opened.encoding
+    kept.set_close(opened.close)
+    return kept
 
 
 def open_known(path: str | Path) -> xr.Dataset:
@@ -42,3 +95,218 @@ def _open(path: str | Path) -> tuple[xr.Dataset, xr.Dataset]:
         except BaseException:
             opened.close()
             raise
+
+
+@contextmanager
+def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
+    """Turns errors of the libraries about a damaged file into UserError. source: name of the file for the user.
+
+    every: whether all errors are turned; for blocks that only read.
+    """
+    try:
+        yield
+    except UserError:
+        raise
+    except Exception as error:
+        if every or (isinstance(error, OSError | RuntimeError) and "NetCDF:" in str(error)):
+            raise UserError(source, "the file", Verbatim("damaged"), _REMEDY) from error
+        raise
+
+
+def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
+    """Variables of a file that the report knows. Only coordinates, texts and the mesh are read.
+
+    source: name of the file for the user. Raises UserError where a needed variable is missing, or has a wrong shape or
+    type.
+    """
+    slow = "mission" if "mission" in dataset.dims else "cycle"
+    lacking = [name for name in ("outcome", slow, "contact") if name not in dataset.variables]
+    if lacking:
+        raise UserError(source, "OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
+    axes = tuple(map(str, dataset["outcome"].dims))
+    try:
+        _check_sizes(dataset, axes, slow)
+        others = (name for name, entry in COORDINATES.items() if not entry.dimensions and name in dataset.variables)
+        coordinates = {name: _checked_axis(dataset, name) for name in (*axes, *others) if name in dataset.dims}
+        drawn = [str(name) for name in dataset.variables if str(name).startswith(DRAWN)]
+        drawn += ["frequency"] * ("frequency_ratio" in axes and "frequency" in dataset.variables)
+        coordinates |= {name: _checked_draws(dataset.variables[name], name, axes) for name in drawn}
+        kept = _checked_variables(dataset, axes, slow)
+        coordinates |= {name: kept.pop(name) for name in _OF_CONTACTS if name in kept}
+        _check_values(coordinates | kept, axes, slow)
+    except _WrongError as wrong:
+        raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
+    checked = xr.Dataset(kept, coordinates, {str(name): _clean(name, value) for name, value in dataset.attrs.items()})
+    checked.set_close(dataset.close)
+    study_tables(checked.attrs, source)
+    return checked
+
+
+def check_numbers(dataset: xr.Dataset, source: str) -> None:
+    """Raises UserError where there are numbers that are too large to be drawn, but for variables of more than 16 MB."""
+    for name, variable in dataset.variables.items():
+        if variable.dtype.kind == "f" and variable.size * variable.dtype.itemsize <= _LARGEST_READ:
+            sizes = np.abs(variable.values)
+            may_be_infinite = str(name).endswith(_INFINITE)
+            wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (not may_be_infinite))]
+            if wrong.size:
+                raise UserError(source, str(name), Verbatim(f"{wrong[0]:g}"), _REMEDY)
+
+
+def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
+    """The effective study of a file, by table; empty where it is no TOML. Very deeply nested values are left out.
+
+    Raises UserError where the study is no text in UTF-8, too long, or nested too deeply.
+    """
+    try:
+        tables = read_toml(str(attributes.get("study", "")).encode("utf-8", "replace"), source)
+    except NoTomlError:
+        return {}
+    except UserError as error:
+        raise UserError(source, "the attribute study", None, error.remedy) from None
+    return {name: found for name, table in tables.items() if isinstance(found := _plain(table, _DEEPEST), dict)}
+
+
+def _need(right: object, name: str, found: str) -> None:
+    if not right:
+        raise _WrongError(name, found)
+
+
+def _check_sizes(dataset: xr.Dataset, axes: Sequence[str], slow: str) -> None:
+    for name in axes:
+        _need(name.isidentifier() and len(name) <= _LONGEST_NAME, "outcome", "axes with unusual names")
+    sizes = {str(name): size for name, size in dataset.sizes.items()}
+    for name in (*axes, slow, "contact"):
+        _need(0 < sizes.get(name, 0) <= _MOST_NAMES, name, f"{sizes.get(name, 0)} values")
+    n_points = math.prod(sizes[name] for name in axes)
+    n_values = n_points * math.prod(sizes.get(name, 1) for name in (slow, "response", "block"))
+    is_small = n_points <= _MOST_POINTS and n_values <= _MOST_VALUES
+    _need(is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
+
+
+def _checked_axis(dataset: xr.Dataset, name: str) -> xr.Variable:
+    """Values along the dimension of this name: finite numbers, or texts."""
+    variable = dataset.variables[name] if name in dataset.variables else xr.Variable((), 0)
+    _need(variable.dims == (name,), name, "no values along the dimension of this name")
+    if variable.dtype.kind in "iuf":
+        _need(name not in ("scheme", "sweep"), name, "numbers in place of words")
+        _need(np.isfinite(variable.values).all(), name, "a value that is no finite number")
+        return xr.Variable((name,), variable.values, _attributes(variable))
+    texts = _texts(variable, name)
+    if name in COORDINATES and name not in _TEXTS:
+        _need(all(map(_is_choice, texts.values.tolist())), name, "texts in place of numbers")
+    return texts
+
+
+def _is_choice(text: str) -> bool:
+    """Whether a text stands for a number: the values of an axis with numbers and "auto" are texts."""
+    try:
+        return text == "auto" or math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def _checked_draws(variable: xr.Variable, name: str, axes: Sequence[str]) -> xr.Variable:
+    """What the samples draw of an input, along axes in their order, and along the pairs where they differ in it.
+
+    Or excitation frequencies, Hz, where an axis gives their ratios.
+    """
+    along = [axis for axis in (*axes, "contact") if axis in variable.dims]
+    needed = "frequency_ratio" if name == "frequency" else SAMPLE
+    _need(list(variable.dims) == along and needed in along, name, f"dimensions {', '.join(map(str, variable.dims))}")
+    right_type = variable.dtype.kind == "f" and variable.size <= _MOST_VALUES and name.isidentifier()
+    _need(right_type and len(name) <= _LONGEST_NAME, name, f"type {variable.dtype} of shape {variable.shape}")
+    # NaN of pairs that a scene does not have
+    right = (np.abs(variable.values) < _LARGEST_NUMBER) | (np.isnan(variable.values) & ("contact" in along))
+    _need(right.all(), name, "a value that is no finite number")
+    return xr.Variable(variable.dims, variable.values, _attributes(variable))
+
+
+def _checked_variables(dataset: xr.Dataset, axes: Sequence[str], slow: str) -> dict[str, xr.Variable]:
+    """Those that the report knows, unread but for texts."""
+    with_axes = ASKED | KEPT | LOOPS | COUNTS | SCENE["exact"]
+    if slow == "mission":
+        with_axes = OF_MISSIONS | OF_A_MISSION
+    elif "modal_amplitude" in axes:
+        with_axes = OF_MODES | OF_A_MODE_POINT
+    kept = {}
+    for name, entry in (_WITHOUT_AXES | _OF_CONTACTS | with_axes).items():
+        if name in dataset.variables:
+            # what is of the scene has those axes along which scenes differ
+            along = tuple(axis for axis in axes if name in with_axes or axis in dataset.variables[name].dims)
+            kept[name] = _checked_variable(dataset.variables[name], name, entry, (*along, *entry.dimensions))
+    return kept
+
+
+def _checked_variable(variable: xr.Variable, name: str, entry: Variable, dimensions: tuple[str, ...]) -> xr.Variable:
+    _need(variable.dims == dimensions, name, f"dimensions {', '.join(map(str, variable.dims))}")
+    _need(not {"scale_factor", "add_offset"} & set(variable.encoding), name, "packed values")
+    if entry.is_text:
+        return _texts(variable, name)
+    numbers = "iuf" if entry.dtype.startswith("float") else "iu"
+    _need(variable.dtype.kind in numbers, name, f"type {variable.dtype}")
+    variable = variable.copy(deep=False)
+    variable.attrs = _attributes(variable)
+    return variable
+
+
+def _check_values(kept: Mapping[str, xr.Variable], axes: Sequence[str], slow: str) -> None:
+    """Tests the values that lead to other values: cycles or missions, pairs, flags and mesh."""
+    # worn joints whose modes are sought stand in any order
+    counts = np.sort(kept[slow].values) if slow in axes else kept[slow].values
+    rising = counts.dtype.kind in "iuf" and counts[0] >= 0 and (np.diff(counts) > 0).all()
+    _need(rising, slow, "no counts in ascending order")
+    pairs = kept["contact"].values
+    differ = pairs.dtype.kind in "iu" and len(set(pairs.tolist())) == pairs.size
+    _need(differ, "contact", "no whole numbers that differ")
+    flags = np.atleast_1d(kept["outcome"].attrs.get("flag_values", np.zeros(0, int)))
+    _need(flags.dtype.kind in "iu", "outcome:flag_values", "no whole numbers")
+    nodes = [kept[name].values for name in ("mesh_x", "mesh_y", "mesh_z") if name in kept]
+    _need(all(np.isfinite(each).all() for each in nodes), "mesh_x", "no finite number, here or beside it")
+    if "mesh_quad" in kept:
+        quad, n_nodes = kept["mesh_quad"].values, min((each.size for each in nodes), default=0)
+        _need(((quad >= 0) & (quad < n_nodes)).all(), "mesh_quad", "nodes that there are not")
+
+
+def _texts(variable: xr.Variable, name: str) -> xr.Variable:
+    is_text = variable.dtype.kind in "OSU" and variable.size <= _MOST_NAMES
+    _need(is_text, name, f"type {variable.dtype} of shape {variable.shape}")
+    longest = _LONGEST_SENTENCE if name == "message" else _LONGEST_NAME
+    texts = [_line(each, longest) for each in variable.values.flat]
+    return xr.Variable(variable.dims, np.array(texts, dtype=np.str_).reshape(variable.shape), _attributes(variable))
+
+
+def _attributes(variable: xr.Variable) -> dict[str, object]:
+    """Attributes that the report reads."""
+    named = ("units", "long_name", "flag_meanings", "sentences")
+    kept: dict[str, object] = {name: _clean(name, variable.attrs[name]) for name in named if name in variable.attrs}
+    return kept | {name: variable.attrs[name] for name in ("flag_values",) if name in variable.attrs}
+
+
+def _clean(name: object, value: object) -> str:
+    """Text of an attribute without control characters."""
+    if name in ("study", "sentences"):
+        return show_text(value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value))
+    longest = {"units": _LONGEST_NAME, "flag_meanings": 50 * _LONGEST_SENTENCE}.get(str(name), _LONGEST_SENTENCE)
+    return _line(value, longest)
+
+
+@functools.lru_cache(maxsize=4096)  # most messages are the same
+def _line(value: object, longest: int) -> str:
+    """Text in one line, without control characters. longest: number of characters."""
+    text = value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value)
+    text = show_text(" ".join(text[: 2 * longest].split()))
+    return text if len(text) <= longest else f"{text[: longest - 1]}…"
+
+
+def _plain(value: object, deepest: int) -> object:
+    """A value of a study for text and arithmetic; None where it is nested too deeply."""
+    if isinstance(value, dict | list) and deepest == 0:
+        return None
+    if isinstance(value, dict):
+        return {_line(name, _LONGEST_NAME): _plain(item, deepest - 1) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item, deepest - 1) for item in value]
+    if isinstance(value, int) and abs(value) >= _INTEGERS:
+        return math.copysign(math.inf, value)
+    return value if isinstance(value, bool | int | float) else _line(value, _LONGEST_NAME)

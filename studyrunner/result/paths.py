@@ -18,19 +18,8 @@ _STREAMS = (0, 1, 2)
 def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
     """The file at `path`, links followed, after a test that it can be written; nothing is changed.
 
-    Parameters
-    ----------
-    option
-        The option of the command line that gave the path.
-    path
-        Input of the user.
-    inputs
-        Files that the run reads and must not replace.
-
-    Raises
-    ------
-    UserError
-        Where the file cannot be written, or is one of the inputs.
+    option: of the command line, that gave the path. inputs: files that the run reads and must not replace. Raises
+    UserError where the file cannot be written, or is one of the inputs.
     """
     try:
         target = Path(os.path.realpath(path))
@@ -49,9 +38,7 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
 
 
 def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> str:
-    """What keeps a file from being written to `target`, the file at `path`, as a remedy; "" for nothing. Raises
-    OSError.
-    """
+    """Remedy for what keeps a file from being written to `target`; "" for nothing. Raises OSError."""
     if target.is_dir():
         return "give the name of a file: this is a folder"
     if not target.parent.is_dir():
@@ -73,7 +60,6 @@ def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> 
 
 
 def _is_stream(target: Path) -> bool:
-    """Whether this file is stdin, stdout or stderr of this process."""
     for number in _STREAMS:
         with contextlib.suppress(OSError):
             if os.path.samestat(target.stat(), os.fstat(number)):

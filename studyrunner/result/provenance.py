@@ -6,7 +6,7 @@ import hashlib
 import platform
 from importlib import metadata
 
-from studyrunner.plan.identity import solver_digest
+from studyrunner.kinds.task import solver_digest
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study
@@ -31,10 +31,9 @@ _COMMENT = (
 
 
 def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
-    """Attributes of the file. They do not depend on time, place or number of ranks.
+    """Attributes of the file: not of time, place or number of ranks, so that equal runs have equal files.
 
-    Therefore there is no date_created without request: equal runs have equal files except for the run times. The id is
-    a hash of all inputs of the result.
+    The id is a hash of all inputs of the result.
     """
     text, solver = format_study(study), solver_digest()
     own = f"{PACKAGES[0]} {metadata.version(PACKAGES[0])}"
@@ -69,21 +68,7 @@ def _summarise(study: Study, facts: SceneFacts) -> str:
         if len(values) > 1
     ]
     over = f", over {'; '.join(ranges)}" if ranges else ""
-    if study.has_modes:
-        return (
-            "Nonlinear modes of a joint: natural frequency and damping over the amplitude, scene"
-            f" {study.scene.model} with {pairs}{over}."
-        )
-    if study.has_missions:
-        blocks = ", ".join(block.name for block in study.mission)
-        return (
-            f"Fretting wear of a joint over {study.slow_time.missions} missions of {blocks}: scene {study.scene.model}"
-            f" with {pairs}{over}. Worn volume by block, wear depths, vibration, and the errors of each."
-        )
-    return (
-        f"Fretting wear of a joint under vibration: wear histories of the scene {study.scene.model} with {pairs}{over}."
-        " Wear depths and worn volume, contact pressures and slip, vibration, and the errors of each."
-    )
+    return study.kind.about.format(scene=f"{study.scene.model} with {pairs}{over}")
 
 
 def describe_versions() -> str:
@@ -95,10 +80,8 @@ def describe_versions() -> str:
 def compare_with_archived(study: Study, scene_sha256: str) -> tuple[str, ...]:
     """Reasons why a study from a result file may now have another result, as lines; none for other studies.
 
-    scene_sha256: digest of the scene built now. Only the scene of the file is compared: with other parameters the study
-    is another one.
+    scene_sha256: digest of the scene built now.
     """
-    archived = study.archived
-    if archived is None:
+    if study.archived is None:
         return ()
-    return archived.differences(scene_sha256, solver_digest(), describe_versions())
+    return study.archived.differences(scene_sha256, solver_digest(), describe_versions())

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -49,14 +48,6 @@ def pairs_of_scene(result: Result, point: Point) -> NDArray[np.intp]:
     if not result.has(EXISTS):
         return np.arange(result.dataset.sizes["contact"])
     return np.flatnonzero(result.at(EXISTS, point).values)
-
-
-def first_points(result: Result) -> Iterator[dict[str, int]]:
-    """One point of each scene, the last of `axes_of_scenes` fastest."""
-    axes = axes_of_scenes(result)
-    shown = result.shown_point()
-    for place in itertools.product(*(range(result.dataset.sizes[axis]) for axis in axes)):
-        yield {**shown, **dict(zip(axes, place, strict=True))}
 
 
 def tells_depth(result: Result) -> bool:

@@ -13,6 +13,33 @@ from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.coordinates import COORDINATES
 
+_LARGE = 1e7
+"""From here on, numbers that were rounded are shown with an exponent."""
+
+_ROUND_OFF = 1e-12
+"""Of the largest value that is shown."""
+
+# Of each unit in SI: smallest value that is shown so, factor, unit; from large to small, the last for all below.
+_SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "m": ((1.0, 1.0, "m"), (0.5e-3, 1e3, "mm"), (0.1e-6, 1e6, "µm"), (0.0, 1e9, "nm")),
+    "m2": ((0.1, 1.0, "m²"), (0.0, 1e6, "mm²")),
+    "m3": ((0.1, 1.0, "m³"), (1e-13, 1e9, "mm³"), (0.0, 1e18, "µm³")),
+    "m3 per cycle": (
+        *((1e-4, 1.0, "m³ per cycle"), (1e-10, 1e9, "mm³ per cycle")),
+        *((1e-17, 1e12, "mm³ per kcycle"), (0.0, 1e18, "µm³ per cycle")),
+    ),
+    "m3 per mission": ((1e-4, 1.0, "m³ per mission"), (1e-13, 1e9, "mm³ per mission"), (0.0, 1e18, "µm³ per mission")),
+    "Pa": ((2e9, 1e-9, "GPa"), (0.1e6, 1e-6, "MPa"), (100.0, 1e-3, "kPa"), (0.0, 1.0, "Pa")),
+    "N": ((5e3, 1e-3, "kN"), (0.1, 1.0, "N"), (0.0, 1e3, "mN")),
+    "cycles": ((5e6, 1e-6, "Mcycles"), (5e3, 1e-3, "kcycles"), (0.0, 1.0, "cycles")),
+    "m kg^0.5": ((0.0, 1.0, "m√kg"),),
+    "rad": ((0.0, 180.0 / np.pi, "°"),),
+}
+_OF_ZERO = ("mm", "mm³", "mm³ per kcycle", "MPa", "N")
+"""Units of an engineer, for values that are all zero."""
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 
 @dataclass(frozen=True)
 class Scale:
@@ -39,57 +66,15 @@ class Scale:
         return f"{text} {self.unit}" if self.unit else text
 
 
-_LARGE = 1e7
-"""From here on, numbers that were rounded are shown with an exponent."""
-
-_ROUND_OFF = 1e-12
-"""Of the largest value that is shown."""
-
-# Of each unit in SI: smallest value that is shown so, factor, unit; from large to small, the last for all below.
-_SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
-    "m": ((1.0, 1.0, "m"), (0.5e-3, 1e3, "mm"), (0.1e-6, 1e6, "µm"), (0.0, 1e9, "nm")),
-    "m2": ((0.1, 1.0, "m²"), (0.0, 1e6, "mm²")),
-    "m3": ((0.1, 1.0, "m³"), (1e-13, 1e9, "mm³"), (0.0, 1e18, "µm³")),
-    "m3 per cycle": (
-        (1e-4, 1.0, "m³ per cycle"),
-        (1e-10, 1e9, "mm³ per cycle"),
-        (1e-17, 1e12, "mm³ per kcycle"),
-        (0.0, 1e18, "µm³ per cycle"),
-    ),
-    "m3 per mission": (
-        (1e-4, 1.0, "m³ per mission"),
-        (1e-13, 1e9, "mm³ per mission"),
-        (0.0, 1e18, "µm³ per mission"),
-    ),
-    "Pa": ((2e9, 1e-9, "GPa"), (0.1e6, 1e-6, "MPa"), (100.0, 1e-3, "kPa"), (0.0, 1.0, "Pa")),
-    "N": ((5e3, 1e-3, "kN"), (0.1, 1.0, "N"), (0.0, 1e3, "mN")),
-    "cycles": ((5e6, 1e-6, "Mcycles"), (5e3, 1e-3, "kcycles"), (0.0, 1.0, "cycles")),
-    "missions": ((0.0, 1.0, "missions"),),
-    "Hz": ((0.0, 1.0, "Hz"),),
-    "m kg^0.5": ((0.0, 1.0, "m√kg"),),
-    "rad": ((0.0, 180.0 / np.pi, "°"),),
-}
-
-
 def scale_for(units: str, *values: ArrayLike) -> Scale:
-    """Scale for values in these units of SI, by the largest magnitude among them; NaN and infinities do not count.
-
-    Units without prefixes stay as they are; where there is nothing but zero, the usual unit of an engineer.
-    """
-    largest = max((_largest(array) for array in values), default=0.0)
-    least = _ROUND_OFF * largest
-    steps = _SCALES.get(units)
-    if steps is None:
-        return Scale(1.0, "" if units == "1" else units, least)
+    """Scale for values in these units of SI, by the largest magnitude among them; NaN and infinities do not count."""
+    arrays = [np.abs(np.asarray(each, dtype=float)) for each in values]
+    largest = max((float(each.max(initial=0.0, where=np.isfinite(each))) for each in arrays), default=0.0)
+    steps = _SCALES.get(units, ((0.0, 1.0, "" if units == "1" else units),))
     if largest == 0.0:
-        usual = {"m": "mm", "m3": "mm³", "m3 per cycle": "mm³ per kcycle", "Pa": "MPa", "N": "N"}.get(units)
-        return next((Scale(factor, unit) for _, factor, unit in steps if unit == usual), Scale(*steps[-1][1:]))
+        return next((Scale(factor, unit) for _, factor, unit in steps if unit in _OF_ZERO), Scale(*steps[-1][1:]))
+    least = _ROUND_OFF * largest
     return next(Scale(factor, unit, least) for smallest, factor, unit in steps if largest >= smallest)
-
-
-def _largest(values: ArrayLike) -> float:
-    array = np.abs(np.asarray(values, dtype=float))
-    return float(array.max(initial=0.0, where=np.isfinite(array)))
 
 
 def show_number(value: float, digits: int = 6) -> str:
@@ -103,19 +88,14 @@ def show_number(value: float, digits: int = 6) -> str:
 
 
 def show_cycles(value: float, counted: str = "cycles") -> str:
-    """A count of cycles, or of missions, in words: in whole numbers as it is, else in four digits; infinite, the final
-    state.
-    """
+    """A count of cycles, or of missions, in words; infinite, the final state."""
     if value == np.inf:
         return "the final state"
     return f"{show_number(value, 4)} {counted.removesuffix('s') if value == 1 else counted}"
 
 
 def units_of(axis: xr.DataArray) -> str:
-    """Unit of an axis: `cycles` where it counts them, empty where there is none.
-
-    Of the axes that every study has it is known, of those that are keys of [scene] or [wear] the file tells it.
-    """
+    """Unit of an axis: `cycles` where it counts them, empty where there is none."""
     name = str(axis.name)
     if name == "step":
         return "cycles"
@@ -125,17 +105,11 @@ def units_of(axis: xr.DataArray) -> str:
 
 def show_value(axis: xr.DataArray, index: int) -> str:
     """A value of an axis in words."""
-    name, value = str(axis.name), axis.values[index]
+    name, value = str(axis.name).replace("_", " "), axis.values[index]
     if isinstance(value, str):
-        return f"{value} scheme" if name == "scheme" else f"{name.replace('_', ' ')} {value}"
-    units = units_of(axis)
-    number = show_number(float(value))
-    return (
-        f"{number} Hz" if name == "frequency" else f"{name.replace('_', ' ')} {number}" + (f" {units}" if units else "")
-    )
-
-
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+        return f"{value} scheme" if name == "scheme" else f"{name} {value}"
+    text = f"{show_number(float(value))} {units_of(axis)}".rstrip()
+    return text if name == "frequency" else f"{name} {text}"
 
 
 def show_power(value: float, _position: object = None) -> str:

@@ -1,28 +1,25 @@
-"""A result file for the report: varying axes, points with results, and the point that is shown."""
+"""A result file as summary and report read it: axes, points with results, how well they are known, the shown point."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studyrunner.result.chosen import find_values
-from studyrunner.result.measured import Profile, read_profile
-from studyrunner.result.missions import as_history
 from studyrunner.result.opening import open_known
-from studyrunner.result.points import CONVERGED, Points
+from studyrunner.result.points import Points
+from studyrunner.result.scars import Profile, read_profile
 from studyrunner.result.units import show_cycles, show_value
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import statistics_of_file
-from studyrunner.user_error import show_text
-
-__all__ = ["CONVERGED", "NO_VOLUME", "Point", "Result", "as_sentences", "open_for_report"]
+from studyrunner.user_error import UserError, show_text
 
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
@@ -30,13 +27,20 @@ NO_VOLUME = 1e-24
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Probabilities of the bands that figures show."""
 
+_LIKE_CYCLES = {
+    "mission": "cycle",
+    "last_mission": "last_cycle",
+    "missions_to_target": "cycles_to_target",
+    "missions_to_target_error": "cycles_to_target_error",
+}
+
 Point = Mapping[str, int]
 """Index along each axis. A missing axis stands for all its values."""
 
 
 @dataclass(frozen=True)
 class Result(Points):
-    """A result file. A point is one combination of the axes.
+    """A result file. A point is one combination of the axes; arrays of points have the shape of the axes.
 
     dataset: read lazily. A variable that was read as a whole stays in memory. fixed: axes of which this holds one value
     of several, and how many the file has. blocks: of a result of missions what belongs to single blocks; in `dataset`
@@ -52,6 +56,62 @@ class Result(Points):
     chosen: Mapping[str, float | str] = field(default_factory=dict)
     measured: Profile | None = None
     again: Mapping[str, xr.Dataset] = field(default_factory=dict)
+
+    # --- the file ---
+
+    @cached_property
+    def title(self) -> str:
+        """Title of the study, or the name of the file."""
+        return str(self.dataset.attrs.get("title") or show_text(self.path.stem))
+
+    @property
+    def followed(self) -> str:
+        """What the frequency of the excitation follows, "resonance" or "peak"; empty for given frequencies."""
+        given = self.study.get("axes", {}).get("frequency")
+        return given if isinstance(given, str) else ""
+
+    @property
+    def stuck_frequency(self) -> float:
+        """First natural frequency with the joint stuck, Hz; NaN where there are several, or the file has none."""
+        found = self.dataset["stuck_frequency"].values if self.has("stuck_frequency") else np.array(math.nan)
+        return float(found) if found.ndim == 0 else math.nan
+
+    @cached_property
+    def responses(self) -> tuple[str, ...]:
+        """Names of the responses; empty where the file has none."""
+        return tuple(map(str, self.dataset["response"].values)) if "response" in self.dataset.coords else ()
+
+    @cached_property
+    def statistics(self) -> xr.Dataset | None:
+        """What the samples of the file say, see `statistics_of_file`; None where it has none."""
+        return statistics_of_file(self.dataset, QUANTILES)
+
+    def lacks(self, *names: str) -> str:
+        """Sentence that says which of these variables to ask for; empty where the file has all."""
+        missing = [name for name in names if not self.has(name)]
+        return f"Add {' and '.join(missing)} to [outputs] variables." if missing else ""
+
+    def read(self, name: str) -> xr.DataArray:
+        """A whole variable. Whole numbers along `cycle` become floating ones, NaN where there is no state."""
+        values = self.dataset[name]
+        if values.dtype.kind in "iu" and "cycle" in values.dims and not self.has_modes:
+            if self.has("cycle_count"):
+                return values.where(self.dataset["cycle_count"].notnull())
+            last = xr.DataArray(np.where(self.held, self.last_cycle, -1.0), dims=self.axes)
+            return values.where(self.dataset["cycle"] <= last)
+        return values
+
+    def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
+        """A variable of one point, read for this point only. cycle: index, or indices, along `cycle` if it has that."""
+        values = self.dataset[name]
+        where: dict[str, int | slice | list[int]] = {
+            axis: index for axis, index in point.items() if axis in values.dims
+        }
+        if "cycle" in values.dims and not self.has_modes:
+            where["cycle"] = cycle
+        return values.isel(where)
+
+    # --- counts of cycles ---
 
     @cached_property
     def cycles(self) -> NDArray[np.float64]:
@@ -82,62 +142,7 @@ class Result(Points):
         reached = np.flatnonzero(np.isfinite(counts) & (counts <= last * (1.0 + 1e-9)))
         return int(reached[-1]) if reached.size and not self.has("cycle_count") else len(counts) - 1
 
-    @cached_property
-    def title(self) -> str:
-        """Title of the study, or the name of the file."""
-        return str(self.dataset.attrs.get("title") or show_text(self.path.stem))
-
-    @property
-    def followed(self) -> str:
-        """What the frequency of the excitation follows, "resonance" or "peak"; empty for given frequencies."""
-        given = self.study.get("axes", {}).get("frequency")
-        return given if isinstance(given, str) else ""
-
-    @property
-    def stuck_frequency(self) -> float:
-        """First natural frequency with the joint stuck, Hz; NaN where there are several, or the file has none."""
-        found = self.dataset["stuck_frequency"].values if self.has("stuck_frequency") else np.array(math.nan)
-        return float(found) if found.ndim == 0 else math.nan
-
-    @cached_property
-    def responses(self) -> tuple[str, ...]:
-        """Names of the responses; empty where the file has none."""
-        if "response" not in self.dataset.coords:
-            return ()
-        return tuple(str(name) for name in self.dataset["response"].values)
-
-    def lacks(self, *names: str) -> str:
-        """Sentence that says which of these variables to ask for; empty where the file has all."""
-        missing = [name for name in names if not self.has(name)]
-        return f"Add {' and '.join(missing)} to [outputs] variables." if missing else ""
-
-    def read(self, name: str) -> xr.DataArray:
-        """A whole variable. Whole numbers along `cycle` become floating ones, NaN where there is no state."""
-        values = self.dataset[name]
-        if values.dtype.kind in "iu" and "cycle" in values.dims and not self.has_modes:
-            if self.has("cycle_count"):
-                return values.where(self.dataset["cycle_count"].notnull())
-            last = xr.DataArray(np.where(self.held, self.last_cycle, -1.0), dims=self.axes)
-            return values.where(self.dataset["cycle"] <= last)
-        return values
-
-    def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
-        """A variable of one point, read from the file for this point only unless all of it was read before.
-
-        cycle: index, or indices, along `cycle`, where the variable has it.
-        """
-        values = self.dataset[name]
-        where: dict[str, int | slice | list[int]] = {
-            axis: index for axis, index in point.items() if axis in values.dims
-        }
-        if "cycle" in values.dims and not self.has_modes:
-            where["cycle"] = cycle
-        return values.isel(where)
-
-    @cached_property
-    def statistics(self) -> xr.Dataset | None:
-        """What the samples of the file say, see `statistics_of_file`; None where it has none."""
-        return statistics_of_file(self.dataset, QUANTILES)
+    # --- points ---
 
     def shown_point(self) -> dict[str, int]:
         """The point that figures of a single point show.
@@ -158,28 +163,26 @@ class Result(Points):
             measures.insert(0, amplitude.max("response", skipna=False).transpose(*self.axes).values)
         if not self.has_modes and self.has("worn_volume"):
             measures.insert(0, self.worn)
-        marched = np.ones(self.computed.shape, np.bool_)
+        has_slow_time = np.ones(self.computed.shape, np.bool_)
         if self.has("cycle_count"):
-            marched = np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
-        usable, best = self.usable, self.best_known
-        sets = (best & marched, usable & marched, best, self.computed, self.held, np.ones_like(marched))
-        points = next(each & self._wanted for each in sets if (each & self._wanted).any())
+            has_slow_time = np.isfinite(self.dataset["cycle_count"].isel(cycle=-1).values)
+        wanted = xr.ones_like(self.dataset["outcome"], dtype=bool)
+        for name, value in self.chosen.items():
+            if name in self.varying:
+                wanted = wanted & (self.dataset[name] == value)
+        allowed = np.asarray(wanted.transpose(*self.axes).values)
+        usable, best, all_points = self.usable, self.best_known, np.ones_like(allowed)
+        sets = (best & has_slow_time, usable & has_slow_time, best, self.computed, self.held, all_points)
+        points = next(each & allowed for each in sets if (each & allowed).any())
         for measure in measures:
             known = np.where(points & np.isfinite(measure), measure, 0.0)
             if known.max() > 0.0:
                 break
-        place = np.unravel_index(int(np.argmax(known)), known.shape)
-        return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
+        return self.point_at(np.unravel_index(int(np.argmax(known)), known.shape))
 
-    @property
-    def _wanted(self) -> NDArray[np.bool_]:
-        """Points with the chosen values; in the shape of the axes."""
-        outcome = self.dataset["outcome"]
-        wanted = xr.ones_like(outcome, dtype=bool)
-        for name, value in self.chosen.items():
-            if name in outcome.dims and self.dataset.sizes[name] > 1:
-                wanted = wanted & (self.dataset[name] == value)
-        return np.asarray(wanted.transpose(*self.axes).values)
+    def point_at(self, place: Sequence[Any] | NDArray[np.intp]) -> dict[str, int]:
+        """The point at a place in an array of points."""
+        return {name: int(index) for name, index in zip(self.axes, place, strict=True)}
 
     @cached_property
     def course_axis(self) -> str | None:
@@ -187,18 +190,15 @@ class Result(Points):
         numbers where the file has one frequency only; None where nothing but words and samples varies.
         """
         numbers = [name for name in self.varying if self.dataset[name].dtype.kind in "iuf" and name != SAMPLE]
-        for name in ("frequency", "modal_amplitude"):
-            if name in numbers:
-                return name
-        return numbers[0] if numbers else None
+        of_first_rank = [name for name in ("frequency", "modal_amplitude") if name in numbers]
+        return next(iter(of_first_rank + numbers), None)
 
     def describe(self, point: Point, axes: Collection[str] | None = None) -> str:
         """A point in words, along `axes`; by default along those of more than one value, or along all where none is."""
         kept = axes if axes is not None else ((*self.varying, *self.fixed) or self.axes)
+        followed = f"the {self.followed}" if self.followed else ""
         return ", ".join(
-            f"the {self.followed}"
-            if name == "frequency" and self.followed
-            else show_value(self.dataset[name], point[name])
+            (name == "frequency" and followed) or show_value(self.dataset[name], point[name])
             for name in self.axes
             if name in kept and name in point
         )
@@ -211,28 +211,51 @@ class Result(Points):
         """A kept cycle count in words, with the word `before` it: "at 5 cycles", "in the final state"."""
         return "in the final state" if np.isinf(self.cycles[index]) else f"{before} {self.cycle_label(index)}"
 
-    def close(self) -> None:
-        """Close the file."""
-        self.dataset.close()
-
 
 def as_sentences(*parts: str) -> str:
     """Text of those parts that are not empty, each ended with a full stop."""
     return " ".join(part if part.endswith(".") else f"{part}." for part in parts if part)
 
 
+def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
+    """The dataset with missions as cycles and without what belongs to single blocks, and these variables.
+
+    Of a result without missions the dataset as it is, and None.
+    """
+    if "block" not in dataset.dims:
+        return dataset, None
+    renamed = dataset.rename({name: new for name, new in _LIKE_CYCLES.items() if name in dataset.variables})
+    of_blocks = [name for name, variable in renamed.variables.items() if "block" in variable.dims]
+    history = renamed.drop_vars(of_blocks)
+    # renaming and dropping variables loses the file to be closed
+    history.set_close(dataset.close)
+    return history, renamed[of_blocks]
+
+
 def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None, measured: Path | None = None) -> Result:
     """Open a result file as the report reads it; variables are read when they are needed.
 
     chosen: values of axes, as text, of the point that figures of a single point show. measured: CSV file of a worn
-    profile.
-
-    Raises
-    ------
-    UserError
-        Where there is no such file, it is no result of `run-study`, or it has no such point.
+    profile. Raises UserError where there is no such file, it is no result of `run-study`, or it has no such point.
     """
     profile = None if measured is None else read_profile(measured)
     dataset, blocks = as_history(open_known(path))
-    values = find_values(dataset, chosen or {})
+    values = {name: _find_value(dataset, name, text) for name, text in (chosen or {}).items()}
     return Result(Path(path), dataset, blocks=blocks, chosen=values, measured=profile)
+
+
+def _find_value(dataset: xr.Dataset, name: str, text: str) -> float | str:
+    """The value of an axis as it is in a file, from its text. Raises UserError."""
+    axes = [str(axis) for axis in dataset["outcome"].dims]
+    remedy = f"give one of the axes {', '.join(axes)}"
+    if name in axes:
+        values = dataset[name].values.tolist()
+        for value in values:
+            try:
+                if value == text or math.isclose(value, float(text), rel_tol=1e-9):
+                    return value  # type: ignore[no-any-return]
+            except (TypeError, ValueError):
+                continue
+        remedy = f"give one of the values of {name}: {', '.join(map(str, values[:12]))}"
+        remedy += ", ..." if len(values) > 12 else ""
+    raise UserError("command line", "--point", f"{name}={text}", remedy)

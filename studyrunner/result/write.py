@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import variable_sizes
+from studyrunner.checkpoint.store import RESULTS
 from studyrunner.result.arrays import SmallArray, attributes
 from studyrunner.result.provenance import POINTS_LEFT
 from studyrunner.result.scene_group import write_scene_group
@@ -53,34 +54,10 @@ def write_result(
 ) -> Counter[int]:
     """Writes the result of a study: axes in the order of the study, then cycle or mission, then others.
 
-    Points that are not computed yet have the outcome `not_computed`.
-
-    Parameters
-    ----------
-    study, facts
-        The study, and facts of its scene.
-    completion
-        The finished histories.
-    path
-        The result file, which is replaced as a whole or not at all.
-    arrays
-        Coordinates, and variables that no task computes.
-    origin
-        Attributes of the file.
-    scene
-        Contents of the group of the scene; None for none.
-    keep_finished
-        Whether `path` holds a finished result, which is kept where points of the new result are missing.
-
-    Returns
-    -------
-    Counter[int]
-        Number of points of each outcome.
-
-    Raises
-    ------
-    StorageError
-        Where the file cannot be written, or the file of the run cannot be read.
+    Points that are not computed yet have the outcome `not_computed`. completion: the finished histories. path: is
+    replaced as a whole or not at all. arrays: coordinates, and variables that no task computes. origin: attributes of
+    the file. scene: contents of its group. keep_finished: whether `path` holds a finished result, which is kept where
+    points of the new one are missing. Returns the number of points of each outcome. Raises StorageError.
     """
     shape = tuple(len(values) for values in study.dimensions.values())
     slab = _slab_shape(shape, completion.kind.itemsize)
@@ -120,12 +97,13 @@ def _writing(path: Path) -> Iterator[netCDF4.Dataset]:
 
 
 def _keys(shape: Sequence[int], completion: CompletionIndex) -> NDArray[np.bytes_]:
-    """Hashes of the histories of points, in the order of the result file; empty for points that are not computed."""
+    """Hashes of the results of points, in the order of the result file; empty for points that are not computed."""
     keys = np.zeros(math.prod(shape), _KEY_TYPE)
-    for march in itertools.chain.from_iterable(completion.plan.marches):
-        if completion.is_finished(march):
-            for key, scaled in zip(completion.histories(march), march.histories, strict=True):
-                keys[np.ravel_multi_index(np.transpose(scaled.points), shape)] = key.encode()
+    there = completion.store.keys(RESULTS)
+    for task in completion.plan.results:
+        for place, key in enumerate(completion.names(task)):
+            if key in there:
+                keys[np.ravel_multi_index(np.transpose(task.points(place)), shape)] = key.encode()
     return keys
 
 
@@ -134,41 +112,46 @@ def _create_all(
 ) -> dict[str, Variable]:
     """Dimensions and variables of the histories."""
     sizes = {name: len(values) for name, values in study.dimensions.items()} | variable_sizes(study, facts)
-    asked = {name: entry for name, entry in study.variables.items() if name in study.outputs.variables}
-    variables = {**asked, **(LOOPS if study.outputs.loops else {}), **study.kept}
-    variables |= COUNTS if study.to_the_end else {}
+    variables = {name: entry for name, entry in study.variables.items() if name in study.outputs.variables}
+    variables |= (LOOPS if study.outputs.loops else {}) | {**study.kept} | (COUNTS if study.to_the_end else {})
     for name, size in sizes.items():
         file.createDimension(name, size)
-    on_contact = sorted(each.name for each in arrays if each.name.startswith("contact_"))
+    of_pairs = sorted(each.name for each in arrays if each.name.startswith("contact_"))
     drawn = [each for each in arrays if each.name.startswith(("sample_", "worn_depth"))]
+    drawn += [each for each in arrays if each.name == "frequency" and "frequency_ratio" in each.dimensions]
     for name, entry in variables.items():
         dimensions = (*study.dimensions, *entry.dimensions)
-        if entry.is_text:
-            # of any length, which cannot be compressed
-            file.createVariable(name, str, dimensions).setncatts(attributes(name, entry))
-            continue
         # a chunk of loops holds a single pair: then pairs without loops take no room
         own = (1 if name in LOOPS and each == "contact" else sizes[each] for each in entry.dimensions)
-        variable = _create(file, name, entry, dimensions, (*slab, *own))
-        variable.setncatts(attributes(name, entry, study.has_modes))
-        if "contact" in entry.dimensions or drawn:
-            named = [each.name for each in drawn if set(each.dimensions) <= set(dimensions)]
-            variable.setncattr("coordinates", " ".join(on_contact * ("contact" in entry.dimensions) + named))
+        variable = _create(file, name, entry, dimensions, (*slab, *own), of_modes=not study.kind.counted)
+        named = [each.name for each in drawn if set(each.dimensions) <= set(dimensions)]
+        named = of_pairs * ("contact" in entry.dimensions) + named
+        if named and not entry.is_text:
+            variable.setncattr("coordinates", " ".join(named))
     if not any("contact" in entry.dimensions for entry in variables.values()):
-        file.setncattr("coordinates", " ".join(on_contact))
+        file.setncattr("coordinates", " ".join(of_pairs))
     return variables
 
 
 def _create(
-    file: netCDF4.Dataset, name: str, entry: Variable, dimensions: Sequence[str], chunks: Sequence[int]
+    file: netCDF4.Dataset,
+    name: str,
+    entry: Variable,
+    dimensions: Sequence[str],
+    chunks: Sequence[int],
+    *,
+    of_modes: bool = False,
 ) -> netCDF4.Variable[Any]:
-    """A compressed variable with its attributes."""
-    fill = math.nan if entry.dtype.startswith("float") else None
-    options: Any = {"compression": "zlib", "complevel": 1, "shuffle": True, "chunksizes": chunks, "fill_value": fill}
-    variable = file.createVariable(name, entry.dtype, dimensions, **options)
-    # a chunk is written once and not looked at again, where the library would keep megabytes of each variable
-    variable.set_var_chunk_cache(size=_BYTES_OF_CACHE, nelems=1)
-    variable.setncatts(attributes(name, entry))
+    """A compressed variable with its attributes; texts of any length cannot be compressed."""
+    if entry.is_text:
+        variable = file.createVariable(name, str, dimensions)
+    else:
+        fill = math.nan if entry.dtype.startswith("float") else None
+        options: Any = {"compression": "zlib", "complevel": 1, "shuffle": True, "chunksizes": chunks}
+        variable = file.createVariable(name, entry.dtype, dimensions, fill_value=fill, **options)
+        # a chunk is written once and not looked at again, where the library would keep megabytes of each variable
+        variable.set_var_chunk_cache(size=_BYTES_OF_CACHE, nelems=1)
+    variable.setncatts(attributes(name, entry, of_modes))
     return variable
 
 
@@ -183,10 +166,8 @@ def _write_slab(
     lengths = [at.stop - at.start for at in region]
     for name, entry in variables.items():
         values = records[name].reshape(*lengths, *records[name].shape[1:])
-        if entry.is_text:
-            values = values.astype(object)
         if name not in LOOPS:
-            file[name][(*region, *(slice(None) for _ in entry.dimensions))] = values
+            file[name][(*region, ...)] = values.astype(object) if entry.is_text else values
             continue
         for place, pair in enumerate(loops):
             file[name][(*region, slice(None), pair)] = values[..., place, :, :]
@@ -220,7 +201,7 @@ def _slabs(
     for region in _regions(shape, slab):
         last = first + math.prod(at.stop - at.start for at in region)
         different, places = np.unique(keys[first:last], return_inverse=True)
-        records, there = completion.read_histories([key.decode() for key in different.tolist()])
+        records, there = completion.read_results([key.decode() for key in different.tolist()])
         if not (there | (different == b"")).all():
             raise StorageError(completion.store.path, ValueError("a result is damaged"), "give the command again")
         records["outcome"][~there] = Outcome.NOT_COMPUTED
@@ -230,7 +211,7 @@ def _slabs(
 
 def _write_array(file: netCDF4.Dataset, study: Study, slab: Sequence[int], array: SmallArray) -> None:
     """Writes a coordinate or another small array; an exact answer, with the axes of the study, in slabs."""
-    values, texts = array.values, array.values.dtype.kind == "U"
+    values = array.values
     for dimension, size in zip(array.dimensions, values.shape, strict=True):
         if dimension not in file.dimensions:
             file.createDimension(dimension, size)
@@ -242,7 +223,7 @@ def _write_array(file: netCDF4.Dataset, study: Study, slab: Sequence[int], array
         for region in _regions(shape, slab):
             variable[region] = values[region]
         return
-    kind: Any = str if texts else values.dtype
-    variable = file.createVariable(array.name, kind, array.dimensions)
+    is_text = values.dtype.kind == "U"
+    variable = file.createVariable(array.name, str if is_text else values.dtype, array.dimensions)
     variable.setncatts(attributes(array.name, array.entry))
-    variable[:] = values.astype(object) if texts else values
+    variable[:] = values.astype(object) if is_text else values

@@ -20,11 +20,7 @@ _DIGITS = 30
 
 @dataclass(frozen=True)
 class SaltelliLayout:
-    """Which row of a Saltelli design is what: 2 + n_groups rows for each base sample, one base sample after the other.
-
-    The rows of a base sample: A, B, then for each group of columns A with the columns of this group from B. So the
-    rows of the first base samples are the design of fewer base samples.
-    """
+    """Rows of a Saltelli design. Of each base sample: A, B, and for each group of columns A with this group from B."""
 
     n_groups: int
 
@@ -36,10 +32,7 @@ class SaltelliLayout:
     def split(
         self, values: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """f_A (..., n), f_B (..., n), f_AB (n_groups, ..., n), as `scipy.stats.sobol_indices` takes them.
-
-        values (..., n rows_per_base): of the rows of the design.
-        """
+        """f_A (..., n), f_B (..., n), f_AB (n_groups, ..., n) of values (..., n rows_per_base) of the rows."""
         rows = values.reshape(*values.shape[:-1], -1, self.rows_per_base)
         return rows[..., 0], rows[..., 1], np.moveaxis(rows[..., 2:], -1, 0)
 
@@ -47,35 +40,14 @@ class SaltelliLayout:
 def unit_design(
     method: Method, seed: int, samples: int, dimensions: int, groups: Sequence[int] = ()
 ) -> NDArray[np.float64]:
-    """Points in the unit cube, without its surface.
+    """Points (rows, dimensions) in the unit cube, without its surface.
 
-    A column depends on its number, the seed and the method alone, so that further columns change none. With "sobol"
-    and "random" the first rows are the design of fewer samples, with "saltelli" those of fewer base samples; with
-    "latin_hypercube" every number of samples has other points.
+    A column depends on its number, the seed and the method alone. Except with "latin_hypercube" the first rows are the
+    design of fewer samples. "sobol" is scrambled by a random lower triangular matrix and a digital shift (Matousek
+    1998); with "saltelli" A and B are two halves of its columns (Saltelli et al. 2010), and there are 2 + len(groups)
+    rows a sample. groups: numbers of columns that vary together in "saltelli"; each alone if empty.
 
-    Parameters
-    ----------
-    method
-        "sobol": Sobol' sequence, scrambled by a random lower triangular matrix and a digital shift for each column
-        (Matousek 1998). "saltelli": A and B are two halves of the columns of such a sequence (Saltelli et al. 2010).
-    seed
-        Of the random numbers, 0 or more.
-    samples
-        Rows; with "saltelli" base samples, each with 2 + len(groups) rows as `SaltelliLayout` says.
-    dimensions
-        Columns.
-    groups
-        Numbers of columns that vary together in "saltelli", their sum is `dimensions`; each column alone if empty.
-
-    Returns
-    -------
-    NDArray
-        (rows, dimensions).
-
-    Raises
-    ------
-    WrongValueError
-        Where a Sobol' sequence has not so many columns.
+    Raises WrongValueError where a Sobol' sequence has not so many columns.
     """
     if method == "saltelli":
         return _saltelli(seed, samples, groups or (1,) * dimensions)
@@ -92,7 +64,6 @@ def unit_design(
 
 
 def _sobol(seed: int, samples: int, dimensions: int) -> NDArray[np.float64]:
-    """Scrambled here and not by scipy, whose scrambling of a column depends on the number of columns."""
     from scipy.stats import qmc  # where it is used: it takes a while to load
 
     if dimensions > qmc.Sobol.MAXDIM:

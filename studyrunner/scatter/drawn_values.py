@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cholesky
 
 from studyrunner.scatter.design import unit_design
-from studyrunner.scatter.section import Distribution, Kind, Of, Scattered, ScatterSection
+from studyrunner.scatter.section import Kind, Scattered, ScatterSection
 from studyrunner.user_error import WrongValueError
 
 _ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
@@ -33,22 +33,18 @@ class ScatteredPairs:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What the samples draw of an input.
+    """What the samples draw of an input: values, or offsets from the study's own value, or factors of it (`kind`).
 
-    values (samples,), or (samples, n_pairs) where pairs differ: values in the unit of the input, offsets in this unit
-    from the study's own value, or factors of it, as `kind` says. of: what has a draw of its own.
+    values (samples,), or (samples, n_pairs) where pairs differ; unit of the input.
     """
 
-    name: str
     values: NDArray[np.float64]
     kind: Kind
-    of: Of
 
     def apply(self, own: ArrayLike) -> NDArray[np.float64]:
-        """The input in each sample, of the study's own value: a number, or (n_pairs,).
+        """The input (samples,) or (samples, n_pairs), of the study's own value: a number, or (n_pairs,).
 
-        (samples,), or (samples, n_pairs) where pairs differ in the draw or in their own value. Without width it is the
-        own value to the last bit.
+        Without width it is the own value to the last bit.
         """
         own = np.asarray(own, dtype=np.float64)
         values = self.values if own.ndim == 0 or self.values.ndim == 2 else self.values[:, None]
@@ -60,45 +56,35 @@ class Drawn:
 def drawn(section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: ScatteredPairs) -> dict[str, Drawn]:
     """What the samples draw of each input that scatters, in the order of `section.inputs`.
 
-    own_values: for those drawn around it the study's own value: a number, (n_pairs,), or (n_values, 1) for an axis.
-    pairs: of the scene; their positions are used for correlation lengths only.
+    own_values: of the study: a number, (n_pairs,), or (n_values, 1) for an axis; not needed where `kind` is "value".
 
-    Raises WrongValueError, with its key, where a draw is none that physics allows, positions are missing, or a relative
-    width is one of 0.
+    Raises WrongValueError, with its key, where a draw is none that physics allows, positions that a correlation length
+    needs are missing, or a relative width is one of 0.
     """
     from scipy.special import ndtri  # where it is used: it takes a while to load
 
     inputs = section.inputs
-    groups = [_n_columns(each, pairs) for each in inputs.values()]
+    labels = tuple(dict.fromkeys(pairs.surface))
+    widths = {"all pairs": 1, "each surface": len(labels), "each pair": len(pairs.surface)}
+    groups = [widths[each.of] for each in inputs.values()]
     design = unit_design(section.method, section.seed, section.samples, sum(groups), groups)
     scores = np.split(ndtri(design), np.cumsum(groups)[:-1], axis=1)
     found = {}
     for (name, scattered), score in zip(inputs.items(), scores, strict=True):
         if scattered.of == "each surface":
-            score = score[:, [_surfaces(pairs).index(label) for label in pairs.surface]]
+            score = score[:, [labels.index(label) for label in pairs.surface]]
         elif scattered.correlation_length is not None:
             score = score @ _field(name, scattered.correlation_length, pairs).T
-        distribution = scattered.distribution
-        values = distribution.draw(score if scattered.of != "all pairs" else score[:, 0])
-        found[name] = Drawn(name, values, distribution.kind, scattered.of)
-        own = 0.0 if distribution.kind == "value" else own_values[name]
-        _check(found[name], distribution, np.atleast_2d(np.asarray(own, dtype=np.float64)))
+        kind = scattered.distribution.kind
+        found[name] = Drawn(scattered.distribution.draw(score if scattered.of != "all pairs" else score[:, 0]), kind)
+        _check(name, scattered, found[name], 0.0 if kind == "value" else own_values[name])
     return found
 
 
 def largest_draw(scattered: Scattered, own: float, score: float) -> float:
     """The value of an input so many standard deviations up, or the same share of a uniform one. own: study's value."""
     distribution = scattered.distribution
-    values = distribution.draw(np.array([score]))
-    return float(Drawn("", values, distribution.kind, scattered.of).apply(own)[0])
-
-
-def _surfaces(pairs: ScatteredPairs) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(pairs.surface))
-
-
-def _n_columns(scattered: Scattered, pairs: ScatteredPairs) -> int:
-    return {"all pairs": 1, "each surface": len(_surfaces(pairs)), "each pair": len(pairs.surface)}[scattered.of]
+    return float(Drawn(distribution.draw(np.array([score])), distribution.kind).apply(own)[0])
 
 
 def _field(name: str, length: float, pairs: ScatteredPairs) -> NDArray[np.float64]:
@@ -116,13 +102,14 @@ def _field(name: str, length: float, pairs: ScatteredPairs) -> NDArray[np.float6
     return np.asarray(cholesky(covariance, lower=True))
 
 
-def _check(draw: Drawn, distribution: Distribution, own: NDArray[np.float64]) -> None:
-    """Refuses draws that physics forbids. own: rows of values of all pairs."""
-    key, name = f"scatter.{draw.name}", draw.name
-    if draw.kind == "factor" and distribution.has_width and not own.any():
+def _check(name: str, scattered: Scattered, draw: Drawn, own: ArrayLike) -> None:
+    """Refuses draws that physics forbids. own: numbers, or rows of values of all pairs."""
+    rows = np.atleast_2d(np.asarray(own, dtype=np.float64))
+    shown = scattered.distribution.model_dump()
+    if draw.kind == "factor" and (draw.values != 1.0).any() and not rows.any():
         remedy = "give a width in the unit of the input: the study's own value is 0, of which a share is nothing"
-        raise WrongValueError(distribution.model_dump(), remedy, key)
-    smallest = min(float(draw.apply(row).min()) for row in own)
+        raise WrongValueError(shown, remedy, f"scatter.{name}")
+    smallest = min(float(draw.apply(row).min()) for row in rows)
     if (smallest < 0.0 and name.startswith(_NOT_BELOW_ZERO)) or (smallest <= 0.0 and name in _ABOVE_ZERO):
         remedy = f"give less width, or lognormal: a sample draws {smallest:.3g}, which {name} cannot be"
-        raise WrongValueError(distribution.model_dump(), remedy, key)
+        raise WrongValueError(shown, remedy, f"scatter.{name}")

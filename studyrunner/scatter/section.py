@@ -13,6 +13,7 @@ from studyrunner.values import NotNegative, Positive, Section, Whole, Wrong
 
 Method = Literal["sobol", "latin_hypercube", "random", "saltelli"]
 Kind = Literal["value", "offset", "factor"]
+"""What is drawn of an input: its values, or offsets from, or factors of the study's own value."""
 Of = Literal["all pairs", "each surface", "each pair"]
 
 OF_PAIRS = ("area", "friction_coefficient", "gap")
@@ -42,16 +43,11 @@ class Normal(_Table):
 
     @property
     def kind(self) -> Kind:
-        """What is drawn: values, or offsets from or factors of the study's own value."""
+        """As `Kind` says."""
         return "value" if self.mean is not None else "offset" if self.std is not None else "factor"
 
-    @property
-    def has_width(self) -> bool:
-        """Whether samples differ."""
-        return (self.std or self.relative_std or 0.0) > 0.0
-
     def draw(self, score: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values, offsets or factors of standard normal scores, shape of the scores."""
+        """What is drawn, of standard normal scores and in their shape."""
         centre = {"value": self.mean or 0.0, "offset": 0.0, "factor": 1.0}[self.kind]
         if self.std is not None:
             return centre + self.std * score
@@ -69,17 +65,12 @@ class Lognormal(_Table):
 
     @property
     def kind(self) -> Kind:
-        """What is drawn: values, or factors of the study's own value."""
+        """As `Kind` says."""
         return "factor" if self.median is None else "value"
 
-    @property
-    def has_width(self) -> bool:
-        """Whether samples differ."""
-        return self.factor > 1.0
-
     def draw(self, score: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values or factors of standard normal scores, shape of the scores."""
-        return (1.0 if self.median is None else self.median) * self.factor**score
+        """What is drawn, of standard normal scores and in their shape."""
+        return (self.median or 1.0) * self.factor**score
 
 
 class Uniform(_Table):
@@ -100,16 +91,11 @@ class Uniform(_Table):
 
     @property
     def kind(self) -> Kind:
-        """What is drawn: values, or offsets from the study's own value."""
+        """As `Kind` says."""
         return "offset" if self.low is None else "value"
 
-    @property
-    def has_width(self) -> bool:
-        """Whether samples differ."""
-        return self.half_width != 0.0
-
     def draw(self, score: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values or offsets of standard normal scores, shape of the scores."""
+        """What is drawn, of standard normal scores and in their shape."""
         from scipy.special import ndtr  # where it is used: it takes a while to load
 
         share = ndtr(score)
@@ -119,7 +105,6 @@ class Uniform(_Table):
 
 
 Distribution = Normal | Lognormal | Uniform
-_DISTRIBUTIONS = ("normal", "lognormal", "uniform")
 
 
 class Scattered(_Table):
@@ -134,9 +119,9 @@ class Scattered(_Table):
     @model_validator(mode="before")
     @classmethod
     def _has_one_distribution(cls, table: object) -> object:
-        if not isinstance(table, Mapping) or len(table.keys() & set(_DISTRIBUTIONS)) != 1:
-            kinds = " or ".join(_DISTRIBUTIONS)
-            raise ValueError(f"give a table with one distribution, {kinds}, as {{normal = {{std = 0.03}}}}")
+        if not isinstance(table, Mapping) or len(table.keys() & {"normal", "lognormal", "uniform"}) != 1:
+            remedy = "give a table with one distribution, normal or lognormal or uniform, as {normal = {std = 0.03}}"
+            raise ValueError(remedy)
         return table
 
     @property
@@ -175,8 +160,7 @@ class ScatterSection(Section):
     @property
     def inputs(self) -> dict[str, Scattered]:
         """The inputs that scatter, in the order of their columns in a design: those of pairs last, else by name."""
-        order = get_args(Of)
-        extra = self.__pydantic_extra__
+        order, extra = get_args(Of), self.__pydantic_extra__
         return {name: extra[name] for name in sorted(extra, key=lambda name: (order.index(extra[name].of), name))}
 
     @property
@@ -188,7 +172,7 @@ class ScatterSection(Section):
 def flat_table(table: Mapping[str, Any]) -> dict[str, Any]:
     """[scatter] with inputs by name, factors of surfaces as the dimensions that they have as axes: `surfaces_flat`."""
     surfaces = table.get("surfaces")
-    found = {name: value for name, value in table.items() if name != "surfaces" or not isinstance(surfaces, Mapping)}
-    if isinstance(surfaces, Mapping):
-        found |= {f"surfaces_{label}": value for label, value in surfaces.items()}
-    return {name: found[name] for name in sorted(found)}
+    if not isinstance(surfaces, Mapping):
+        return dict(sorted(table.items()))
+    others = {name: value for name, value in table.items() if name != "surfaces"}
+    return dict(sorted((others | {f"surfaces_{label}": value for label, value in surfaces.items()}).items()))

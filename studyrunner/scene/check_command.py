@@ -1,4 +1,4 @@
-"""The output of `--check`: lines on the finite-element model of a study, and a picture."""
+"""What is said of the finite-element model of a study: remarks on its files, and the lines and picture of `--check`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,15 @@ from studyrunner.scene.scene import harmonics_to_build
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, show_text
+
+
+def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:
+    """Label and text of each line on what was skipped in files, or read in one of two ways."""
+    if study.scene.files is None:
+        return ()
+    from studies.fe_models.mesh_files import read_mesh_file
+
+    return read_mesh_file(study.scene.files.mesh).remarks
 
 
 def check_study_model(study: Study, picture: Path, progress: Callable[[str], None]) -> str:

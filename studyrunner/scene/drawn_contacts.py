@@ -25,7 +25,7 @@ def contact_changes(
 
     facts: of each scene. Raises UserError where a sample draws a value that is none, or blocks differ in their pairs.
     """
-    if not study.has_missions:
+    if not study.mission:
         return _of_parts(study, scenes, facts)
     check_blocks(study, scenes, facts)
     of_blocks = []

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene
-from studyrunner.scene.scene_set import SceneSet, find_scenes
+from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
 from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study
 
@@ -73,5 +73,6 @@ def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
         with keys_as_given(study.scene_axes):
             model = build_study_scene(scenes.studies[number], say)
         facts[number] = describe_scene(model)
+    scenes = at_ratios(scenes, {number: facts[near] for number, near in enumerate(nearest)})
     each_takes = (time.monotonic() - began) / len(facts)
     return PlannedScenes(scenes, facts, tuple(nearest), each_takes * (len(scenes.studies) - len(facts)))

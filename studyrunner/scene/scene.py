@@ -156,7 +156,7 @@ def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] 
         raise UserError(study.source, names, None, "give one value: a scene file holds one scene")
     if len({json.dumps(scene_parameters_of(block), sort_keys=True) for block in study.block_studies}) > 1:
         raise UserError(study.source, "mission", None, "give all blocks one scene: a scene file holds one")
-    study = study.block_studies[0] if study.has_missions else study
+    study = next(iter(study.block_studies), study)
     model = build_study_scene(study, progress)
     with scene_errors(study.source, study.scene.path):
         mesh, origin = build_mesh(study), describe_origin(study)

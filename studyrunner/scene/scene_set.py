@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,9 +68,37 @@ def _key(study: Study) -> str:
     return json.dumps([scene.model, scene_parameters_of(study), where, harmonics_to_build(study)], sort_keys=True)
 
 
+def at_ratios(scenes: SceneSet, facts: Mapping[int, SceneFacts]) -> SceneSet:
+    """The same with excitation frequencies in Hz, where the study gives their ratios. facts: of each scene.
+
+    Raises UserError where a scene has no natural frequency with the joint stuck.
+    """
+    parts = []
+    for part, number in zip(scenes.parts, scenes.numbers, strict=True):
+        axes, stuck = part.study.axes, facts[number].stuck_frequency
+        if axes.frequency_ratio is None:
+            return scenes
+        if math.isnan(stuck):
+            remedy = "give axes.frequency in its place: nothing that has mass moves while all pairs stick"
+            raise UserError(part.study.source, "axes.frequency_ratio", list(axes.frequency_ratio), remedy)
+        hertz = axes.model_copy(update={"frequency": tuple(ratio * stuck for ratio in axes.frequency_ratio)})
+        parts.append(replace(part, study=part.study.model_copy(update={"axes": hertz})))
+    return replace(scenes, parts=tuple(parts))
+
+
+def frequencies_of_ratios(
+    study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
+) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
+    """Excitation frequencies, Hz: their dimensions, the first one frequency_ratio; None where the study gives Hz."""
+    if study.axes.frequency_ratio is None:
+        return None
+    names, stuck = stuck_frequencies_of(study, facts, scenes)
+    return ("frequency_ratio", *names), np.multiply.outer(study.axes.frequency_ratio, stuck)
+
+
 def check_blocks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> None:
     """Raises UserError where the blocks of a mission do not have equal pairs. facts: of each scene."""
-    for numbers in scenes.of_blocks if study.has_missions else ():
+    for numbers in scenes.of_blocks:
         for block, number in zip(study.mission, numbers, strict=True):
             if not _same_pairs(facts[numbers[0]], facts[number]):
                 remedy = (

@@ -9,32 +9,10 @@ import xarray as xr
 
 from studyrunner.percent import show_percent
 from studyrunner.statistics.estimates import FEWEST
-from studyrunner.statistics.samples import CYCLE, Array
+from studyrunner.statistics.samples import Array
 
 _MM3 = 1e9
 _MEASURES = ("first_index", "rank_correlation")
-
-
-def sentences(statistics: xr.Dataset) -> list[str]:
-    """A sentence for each point of the result of `worn_volume_statistics`, of the last cycle count.
-
-    "211.5 Hz: 90 % of 128 samples wear 1.4 to 2.4 mm3, median 2.1 mm3 (numerical error 1 %); friction coefficient
-    decides most (rank correlation 0.80, interval 0.71 to 0.86)".
-    """
-    last = statistics.isel({CYCLE: -1}, missing_dims="ignore")
-    axes = list(last["n_without_value"].dims)
-    varying = [name for name in axes if last.sizes[name] > 1 or name == "frequency"]
-    lines = []
-    for place in np.ndindex(*(last.sizes[name] for name in axes)):
-        point = last.isel(dict(zip(axes, place, strict=True)))
-        where = ", ".join(_show(point[name]) for name in varying)
-        lines.append(f"{where}: {sentence(point)}" if where else sentence(point))
-    return lines
-
-
-def sentence(point: xr.Dataset) -> str:
-    """What the samples of one point say: range, median, numerical error, two groups, the input that decides."""
-    return "; ".join(filter(None, (describe_volumes(point), describe_ranking(point))))
 
 
 def describe_volumes(point: xr.Dataset) -> str:
@@ -71,13 +49,6 @@ def _error(point: xr.Dataset, middle: int) -> str:
     if not (finite.any() and np.isfinite(moved).all()):
         return "numerical error not known"
     return f"numerical error {show_percent(float(moved.sum() / ends[finite].sum()) if moved.any() else 0.0)}"
-
-
-def _show(coordinate: xr.DataArray) -> str:
-    units, value = str(coordinate.attrs.get("units", "1")), coordinate.values[()]
-    if coordinate.dtype.kind not in "iuf":
-        return str(value)
-    return f"{float(value):.10g} {units}" if units != "1" else f"{coordinate.name} {float(value):.10g}"
 
 
 # --- which input decides ---

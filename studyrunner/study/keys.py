@@ -1,6 +1,6 @@
-"""The keys of a study file as text, from the classes that check them: a new study, and the table of STUDY_FILE.md.
+"""The keys of a study file as text, from the classes that check them: a new study, and the list of STUDY_FILE.md.
 
-`python -m studyrunner.study.keys` prints the table.
+`python -m studyrunner.study.keys` prints the list.
 """
 
 from __future__ import annotations
@@ -8,15 +8,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
+import numpy as np
 from pydantic.fields import FieldInfo
 
 from studyrunner.study.mission import MissionBlock
+from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.sections import SECTIONS, SOLVER_AXES, StudySection
 from studyrunner.study.toml_text import toml_value
 from studyrunner.user_error import UserError
+from studyrunner.values import Section
 
-_NEW = {
+Given = dict[str, tuple[object, str]]
+"""Keys with value and comment."""
+
+_NEW: dict[str, Given] = {
     "scene": {
         "model": ("dovetail_sector", "or a scene file, joint.h5, or the deck of a finite-element model, joint.inp"),
         "mesh": (1, "coarse, for first trials; run-study --scene-help dovetail_sector lists all keys of this scene"),
@@ -29,12 +35,12 @@ _NEW = {
     },
     "slow_time": {"cycles": (20_000, "of vibration"), "outputs": (21, "cycle counts in the result")},
 }
-"""Keys of a new study with their values and comments."""
+"""Tables of a new study; the time that the study takes is a minute."""
 
 _HEAD = """\
 # A study of fretting wear, in SI units. A line that begins with # shows a key with its default.
 #   run-study {name}.toml --plan    what would be computed, and how long it takes
-#   run-study {name}.toml           computes, one minute, and writes {name}.nc
+#   run-study {name}.toml           computes, and writes {name}.nc
 #   study-report {name}.nc          draws figures and a page into {name}-report
 """
 
@@ -46,17 +52,20 @@ _TAIL = """\
 """
 
 
-def write_new_study(name: str) -> Path:
-    """Writes a study file that runs, with a comment on each key, in the current folder. name: of the study.
+def write_new_study(name: str, deck: Path | None = None) -> Path:
+    """Writes a study file that runs, with a comment on each key, in the current folder.
 
-    Raises UserError where the name is wrong, or the file is there or cannot be written.
+    name: of the study. deck: of a finite-element model, of which the study is; None for the bundled dovetail.
+
+    Raises UserError where the name or the deck is wrong, or the file is there or cannot be written.
     """
     name = name.removesuffix(".toml")
     path = Path(f"{name}.toml")
     try:
         StudySection.model_validate({"name": name})
+        text = _new_study(name, _NEW if deck is None else {**_NEW, **_tables_of_deck(deck)})
         with path.open("x", encoding="utf-8") as file:
-            file.write(_new_study(name))
+            file.write(text)
     except ValueError:
         raise UserError("command line", "--new", name, "give a name that can be a file name, without a slash") from None
     except OSError as error:
@@ -65,30 +74,59 @@ def write_new_study(name: str) -> Path:
     return path
 
 
-def _new_study(name: str) -> str:
+def _tables_of_deck(path: Path) -> dict[str, Given]:
+    """[scene] and [axes] for a deck: the load acts on the free set of nodes that is farthest from what is held."""
+    from studies.fe_models.deck.read import read_deck  # where it is used: it takes a while to load
+
+    with scene_errors("command line", path):
+        deck = read_deck(path)
+    held = np.unique(np.concatenate([each.nodes for each in deck.boundaries] or [deck.node_numbers[:1]]))
+    centre = deck.coordinates[np.isin(deck.node_numbers, held)].mean(axis=0)
+    free = {name: nodes for name, nodes in deck.node_sets.items() if len(nodes) and not np.isin(nodes, held).any()}
+    away = {
+        name: float(np.linalg.norm(deck.coordinates[np.isin(deck.node_numbers, nodes)] - centre, axis=1).mean())
+        for name, nodes in free.items()
+    }
+    if not away:
+        raise UserError("command line", "--from", str(path), "give a deck with a set of nodes that can move")
+    motion = {"set": max(away, key=lambda name: away[name]), "direction": [0, 1, 0]}
+    in_mm = any(material.density < 1e-3 for material in deck.materials.values() if material.density)
+    scene: Given = {
+        "model": (str(path), ""),
+        "units": ("mm-t-s" if in_mm else "SI", "of the deck; all other keys are SI"),
+        "load": (motion, f"where the excitation acts; sets of the deck: {', '.join(sorted(free))}"),
+        "response": ({"tip": motion}, "what is observed"),
+        "nodal_diameter": (0, "of the travelling wave, for a sector"),
+    }
+    if any(pair.friction_coefficient is None for pair in deck.contact_pairs) or not deck.contact_pairs:
+        scene["friction_coefficient"] = (0.3, "")
+    ratios = ([0.99, 1.0], "over the first natural frequency with all contact pairs stuck; or frequency, Hz")
+    return {"scene": scene, "axes": {"frequency_ratio": ratios, "excitation_amplitude": (1.0, "N")}}
+
+
+def _new_study(name: str, tables: dict[str, Given]) -> str:
     lines = [_HEAD.format(name=name)]
     for table in ("study", "scene", "axes", "slow_time", "wear", "solver", "outputs"):
         lines.append(f"[{table}]")
-        given = {"name": (name, "")} if table == "study" else _NEW.get(table, {})
+        given: Given = {"name": (name, "")} if table == "study" else tables.get(table, {})
         lines += [f"{key} = {toml_value(value)}" + f" # {note}" * bool(note) for key, (value, note) in given.items()]
-        fields = SECTIONS[table].model_fields if table in SECTIONS else {}
-        for key, field in fields.items():
+        for key, field in SECTIONS[table].model_fields.items() if table != "scene" else ():
             if key not in given and (default := _default(table, field)) not in ("required", "-"):
                 lines.append(f"# {key} = {default} # {_meaning(field)}")
         lines.append("")
     return "\n".join([*lines, _TAIL])
 
 
-def key_table() -> str:
-    """Markdown: all keys of a study file with meaning and default."""
-    lines = ["| key | meaning | default |", "|---|---|---|"]
+def key_list() -> str:
+    """Markdown: all keys of a study file with default and meaning."""
+    lines = []
+    kinds: dict[str, type[Section]] = {**SECTIONS, "scene": SceneSection, "mission": MissionBlock}
     for table in ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", "loading", "scatter", "mission"):
-        kind = {**SECTIONS, "scene": SceneSection, "mission": MissionBlock}[table]
-        for key, field in kind.model_fields.items():
+        for key, field in kinds[table].model_fields.items():
             if field.description and not (table == "axes" and key in SOLVER_AXES):
                 default = _default(table, field)
-                shown = default if default in ("required", "-") else f"`{default}`"
-                lines.append(f"| `{table}.{key}` | {_meaning(field)} | {shown} |")
+                shown = {"required": f"`{table}.{key}` (required)", "-": f"`{table}.{key}`"}
+                lines.append(f"- {shown.get(default, f'`{table}.{key} = {default}`')}: {_meaning(field)}")
     return "\n".join(lines)
 
 
@@ -112,4 +150,4 @@ def _default(table: str, field: FieldInfo) -> str:
 
 
 if __name__ == "__main__":
-    print(key_table())
+    print(key_list())

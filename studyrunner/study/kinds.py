@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import ValidationError
+
+from solver.settings import FOLLOWED, FollowedFrequency
 from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS, OF_MISSIONS_BY_DEFAULT, OF_SAMPLED_MISSIONS
 from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.study.mistakes import Mistakes
-from studyrunner.study.sections import SOLVER_AXES, AxesSection, SlowTimeSection, WearSection
+from studyrunner.study.sections import SOLVER_AXES, AxesSection, LoadingSection, SlowTimeSection, WearSection
 from studyrunner.values import listed
 from studyrunner.variables import ASKED, KEPT, OF_SAMPLES, USUAL, Variable
 
@@ -28,6 +31,7 @@ class Kind:
     asked, kept: variables that its points may have, and that its result always holds.
     usual, of_samples: variables where the study names none, and where samples are drawn.
     unused: keys without a use, by table. why: the remedy where one is given.
+    counted: what the slow time counts; empty where nothing wears. about: what a result holds, of a {scene}.
     """
 
     name: str
@@ -38,20 +42,34 @@ class Kind:
     of_samples: tuple[str, ...]
     unused: Mapping[str, tuple[str, ...]]
     why: str
+    counted: str
+    about: str
 
 
 def _other_axes(*axes: str) -> tuple[str, ...]:
     return tuple(name for name in AxesSection.model_fields if name not in (*axes, *SOLVER_AXES))
 
 
-_AXES = _other_axes("modal_amplitude", "mode")
+_AXES = _other_axes("frequency_ratio", "modal_amplitude", "mode")
 _OF_MODES = ("mode", "sweep")
-_OF_MISSIONS = _other_axes("modal_amplitude", "mode", "step", "scheme")
+_OF_MISSIONS = _other_axes("frequency_ratio", "modal_amplitude", "mode", "step", "scheme")
 
 NUMBERS = tuple(name for name in _OF_MISSIONS if name != "sweep")
 """Axes that hold numbers of the joint and of its excitation, which may scatter."""
 
-WEAR = Kind("wear histories", _AXES, ASKED, KEPT, USUAL, OF_SAMPLES, {}, "")
+WEAR = Kind(
+    "wear histories",
+    _AXES,
+    ASKED,
+    KEPT,
+    USUAL,
+    OF_SAMPLES,
+    {},
+    "",
+    "cycle",
+    "Fretting wear of a joint under vibration: wear histories of the scene {scene}. Wear depths and worn volume,"
+    " contact pressures and slip, vibration, and the errors of each.",
+)
 MODES = Kind(
     "nonlinear modes",
     _OF_MODES,
@@ -66,6 +84,8 @@ MODES = Kind(
         "outputs": ("loops",),
     },
     "leave it out: with axes.modal_amplitude nothing is excited and nothing wears",
+    "",
+    "Nonlinear modes of a joint: natural frequency and damping over the amplitude, scene {scene}.",
 )
 MISSIONS = Kind(
     "missions",
@@ -80,12 +100,59 @@ MISSIONS = Kind(
         "outputs": ("loops",),
     },
     "leave it out: slow_time.missions counts in place of cycles, and missions choose their own steps",
+    "mission",
+    "Fretting wear of a joint over missions: scene {scene}. Worn volume by block, wear depths, vibration, and the"
+    " errors of each.",
 )
 
 
 def kind_of(tables: Tables) -> Kind:
     """The kind of study that the tables ask for."""
     return MISSIONS if "mission" in tables else MODES if "modal_amplitude" in tables["axes"] else WEAR
+
+
+def take_ratio(tables: Tables, found: Mistakes) -> dict[str, str]:
+    """Ratios stand for frequencies until the natural frequencies of the scenes are known (`scene_set.at_ratios`).
+
+    Returns the key of mistakes in the frequencies.
+    """
+    axes = tables["axes"]
+    if "frequency_ratio" not in axes:
+        return {}
+    if "frequency" in axes:
+        found.add("axes.frequency", axes["frequency"], "leave it out, or frequency_ratio: give one of both")
+    if "exact" in listed(tables["outputs"].get("variables")):
+        remedy = "leave it out: it is of given frequencies, and axes.frequency_ratio gives none"
+        found.add("outputs.variables", "exact", remedy)
+    if "frequency" in tables.get("scatter", {}):
+        remedy = "leave it out: axes.frequency_ratio gives each sample the frequency of its own scene"
+        found.add("scatter.frequency", tables["scatter"].pop("frequency"), remedy)
+    axes["frequency"] = axes["frequency_ratio"]
+    return {"axes.frequency": "axes.frequency_ratio"}
+
+
+def take_followed(tables: Tables, found: Mistakes) -> FollowedFrequency | None:
+    """What the frequency follows, None where it is given; the axis then gets the middle of the range."""
+    given, loading = tables["axes"].get("frequency"), tables.get("loading")
+    words = [each for each in listed(given) if isinstance(each, str)]
+    if not words and loading is not None:
+        remedy = 'leave it out, or give axes.frequency = "resonance" or "peak", which is followed in this range'
+        found.add("loading", tables.pop("loading"), remedy)
+    if not words or words[0] not in FOLLOWED:
+        return None
+    if len(words) > 1:
+        found.add("axes.frequency", given, f'give "{words[0]}" alone, and another study for the other')
+    elif given not in (words[0], words):
+        found.add("axes.frequency", given, f'give "{words[0]}" alone: every point has the frequency that it finds')
+    tables["axes"] = {**tables["axes"], "frequency": IDLE_FREQUENCY}
+    tables.setdefault("loading", {})
+    try:
+        low, high = LoadingSection.model_validate(tables["loading"]).between
+    except ValidationError:
+        # said with the other tables
+        return None
+    tables["axes"]["frequency"] = 0.5 * low + 0.5 * high
+    return FollowedFrequency(words[0], low, high)
 
 
 def take_unused(tables: Tables, found: Mistakes) -> None:

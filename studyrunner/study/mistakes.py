@@ -81,15 +81,17 @@ def check_table(
     found = Mistakes(source)
     # tables of scenes are made for other callers as well, and take this from their caller
     strict = None if issubclass(kind, Section) else True
+    checked: Checked | None = None
+    wrong: Iterator[Wrong] = iter(())
     try:
         checked = kind.model_validate(table, strict=strict)
+        wrong = checked.rules() if isinstance(checked, Section) else wrong
     except ValidationError as error:
-        for wrong in wrong_keys(error, kind, table, others):
-            found.add(*_below(prefix, wrong))
-    else:
-        for wrong in checked.rules() if isinstance(checked, Section) else ():
-            found.add(*_below(prefix, wrong))
+        wrong = wrong_keys(error, kind, table, others)
+    for key, value, remedy in wrong:
+        found.add(f"{prefix}.{key}" if key else prefix, value, remedy)
     found.raise_any()
+    assert checked is not None
     return checked
 
 
@@ -192,10 +194,6 @@ def tables_in(annotation: object) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [found for each in get_args(annotation) for found in tables_in(each)]
-
-
-def _below(prefix: str, wrong: Wrong) -> Wrong:
-    return wrong._replace(key=".".join(filter(None, (prefix, wrong.key))))
 
 
 def _nearest(kind: type[BaseModel], names: Sequence[str], others: Sequence[str]) -> str:

@@ -16,11 +16,14 @@ from studyrunner.user_error import UserError
 
 Table = dict[str, Any]
 
+_INSTEAD = {"axes.frequency": "frequency_ratio", "axes.frequency_ratio": "frequency"}
+"""Keys under [axes] that stand in each other's place."""
+
 _BARE_WORD = re.compile(r"[^\s\"'\[\]{}=,#]+")
 
 
 def override(table: Table, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
-    """Sets keys of a study. overrides: as in `read_study`. Raises UserError."""
+    """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
     if isinstance(overrides, Mapping):
         for key, value in overrides.items():
             _set_key(table, key, _plain(value), "overrides", key)
@@ -43,7 +46,12 @@ def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> 
         if not isinstance(inner, dict):
             raise UserError(source, shown, value, f"{name} holds a value and no keys: give all of it")
         place = inner
+    if value is None:
+        place.pop(names[-1], None)
+        return
     place[names[-1]] = value
+    if key in _INSTEAD:
+        place.pop(_INSTEAD[key], None)
     # the last place where a key is given counts, here or under [axes]
     tables = ("solver",) if names[-1] in AxesSection.model_fields else ("scene", "wear")
     others = {"axes": tables, **dict.fromkeys(tables, ("axes",))}

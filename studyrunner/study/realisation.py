@@ -106,7 +106,7 @@ def wrong_scatter(study: Study) -> Iterator[Wrong]:
     if of_pairs and "exact" in study.outputs.variables:
         remedy = f"leave it out: the closed form knows nothing of the {of_pairs[0]} that [scatter] draws for each pair"
         yield Wrong("outputs.variables", "exact", remedy)
-    known = [*(() if study.has_modes else NUMBERS), *OF_PAIRS, *_numbers_of(study)]
+    known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *_numbers_of(study)]
     for name, scattered in section.inputs.items():
         key, drawn, absolute = f"scatter.{name}", scattered.distribution, scattered.distribution.kind == "value"
         if name not in known:
@@ -208,7 +208,7 @@ def _drawn_studies(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
         if of_wear:
             update["wear"] = study.wear.with_numbers({name: float(values[name][sample]) for name in of_wear})
         part = study.model_copy(update=update)
-        yield with_room_for_wear(part) if of_scene and not study.has_missions else part, (sample,)
+        yield with_room_for_wear(part) if of_scene and not study.mission else part, (sample,)
 
 
 def _with_parameters(study: Study, values: Mapping[str, float]) -> BaseModel:

@@ -112,6 +112,9 @@ class AxesSection(Section):
     frequency: Annotated[Axis[Positive], BeforeValidator(_check_word)] = Field(
         description='Hz; or "resonance" or "peak", followed in the range of [loading]; not for modes and missions'
     )
+    frequency_ratio: Axis[Positive] | None = Field(
+        None, description="in place of frequency: over the first natural frequency of the same scene, all pairs stuck"
+    )
     wear_coefficient: Axis[NotNegative] = Field((1.1e-11,), description="1/Pa, of the law of [wear]")
     excitation_amplitude: Axis[Positive] = Field((1.0,), description="N, factor of the harmonic load of the scene")
     step: Axis[Positive] = Field((1000.0,), description="h, cycles: length of implicit and explicit steps")

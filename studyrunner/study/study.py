@@ -39,13 +39,10 @@ class Study(Section):
     - mission: blocks in order; none where each point has one vibration.
     - block_studies: for each block a study of this block alone.
     - follow: what the frequency of the excitation follows; None where it is given.
-    - source: file of the study, as the user named it.
-    - folder: folder of this file.
+    - source, folder: file of the study as the user named it, and its folder.
     - archived: attributes of a result file; None for a study file.
-    - scene_axes: axes that are keys of [scene] or [wear].
-    - variants: for each combination of the values of `scene_axes`, the last of them fastest, the study with these
-      values in [scene] and [wear] and without these axes; none where there are no such axes. What [scene] and [wear] of
-      this study say of a key that is an axis is its first value.
+    - scene_axes: axes that are keys of [scene] or [wear]; variants: for each combination of their values, the last one
+      fastest, the study with these values in [scene] and [wear]. This study has their first values.
     """
 
     study: StudySection
@@ -72,16 +69,6 @@ class Study(Section):
         return MISSIONS if self.mission else MODES if self.axes.modal_amplitude is not None else WEAR
 
     @property
-    def has_modes(self) -> bool:
-        """Whether the points of the study are those of nonlinear modes; then nothing wears."""
-        return self.kind is MODES
-
-    @property
-    def has_missions(self) -> bool:
-        """Whether the points of the study are mission histories, whose slow time is counted in missions."""
-        return bool(self.mission)
-
-    @property
     def variables(self) -> Mapping[str, Variable]:
         """Variables that the points of such a study have, if they are asked for."""
         return self.kind.asked
@@ -94,10 +81,8 @@ class Study(Section):
     @property
     def sizes(self) -> Mapping[str, int]:
         """Lengths of the dimensions after the axes that the study gives: slow time, and blocks of missions."""
-        if self.has_modes:
-            return {}
-        n_kept = len(self.cycles_kept)
-        return {"mission": n_kept, "block": len(self.mission)} if self.has_missions else {"cycle": n_kept}
+        counted = {self.kind.counted: len(self.cycles_kept)} if self.kind.counted else {}
+        return {**counted, **({"block": len(self.mission)} if self.mission else {})}
 
     @property
     def scene_variables(self) -> tuple[str, ...]:
@@ -107,11 +92,11 @@ class Study(Section):
     @property
     def files(self) -> tuple[Path, ...]:
         """Files that a run of the study reads."""
-        study_file = self.folder / Path(self.source).name
-        scene = () if self.scene.path is None else (self.scene.path,)
-        model = () if self.scene.files is None else self.scene.files.all
-        worn = () if self.scene.worn is None or not self.scene.worn.result else (self.folder / self.scene.worn.result,)
-        return (study_file, *scene, *model, *worn)
+        found = [self.folder / Path(self.source).name]
+        found += [] if self.scene.path is None else [self.scene.path]
+        found += [] if self.scene.files is None else self.scene.files.all
+        found += [self.folder / self.scene.worn.result] if self.scene.worn and self.scene.worn.result else []
+        return tuple(found)
 
     @property
     def friction_coefficient(self) -> float | None:
@@ -127,10 +112,8 @@ class Study(Section):
     @property
     def until(self) -> WearTarget | None:
         """Wear at which a point ends."""
-        for quantity in TARGETS:
-            if self.slow_time.until is not None and quantity in self.slow_time.until:
-                return WearTarget(quantity, self.slow_time.until[quantity])
-        return None
+        given = self.slow_time.until or {}
+        return next((WearTarget(quantity, given[quantity]) for quantity in TARGETS if quantity in given), None)
 
     @property
     def to_the_end(self) -> bool:
@@ -139,11 +122,9 @@ class Study(Section):
 
     @cached_property
     def cycles_kept(self) -> tuple[float, ...]:
-        """Cycle counts, or numbers of missions, of the result, ascending; numbers of the outputs where each point has
-        its own counts.
-        """
+        """Cycle counts, or numbers of missions, of the result, ascending; with `to_the_end` numbers of the outputs."""
         cycles, outputs = self.slow_time.cycles, self.slow_time.outputs
-        if self.has_missions:
+        if self.mission:
             return tuple(map(float, self.missions_kept))
         if isinstance(outputs, tuple):
             return outputs
@@ -155,7 +136,7 @@ class Study(Section):
 
     @property
     def missions_kept(self) -> tuple[int, ...]:
-        """Numbers of missions of the result, ascending; equally spaced but for rounding to whole numbers."""
+        """Numbers of missions of the result, ascending; equally spaced, rounded to whole numbers."""
         missions, outputs = self.slow_time.missions, self.slow_time.outputs
         assert missions is not None
         if isinstance(outputs, tuple):
@@ -166,22 +147,22 @@ class Study(Section):
     @property
     def harmonics(self) -> tuple[int | Automatic, ...]:
         """Values of `harmonics`, from its axis or the one under [solver]; so for the other solver keys."""
-        return (self.solver.harmonics,) if self.axes.harmonics is None else self.axes.harmonics
+        return self.axes.harmonics or (self.solver.harmonics,)
 
     @property
     def samples(self) -> tuple[int | Automatic, ...]:
         """Values of `samples`."""
-        return (self.solver.samples,) if self.axes.samples is None else self.axes.samples
+        return self.axes.samples or (self.solver.samples,)
 
     @property
     def tolerance(self) -> tuple[float, ...]:
         """Values of `tolerance`."""
-        return (self.solver.tolerance,) if self.axes.tolerance is None else self.axes.tolerance
+        return self.axes.tolerance or (self.solver.tolerance,)
 
     @property
     def rtol(self) -> tuple[float, ...]:
         """Values of `rtol`."""
-        return (self.solver.rtol,) if self.axes.rtol is None else self.axes.rtol
+        return self.axes.rtol or (self.solver.rtol,)
 
     @property
     def given_harmonics(self) -> tuple[int, ...]:
@@ -191,14 +172,15 @@ class Study(Section):
     @property
     def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
-        found = {**{name: getattr(self.axes, name) for name in self.own_axes}, **self.axes_of_parts}
+        names = {} if self.axes.frequency_ratio is None else {"frequency": "frequency_ratio"}
+        found = {names.get(name, name): getattr(self.axes, name) for name in self.own_axes} | self.axes_of_parts
         if self.axes.modal_amplitude is None:
             return found
         worn = found.pop("cycle", (0.0,))
         return {**found, "modal_amplitude": self.axes.modal_amplitude, "cycle": worn}
 
     @property
-    def axes_of_parts(self) -> Mapping[str, tuple[float | str, ...]]:
+    def axes_of_parts(self) -> dict[str, tuple[float | str, ...]]:
         """Names and values of the axes whose points are parts of the study (`realise`): the last axes of the result."""
         samples = {} if self.scatter is None else {"sample": tuple(range(self.scatter.realisations))}
         return {**{axis.name: axis.values for axis in self.scene_axes}, **samples}

@@ -8,9 +8,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel
 
-from solver.settings import FOLLOWED, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter.section import flat_table
 from studyrunner.study.kinds import (
@@ -18,6 +17,8 @@ from studyrunner.study.kinds import (
     MODES,
     Tables,
     kind_of,
+    take_followed,
+    take_ratio,
     take_unused,
     with_idle_values,
     without_idle_values,
@@ -44,7 +45,6 @@ from studyrunner.study.sections import (
     SOLVER_AXES,
     VARIABLES,
     AxesSection,
-    LoadingSection,
     OutputsSection,
     WearSection,
 )
@@ -54,7 +54,6 @@ from studyrunner.study.toml_text import format_toml, read_toml, read_toml_file
 from studyrunner.study.worn import AXIS as WORN_AXIS
 from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError
-from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
 _MOST_WRONG_PARTS = 20
@@ -106,19 +105,19 @@ def bundled_studies() -> tuple[str, ...]:
 
 
 def _study_path(argument: str) -> Path:
-    path = Path(argument)
+    path, names = Path(argument), bundled_studies()
     try:
-        if path.is_dir():
-            raise UserError(argument, "the study", None, "give a TOML file: this is a folder")
         if path.is_file():
             return path
+        remedy = "give a TOML file: this is a folder" if path.is_dir() else ""
     except OSError as error:
-        raise UserError(argument, "the study", None, f"give a file that can be read: {error.strerror}") from None
-    if path.suffix == ".toml" or "/" in argument or "\\" in argument:
-        raise UserError(argument, "the study", None, "there is no such file: give a TOML file or a bundled study")
-    if argument not in bundled_studies():
-        names = ", ".join(bundled_studies())
-        raise UserError(argument, "the study", None, f"there is none of this name: give a TOML file or one of {names}")
+        remedy = f"give a file that can be read: {error.strerror}"
+    if not remedy and (path.suffix == ".toml" or "/" in argument or "\\" in argument):
+        remedy = "there is no such file: give a TOML file or a bundled study"
+    if not remedy and argument not in names:
+        remedy = f"there is none of this name: give a TOML file or one of {', '.join(names)}"
+    if remedy:
+        raise UserError(argument, "the study", None, remedy)
     return Path(str(resources.files("studies").joinpath(f"{argument}.toml")))
 
 
@@ -132,8 +131,9 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     found = Mistakes(origin.source)
     tables = _known_tables(table, found)
     take_unused(tables, found)
+    moved = take_ratio(tables, found)
     _take_worn(tables, origin, found)
-    moved = _move_solver_axes(tables, found)
+    moved |= _move_solver_axes(tables, found)
     axes, blocks = _axes_and_blocks(tables, origin, found)
     parts, renamed = [], {**moved, **keys_below_axes(axes)}
     for number, part in enumerate(combinations(tables, axes) if axes else [tables]):
@@ -185,10 +185,7 @@ def _take_worn(tables: Tables, origin: Origin, found: Mistakes) -> None:
 
 
 def _move_solver_axes(tables: Tables, found: Mistakes) -> dict[str, str]:
-    """Makes axes of the solver keys that hold several values; a list of one value is that value.
-
-    Returns for each of these axes the key that it was given as.
-    """
+    """Makes axes of the solver keys with several values. Returns for each of these axes the key that was given."""
     solver, axes, moved = tables["solver"], tables["axes"], {}
     for key in SOLVER_AXES:
         value = solver.get(key)
@@ -202,21 +199,26 @@ def _move_solver_axes(tables: Tables, found: Mistakes) -> dict[str, str]:
     return moved
 
 
+def _scene_kind(tables: Tables, origin: Origin) -> type[BaseModel] | None:
+    """What [scene] consists of; None where its model is wrong, which is said where the scene is checked."""
+    try:
+        return parameters_of(tables["scene"].get("model"), origin.source)
+    except UserError:
+        return None
+
+
 def _axes_and_blocks(
     tables: Tables, origin: Origin, found: Mistakes
 ) -> tuple[tuple[SceneAxis, ...], tuple[MissionBlock, ...]]:
     """Axes that are keys of [scene] or [wear], taken out of the tables, and the blocks of a study of missions."""
-    axes: tuple[SceneAxis, ...] = ()
-    blocks: tuple[MissionBlock, ...] = ()
-    try:
-        kind = parameters_of(tables["scene"].get("model"), origin.source)
-    except UserError:
-        # said where the scene is checked, and nobody knows its keys
+    kind = _scene_kind(tables, origin)
+    if kind is None:
         for name in tables["axes"].keys() - AxesSection.model_fields.keys():
             del tables["axes"][name]
-        return axes, blocks
+        return (), ()
     own = [name for name in tables["axes"] if name in OWN_AXES]
     axes = take_scene_axes(tables, kind, WearSection, found)
+    blocks: tuple[MissionBlock, ...] = ()
     if "mission" in tables:
         blocks = read_blocks(tables["mission"], tables["axes"], kind, found)
         check_used_axes([*own, *(axis.name for axis in axes)], blocks, found)
@@ -239,11 +241,12 @@ def _check_part(
             parts["scene"] = check_scene(tables["scene"], origin)
     if "mission" in tables and (of_blocks := _block_studies(tables, blocks, origin, before, found)):
         parts |= {"mission": blocks, "block_studies": of_blocks}
-    parts["follow"] = _take_followed(tables, found)
+    parts["follow"] = take_followed(tables, found)
     filled = with_idle_values(tables)
     for name, kind in SECTIONS.items():
         if name in filled and name not in before:
-            others = _keys_of_axes(tables, origin) if name == "axes" else ()
+            scene = _scene_kind(tables, origin) if name == "axes" else None
+            others = () if scene is None else (*scene.model_fields, *WearSection.AXES)
             with found.collecting():
                 parts[name] = check_table(kind, filled[name], origin.source, name, others)
     if "outputs" in parts:
@@ -270,10 +273,7 @@ def _check_part(
 def _block_studies(
     tables: Tables, blocks: Sequence[MissionBlock], origin: Origin, before: Mistakes, found: Mistakes
 ) -> tuple[Study, ...]:
-    """For each block a study of this block alone, with its scene and its axes, without room for wear.
-
-    None at all where a parameter of a block is wrong.
-    """
+    """For each block a study of this block alone, without room for wear; none where a parameter of a block is wrong."""
     studies: list[Study] = []
     for block in blocks:
         own = {name: getattr(block, name) for name in OWN_AXES if isinstance(getattr(block, name), float)}
@@ -292,38 +292,6 @@ def _block_studies(
     return tuple(studies) if len(studies) == len(blocks) else ()
 
 
-def _take_followed(tables: Tables, found: Mistakes) -> FollowedFrequency | None:
-    """What the frequency follows, None where it is given; the axis then gets the middle of the range."""
-    given, loading = tables["axes"].get("frequency"), tables.get("loading")
-    words = [each for each in listed(given) if isinstance(each, str)]
-    if not words and loading is not None:
-        remedy = 'leave it out, or give axes.frequency = "resonance" or "peak", which is followed in this range'
-        found.add("loading", tables.pop("loading"), remedy)
-    if not words or words[0] not in FOLLOWED:
-        return None
-    if len(words) > 1:
-        found.add("axes.frequency", given, f'give "{words[0]}" alone, and another study for the other')
-    elif given not in (words[0], words):
-        found.add("axes.frequency", given, f'give "{words[0]}" alone: every point has the frequency that it finds')
-    tables["axes"] = {**tables["axes"], "frequency": IDLE_FREQUENCY}
-    tables.setdefault("loading", {})
-    try:
-        low, high = LoadingSection.model_validate(tables["loading"]).between
-    except ValidationError:
-        # said with the other tables
-        return None
-    tables["axes"]["frequency"] = 0.5 * low + 0.5 * high
-    return FollowedFrequency(words[0], low, high)
-
-
-def _keys_of_axes(tables: Tables, origin: Origin) -> tuple[str, ...]:
-    """Keys of [scene] and [wear] that may stand under [axes]."""
-    try:
-        return (*parameters_of(tables["scene"].get("model"), origin.source).model_fields, *WearSection.AXES)
-    except UserError:
-        return ()
-
-
 def _with_usual_variables(parts: Mapping[str, Any], tables: Tables) -> OutputsSection:
     """[outputs] with variables in their order, the usual ones of such a study for the word that stands for them."""
     outputs: OutputsSection = parts["outputs"]
@@ -339,11 +307,16 @@ def format_study(study: Study) -> str:
     """The effective study, every default filled in, as TOML; read again it is the same study."""
     tables = study.model_dump(mode="json")
     scene, axes = tables["scene"], tables["axes"]
-    chosen = _chosen_by_scenes(study)
+    # parameters that differ along the axes without being one: each scene has room for its own wear
+    names = {axis.key[0] for axis in study.scene_axes}
+    own, others = dict(study.scene.parameters), [dict(each.scene.parameters) for each in study.variants]
+    chosen = {key for key in own if key not in names and any(other[key] != own[key] for other in others)}
     kept = {key: value for key, value in scene["parameters"].items() if key not in chosen}
     tables["scene"] = {"model": scene["model"], **kept, "worn": _worn_states(study)}
     if study.follow is not None:
         axes["frequency"] = study.follow.of
+    if axes["frequency_ratio"] is not None:
+        del axes["frequency"]
     for axis in study.scene_axes:
         if axis.key == ("worn",):
             continue
@@ -358,14 +331,6 @@ def format_study(study: Study) -> str:
     if study.mission:
         tables["mission"] = [block.as_table() for block in study.mission]
     return format_toml(without_idle_values(tables, study.kind, study.idle_axes))
-
-
-def _chosen_by_scenes(study: Study) -> set[str]:
-    """Parameters that are no axis and differ along the axes: each scene has room for its own wear."""
-    axes = {axis.key[0] for axis in study.scene_axes}
-    own = dict(study.scene.parameters)
-    others = [dict(variant.scene.parameters) for variant in study.variants]
-    return {key for key in own if key not in axes and any(other[key] != own[key] for other in others)}
 
 
 def _worn_states(study: Study) -> dict[str, object] | None:

@@ -14,17 +14,13 @@ from studyrunner.user_error import UserError, Verbatim
 SCENE_GROUP = "scene"
 """Group of a result file with the contents of a scene file."""
 
-_ATTRIBUTES = ("study", "scene_sha256", "solver_digest", "versions")
-
 
 @dataclass(frozen=True)
 class Archived:
     """Attributes of a result file.
 
-    study: the effective study, TOML.
-    scene_sha256, solver_digest, versions: hashes of scene and solver, and versions of packages; empty where unknown.
-    holds_scene: whether the scene is in the group SCENE_GROUP.
-    scene: the table [scene] of the study.
+    study: the effective study, TOML. scene: its table [scene]. scene_sha256, solver_digest, versions: hashes of scene
+    and solver, and versions of packages; empty where unknown. holds_scene: whether the group SCENE_GROUP is there.
     """
 
     study: str
@@ -38,14 +34,11 @@ class Archived:
         """Reasons why a result that is computed now may have other numbers, as lines."""
         lines = []
         if self.scene_sha256 != scene_sha256:
-            lines.append(
-                f"its scene_sha256 is {self.scene_sha256[:12] or 'missing'}, that of the scene built now"
-                f" {scene_sha256[:12]}: another scene, whose results differ"
-            )
+            there, here = self.scene_sha256[:12] or "missing", scene_sha256[:12]
+            lines.append(f"its scene_sha256 is {there}, that of the scene built now {here}: another scene")
         if self.solver_digest != solver_digest:
-            lines.append(
-                f"computed by another solver ({self.versions or 'unknown'}; now {versions}): numbers may differ"
-            )
+            before = self.versions or "unknown"
+            lines.append(f"computed by another solver ({before}; now {versions}): numbers may differ")
         return tuple(lines)
 
 
@@ -65,12 +58,12 @@ def _user_errors(name: str, prefix: str = "") -> Iterator[None]:
 def read_archived(path: Path, name: str) -> Archived:
     """Reads the attributes of a result file that the user calls `name`. Raises UserError."""
     with _user_errors(name, "the attribute "), open_hdf5(path) as file:
-        found = {attribute: read_text_attribute(file, attribute) for attribute in _ATTRIBUTES}
-        if not found["study"]:
+        names = ("study", "scene_sha256", "solver_digest", "versions")
+        study, scene, solver, versions = (read_text_attribute(file, name) for name in names)
+        if not study:
             remedy = "missing: give a study file (TOML) or a result file of run-study"
             raise UserError(name, "the attribute study", None, remedy)
-        study, scene_sha256, solver_digest, versions = found.values()
-        return Archived(study, scene_sha256, solver_digest, versions, holds_scene=SCENE_GROUP in file)
+        return Archived(study, scene, solver, versions, SCENE_GROUP in file)
 
 
 def check_result_file(path: Path, name: str) -> None:

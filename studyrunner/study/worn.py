@@ -77,15 +77,11 @@ class _OfResult(Section):
 
 
 def read_worn(table: object, source: str, folder: Path) -> dict[str, Any]:
-    """The table `worn` with depths, those of a result file read from the file.
+    """The table `worn` with depths, those of a result file read from the file. folder: relative paths start here.
 
-    table: as the study file has it: {result, cycle, ...}, where other keys select a point of the result by values of
-    its axes, or {depth}. folder: relative paths start here.
+    table: as the study file has it: {result, cycle, ...}, where other keys select a point of the result, or {depth}.
 
-    Raises
-    ------
-    UserError
-        Where the table or the result file is wrong.
+    Raises UserError where the table or the result file is wrong.
     """
     import xarray as xr  # where it is used: it takes a while to load
 
@@ -126,11 +122,9 @@ def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence
         if name not in point and len(values) > 1:
             remedy = f"missing: give one of the values {', '.join(map(str, values[:10]))} of the result"
             found.add(f"scene.worn.{name}", None, remedy)
-        with found.collecting():
-            places[name] = _place(f"scene.worn.{name}", values, point.get(name, values[0]), source)
-    with found.collecting():
-        counts = dataset["cycle"].values.tolist()
-        places["cycle"] = [_place("scene.worn.cycle", counts, count, source) for count in cycle]
+        places[name] = _place(f"scene.worn.{name}", values, point.get(name, values[0]), found)
+    counts = dataset["cycle"].values.tolist()
+    places["cycle"] = [_place("scene.worn.cycle", counts, count, found) for count in cycle]
     found.raise_any()
     chosen = np.asarray(depths.isel(places).values, dtype=np.float64)
     for count, row in zip(cycle, chosen, strict=True):
@@ -140,16 +134,19 @@ def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence
     return chosen
 
 
-def _place(key: str, values: Sequence[Any], wanted: Any, source: str) -> int:
-    """Index of a value along an axis of a result."""
-    for place, value in enumerate(values):
-        number = isinstance(value, float | int) and isinstance(wanted, float | int)
-        if value == wanted or (number and math.isclose(value, wanted, rel_tol=1e-12)):
-            return place
+def _place(key: str, values: Sequence[Any], wanted: Any, found: Mistakes) -> int:
+    """Index of a value along an axis of a result; 0, and a mistake, where it is not there."""
     numbers = [value for value in values if isinstance(value, float | int)]
-    near = min(numbers, key=lambda value: abs(value - wanted)) if numbers and isinstance(wanted, float | int) else None
-    remedy = f"the nearest value of the result is {near:.10g}" if near is not None else f"give one of {values[:10]}"
-    raise UserError(source, key, wanted, remedy)
+    if numbers and isinstance(wanted, float | int):
+        near = min(numbers, key=lambda value: abs(value - wanted))
+        if math.isclose(near, wanted, rel_tol=1e-12):
+            return values.index(near)
+        found.add(key, wanted, f"the nearest value of the result is {near:.10g}")
+    elif wanted in values:
+        return values.index(wanted)
+    else:
+        found.add(key, wanted, f"give one of {values[:10]}")
+    return 0
 
 
 def worn_axis(table: Mapping[str, Any], name: str) -> tuple[SceneAxis, ...]:

@@ -15,19 +15,19 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, describe_ended
-from studyrunner.result.missions import as_history
 from studyrunner.result.points import COMPLETE_WORDS
 from studyrunner.result.units import show_number
-from studyrunner.result.view import Result
+from studyrunner.result.view import Result, as_history
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.sentence import describe_ranking, describe_volumes
 from studyrunner.summary.doubts import doubts
-from studyrunner.summary.mesh_change import MeshChange, compare_meshes
 from studyrunner.summary.wear import (
     Life,
+    MeshChange,
     MostWear,
     NothingWore,
     Vibration,
+    compare_meshes,
     most_wear,
     shortest_life,
     vibration_of,
@@ -37,27 +37,20 @@ from studyrunner.summary.wear import (
 
 @dataclass(frozen=True)
 class Samples:
-    """What the samples say, at the point of the other axes where their median is largest.
+    """What the samples say, at the point of the other axes where their median is largest."""
 
-    where: this point in words. n_points: how many there are. volumes, ranking: range and median of the worn volumes,
-    and which input decides, in words.
-    """
-
-    where: str
+    where: str  # this point in words
     n_points: int
-    volumes: str
-    ranking: str
+    volumes: str  # range and median of the worn volumes
+    ranking: str  # which input decides
 
 
 @dataclass(frozen=True)
 class ModeRange:
-    """Natural frequency, Hz, and damping ratio of a mode: ends of their ranges over the points that were found.
-
-    over: what varies, in words.
-    """
+    """Natural frequency, Hz, and damping ratio of a mode: ends of their ranges over the points that were found."""
 
     number: int
-    over: str
+    over: str  # what varies, in words
     frequency: tuple[float, float]
     damping: tuple[float, float]
     n_found: int
@@ -66,45 +59,33 @@ class ModeRange:
 
 @dataclass(frozen=True)
 class Failure:
-    """Points that ended in one way but `converged`. sentence, advice: on them. first: of them, in words.
-
-    is_complete: whether they were computed to the end, and are uncertain only.
-    """
+    """Points that ended in one way but `converged`."""
 
     word: str
-    is_complete: bool
+    is_complete: bool  # computed to the end, and uncertain only
     n_points: int
     sentence: str
     advice: str
-    first: str
+    first: str  # the first of these points, in words
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What came out.
-
-    n_points, n_complete: points of the study, and those computed to the end. counted: "cycles" or "missions".
-    wear: the point that wears most, or why nothing wore; None where that is not known or not asked for.
-    samples: with [scatter]. vibration: where the joint responds most, or where its resonance went.
-    life: the shortest, where there is a target. mesh: how far meshes are apart, where they can be compared.
-    modes: of nonlinear modes, one each. stuck_frequency: Hz, first natural frequency of the joint that sticks; NaN
-    where there is none, or several. failures: of each way to fail. certainty: how well the answer is known.
-    doubts: sentences on values that are hardly what was meant.
-    """
+    """What came out."""
 
     n_points: int
-    n_complete: int
-    counted: str
-    failures: tuple[Failure, ...]
+    n_complete: int  # computed to the end
+    counted: str  # "cycles" or "missions"
+    failures: tuple[Failure, ...]  # of each way to fail
     certainty: Certainty | None
-    wear: MostWear | NothingWore | None = None
-    samples: Samples | None = None
+    wear: MostWear | NothingWore | None = None  # None where it is not known or not asked for
+    samples: Samples | None = None  # with [scatter]
     vibration: Vibration | None = None
-    life: Life | None = None
-    mesh: MeshChange | None = None
+    life: Life | None = None  # with a target
+    mesh: MeshChange | None = None  # where meshes can be compared
     modes: tuple[ModeRange, ...] = ()
-    stuck_frequency: float = np.nan
-    doubts: tuple[str, ...] = ()
+    stuck_frequency: float = np.nan  # Hz, of the joint that sticks; NaN where there is none, or several
+    doubts: tuple[str, ...] = ()  # sentences on values that are hardly what was meant
 
     def __str__(self) -> str:
         """The summary as text."""
@@ -186,7 +167,7 @@ def _failures(result: Result) -> tuple[Failure, ...]:
         if ending.word == "sensitive" or not lines:
             # what the message of a sensitive one holds is no result
             place = np.argwhere(result.dataset["outcome"].values == number)[0]
-            lines = [where_is(result, dict(zip(result.axes, map(int, place), strict=True)))]
+            lines = [where_is(result, result.point_at(place))]
         first = re.split(r"[.:](?:\s|$)", ending.sentence)[0]
         advice = " ".join(advise_ended(result, number)[:1]).rstrip(".")
         found.append(Failure(ending.word, is_complete, n_points, first, advice, lines[0]))

@@ -33,10 +33,10 @@ def _not_small(result: Result) -> str:
     if largest <= SMALL:
         return ""
     place = np.unravel_index(int(np.nanargmax(ratios)), ratios.shape)
-    point = {name: int(index) for name, index in zip(result.axes, place, strict=True)}
+    point = result.point_at(place)
     return (
-        f"the wear is not small, as the method assumes: depth over contact width {largest:.2g}"
-        f" at {result.describe(point)}: take fewer cycles, if wear_coefficient is in 1/Pa"
+        f"the method assumes shallow wear, but the depth is {largest:.2g} of the contact width at"
+        f" {result.describe(point)}: take fewer cycles, and check that wear_coefficient is in 1/Pa"
     )
 
 

@@ -64,11 +64,11 @@ def _count(value: float, summary: Summary) -> str:
     return show_cycles(value, summary.counted)
 
 
-def show_known(number: Number, units: str) -> str:
+def show_known(number: Number, units: str, unknown: str = " (error not known)") -> str:
     """A number with its error: "1.52 mm3 +- 1.3 %"."""
     text = scale_for(units, number.value).show(number.value)
     if math.isnan(number.error):
-        return f"{text} (error not known)"
+        return f"{text}{unknown}"
     return f"{text} +- {show_percent(max(number.error / number.value, _LEAST))}" if number.value > 0.0 else text
 
 
@@ -89,7 +89,7 @@ def _samples(samples: Samples, summary: Summary) -> list[tuple[str, str]]:
     if samples.where:
         text += f", at {samples.where}"
     if samples.n_points > 1:
-        text += f", the most of {samples.n_points} points"
+        text += f" (of {samples.n_points} points the one with the largest median)"
     return [("wear", text), *([("input", samples.ranking)] if samples.ranking else [])]
 
 
@@ -118,16 +118,23 @@ def _nothing(wear: NothingWore, summary: Summary) -> str:
 
 
 def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
-    first, last = ("not known" if math.isnan(each.value) else show_known(each, "m") for each in vibration.amplitude)
+    without_error = all(math.isnan(each.error) for each in vibration.amplitude)
+    unknown = "" if without_error else " (error not known)"
+    first, last = (
+        "not known" if math.isnan(each.value) else show_known(each, "m", unknown) for each in vibration.amplitude
+    )
     start, end = vibration.frequency
     worn = isinstance(summary.wear, MostWear)
-    at = " in this case" if worn else f" at {vibration.where}" if vibration.where else ""
+    at = f" at {vibration.where}" if vibration.where else ""
+    if worn:
+        at = " in that sample" if summary.samples else " at the same point" if summary.n_points > 1 else ""
     if vibration.followed:
         known = "" if math.isnan(end.error) else f" +- {end.error:.2g}"
         moved = f"moved from {start:.6g} to {end.value:.6g}{known} Hz" if worn else f"at {start:.6g} Hz"
         return vibration.followed, f"{moved}, response of {vibration.of} {f'{first} to {last}' if worn else first}"
     text = f"{vibration.of}{at}: {first}"
     text += f" when new, {last} when worn" if worn else ""
+    text += " (errors not known)" if without_error else ""
     if math.isfinite(start):
         peak = scale_for("m", vibration.peak).show(vibration.peak)
         text += f"; the new joint responds most at {start:.6g} Hz ({peak})"
@@ -139,17 +146,16 @@ def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
 def _life(life: Life, summary: Summary) -> str:
     units = {"wear_depth": "m", "worn_volume": "m3", "frequency_shift": "Hz"}.get(life.quantity, "1")
     target = f"{life.quantity.replace('_', ' ')} {scale_for(units, life.target).show(life.target)}"
-    beyond = f"{count(life.n_beyond, 'point')} {'does' if life.n_beyond == 1 else 'do'} not reach it"
+    unsure = f"; the life of {count(life.n_unsure, 'point')} is not known" if life.n_unsure else ""
     if math.isnan(life.count.value):
-        unsure = f"the life of {count(life.n_unsure, 'point')} is not known; " if life.n_unsure else ""
-        return f"{unsure}{target} is not reached by {'another' if unsure else 'any'} point computed to the end"
-    known = "error not known"
+        return f"no {'other ' if unsure else ''}point computed to the end reaches {target}{unsure}"
+    known = "(error not known)"
     if math.isfinite(life.count.error):
         known = f"+- {show_percent(life.count.error / life.count.value)}"
     text = f"{_count(round(life.count.value), summary)} {known} to {target}"
-    text += f", the shortest, at {life.where}" if life.where and summary.n_points > 1 else ""
-    text += f"; that of {count(life.n_unsure, 'point')} is not known" if life.n_unsure else ""
-    return text + (f"; {beyond}" if life.n_beyond else "")
+    text += f" at {life.where} (the shortest life)" if life.where and summary.n_points > 1 else ""
+    verb = "does" if life.n_beyond == 1 else "do"
+    return text + unsure + (f"; {count(life.n_beyond, 'point')} {verb} not reach the target" if life.n_beyond else "")
 
 
 def _mode(mode: ModeRange) -> str:
@@ -169,11 +175,7 @@ def _mesh(summary: Summary) -> str:
     assert mesh is not None
     coarse, fine = (show_number(each) for each in mesh.meshes)
     text = f"worn volumes of meshes {coarse} and {fine} differ by {show_percent(mesh.median)} {mesh.at}"
-    text += f", at most {show_percent(mesh.largest)}" if mesh.largest > mesh.median else ""
-    if mesh.limit is not None:
-        volume, order = mesh.limit
-        text += f"; an infinitely fine one would wear {scale_for('m3', volume).show(volume)} (order {order:.1f})"
-    return text
+    return f"{text}, at most {show_percent(mesh.largest)}" if mesh.largest > mesh.median else text
 
 
 def _failure(failure: Failure, n_points: int) -> str:

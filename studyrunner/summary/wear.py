@@ -1,4 +1,4 @@
-"""Where a joint wears most, how much and how deep; why nothing wore; where its resonance went; how long it lives."""
+"""Where a joint wears most, how much and how deep; why nothing wore; its resonance, its life, the effect of meshes."""
 
 from __future__ import annotations
 
@@ -26,85 +26,71 @@ class Number:
 
 @dataclass(frozen=True)
 class Deepest:
-    """The deepest pair of a point. depth: m; its error is that of this pair.
+    """The deepest pair of a point; None and NaN where the file holds no depths of single pairs, or no places."""
 
-    pair: index along `contact`, with surface and position (3,), m, NaN where the file has none; None where the file
-    holds no depths of single pairs. edge_share, edge_area: of the volume and of the area of its surface, what belongs
-    to pairs at the edge of the contact; NaN where not known.
-    """
-
-    depth: Number
-    pair: int | None = None
+    depth: Number  # m, with the error of this pair
+    pair: int | None = None  # index along `contact`
     surface: str = ""
-    position: tuple[float, ...] = (math.nan,) * 3
-    edge_share: float = math.nan
-    edge_area: float = math.nan
+    position: tuple[float, ...] = (math.nan,) * 3  # m
+    edge_share: float = math.nan  # of the volume of its surface, what belongs to pairs at the edge of the contact
+    edge_area: float = math.nan  # the same of the area
 
 
 @dataclass(frozen=True)
 class MostWear:
-    """The point with the largest worn volume.
+    """The point with the largest worn volume, of points that differ in numerical settings only the best known one."""
 
-    Of points that differ in numerical settings only, it is the best known one. point: index along each axis. where:
-    the point in words. n_compared: cases that it is the largest of. n_left_out: cases without a worn volume that is
-    known, which may wear more. count: cycles or missions, inf for the final state. volume: m3. blocks: of missions,
-    share of each block.
-    """
-
-    point: dict[str, int]
-    where: str
-    n_compared: int
-    n_left_out: int
-    count: float
-    volume: Number
+    point: dict[str, int]  # index along each axis
+    where: str  # the point in words
+    n_compared: int  # cases that it is the largest of
+    n_left_out: int  # cases without a known worn volume, which may wear more
+    count: float  # cycles or missions, inf for the final state
+    volume: Number  # m3
     deepest: Deepest
-    blocks: tuple[tuple[str, float], ...] = ()
+    blocks: tuple[tuple[str, float], ...] = ()  # of missions, share of each block
 
 
 @dataclass(frozen=True)
 class NothingWore:
-    """No point that was computed to the end wears.
+    """No point that was computed to the end wears."""
 
-    largest_slip: m, of any pair, 0 where all stick; NaN where the file does not say. where: these points in words, as
-    "212 Hz" or "all 3 frequencies".
-    """
-
-    largest_slip: float
-    where: str
+    largest_slip: float  # m, of any pair, 0 where all stick; NaN where the file does not say
+    where: str  # these points in words, as "212 Hz" or "all 3 frequencies"
 
 
 @dataclass(frozen=True)
 class Vibration:
-    """How the joint responds. of: name of the response. where: the point in words.
+    """How the joint responds at a point; amplitudes are NaN where they are known to a factor of two only."""
 
-    followed: "resonance" or "peak", whose frequency goes from `frequency[0]` to `frequency[1]`, Hz, while the joint
-    wears. Else empty: frequency[0] is where the unworn joint responds most among the frequencies, NaN where none lies
-    between two others; frequency[1] is NaN. amplitude: m, of the unworn and of the worn joint at `where`; NaN where it
-    is known to a factor of two only. peak: m, of the unworn joint at frequency[0].
-    """
-
-    of: str
-    where: str
-    followed: str
+    of: str  # name of the response
+    where: str  # the point in words
+    followed: str  # "resonance" or "peak", whose frequency changes while the joint wears; else empty
+    # Hz, followed: first and last; else where the unworn joint responds most, NaN at the ends of the frequencies
     frequency: tuple[float, Number]
-    amplitude: tuple[Number, Number]
-    peak: float = math.nan
+    amplitude: tuple[Number, Number]  # m, of the unworn and of the worn joint
+    peak: float = math.nan  # m, of the unworn joint at frequency[0]
 
 
 @dataclass(frozen=True)
 class Life:
-    """The shortest life. quantity, target: of slow_time.until. count: NaN where no point reaches the target.
+    """The shortest life."""
 
-    n_beyond: points computed to the end that do not reach it. n_unsure: those whose life is known to a factor of two
-    only.
-    """
-
-    quantity: str
+    quantity: str  # of slow_time.until
     target: float
-    count: Number
+    count: Number  # NaN where no point reaches the target
     where: str
-    n_beyond: int
-    n_unsure: int = 0
+    n_beyond: int  # points computed to the end that do not reach the target
+    n_unsure: int = 0  # points whose life is known to a factor of two only
+
+
+@dataclass(frozen=True)
+class MeshChange:
+    """How far the worn volumes of two meshes are apart, relative."""
+
+    meshes: tuple[float, float]
+    at: str  # "at the resonance", "at equal frequency ratio"
+    median: float
+    largest: float
 
 
 def where_is(result: Result, point: dict[str, int]) -> str:
@@ -121,7 +107,7 @@ def most_wear(result: Result) -> MostWear | NothingWore | None:
     if worn.max() <= NO_VOLUME:
         return _nothing(result, best)
     place = np.unravel_index(int(np.argmax(worn)), worn.shape)
-    point = {name: int(index) for name, index in zip(result.axes, place, strict=True)}
+    point = result.point_at(place)
     volume, at = float(worn[place]), result.last_kept(point)
     return MostWear(
         point,
@@ -255,7 +241,27 @@ def shortest_life(result: Result) -> Life | None:
         return Life(str(quantity), float(target), Number(math.nan), "", beyond, n_unsure)
     place = np.unravel_index(int(np.nanargmin(lives)), lives.shape)
     error = float(errors[place])
-    point = {name: int(index) for name, index in zip(result.axes, place, strict=True)}
+    point = result.point_at(place)
     return Life(
         str(quantity), float(target), Number(float(lives[place]), error), where_is(result, point), beyond, n_unsure
     )
+
+
+def compare_meshes(result: Result) -> MeshChange | None:
+    """How far worn volumes of the two finest meshes are apart, at equal distance to the resonance; else None.
+
+    The resonance moves with the mesh: at one frequency one mesh may wear a multiple of the other.
+    """
+    at = f"at the {result.followed}" if result.followed else ""
+    at = at or ("at equal frequency ratio" if "frequency_ratio" in result.axes else "")
+    if not at or "mesh" not in result.varying or not result.wears or not result.has("worn_volume"):
+        return None
+    meshes = result.dataset["mesh"].values.astype(float)
+    two = np.argsort(meshes)[-2:]
+    volumes = np.where(result.best_known, result.worn, np.nan).take(two, axis=result.axes.index("mesh"))
+    coarse, fine = np.moveaxis(volumes, result.axes.index("mesh"), 0)
+    larger = np.fmax(coarse, fine)
+    apart = np.abs(fine - coarse) / np.where(larger > NO_VOLUME, larger, np.nan)
+    if np.isnan(apart).all():
+        return None
+    return MeshChange((meshes[two[0]], meshes[two[1]]), at, float(np.nanmedian(apart)), float(np.nanmax(apart)))

@@ -8,45 +8,21 @@ By hand: `tempfile` and `os.replace` are used, but neither of them refuses links
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import secrets
-import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-_NOT_PLAIN = (errno.ELOOP, errno.ENXIO, errno.EISDIR)
 _BYTES_OF_TRIAL = 2**22  # a disk is full for a library that writes a part of a result, not for a few bytes
 _NO_SYNC = (errno.EINVAL, errno.ENOTSUP)
-
-
-class NotPlainError(ValueError):
-    """What stands under a name is no plain file, or is larger than any that would be written there."""
 
 
 def create(path: Path) -> IO[bytes]:
     """A new file for writing. Raises FileExistsError where anything has this name, a link to nowhere included."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     return os.fdopen(os.open(path, flags, 0o666), "wb")
-
-
-def open_plain(path: Path, largest: int, flags: int = os.O_RDONLY) -> IO[bytes]:
-    """A file of at most `largest` bytes, open for reading, or as `flags` say. Raises NotPlainError and OSError."""
-    try:
-        # what would wait for a writer, as a FIFO does, must not be waited for
-        descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
-    except OSError as error:
-        if error.errno in _NOT_PLAIN:
-            raise NotPlainError(f"{path.name} is no plain file") from None
-        raise
-    found = os.fstat(descriptor)
-    if not stat.S_ISREG(found.st_mode) or found.st_size > largest:
-        os.close(descriptor)
-        what = "larger than a run writes it" if stat.S_ISREG(found.st_mode) else "no plain file"
-        raise NotPlainError(f"{path.name} is {what}")
-    return os.fdopen(descriptor, "rb" if flags & os.O_ACCMODE == os.O_RDONLY else "rb+")
 
 
 def sync(file: IO[bytes]) -> None:
@@ -89,21 +65,6 @@ def replacing(path: Path) -> Iterator[Path]:
         sync_folder(path.parent)
     finally:
         partial.unlink(missing_ok=True)
-
-
-def has_locks(path: Path) -> bool:
-    """Whether files beside `path` can be locked: not on each file system. Raises OSError where the disk is at fault."""
-    trial = new_partial(path)
-    with create(trial) as file:
-        try:
-            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            if error.errno == errno.EIO:
-                raise
-            return False
-        finally:
-            trial.unlink()
-    return True
 
 
 def find_fault(path: Path) -> OSError | None:

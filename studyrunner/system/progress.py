@@ -24,29 +24,26 @@ LONGEST_SILENCE = 30.0
 _GROWTH = 1.5
 _SECONDS_A_PICTURE = 0.1
 _MOST_NAMED = 3
+_MOST_SHOWN = 0.99  # before every point is done
 
 
 @dataclass(frozen=True)
 class Standing:
     """How far the tasks of a run are.
 
-    n_done, n_points: points. seconds_left: expected. running: what is computed at the moment, longest first.
+    n_done, n_points: points. share: of the work that is done, 0 to 1, parts of points included. seconds_left: expected.
+    running: what is computed at the moment, longest first.
     """
 
     n_done: int
     n_points: int
+    share: float
     seconds_left: float
     running: tuple[str, ...]
 
-    def fraction(self, elapsed: float) -> float:
-        """Fraction of the time that is over after so many seconds; all of it only where every point is done."""
-        if self.n_done == self.n_points:
-            return 1.0
-        return min(elapsed / max(elapsed + self.seconds_left, 1e-9), 0.99)
-
-    def describe(self, fraction: float) -> str:
-        """Points and percent that are done, the time left, and what runs, in one line; fraction: that is over."""
-        parts = [f"{self.n_done} of {count(self.n_points, 'point')}", f"{100.0 * fraction:.0f} %"]
+    def describe(self, share: float) -> str:
+        """Points and percent that are done, the time left, and what runs, in one line; share: that is shown."""
+        parts = [f"{self.n_done} of {count(self.n_points, 'point')}", f"{100.0 * share:.0f} %"]
         if self.n_done < self.n_points:
             parts.append(f"about {format_seconds(self.seconds_left)} left")
         if self.running:
@@ -60,10 +57,10 @@ class ProgressDisplay:
     """What the user sees while a study runs. Only rank 0 has one."""
 
     def __init__(self) -> None:
-        self._began = self._began_tasks = time.monotonic()
+        self._began = time.monotonic()
         self._next_line = FIRST_LINE
         self._next_picture = 0.0
-        self._fraction = 0.0
+        self._share = 0.0
         self._bar = _new_bar() if sys.stderr.isatty() else None
         if self._bar is not None:
             self._bar_task = self._bar.add_task("", total=1.0)
@@ -93,30 +90,26 @@ class ProgressDisplay:
         else:
             self._bar.console.print(happened)
 
-    def begin_tasks(self) -> None:
-        """The tasks begin now: what came before does not count for how far they are."""
-        self._began_tasks = time.monotonic()
-
     def tick(self, look: Callable[[], Standing]) -> None:
         """Called many times a second: shows how far the tasks are where that is due, and only then looks.
 
         On a terminal the bar moves; elsewhere a plain line is printed, often at first, then every half minute.
         """
         elapsed = self.seconds
-        since = time.monotonic() - self._began_tasks
         if self._bar is not None:
             if elapsed >= self._next_picture:
                 self._next_picture = elapsed + _SECONDS_A_PICTURE
-                text = self._describe(look(), since)
-                self._bar.update(self._bar_task, completed=self._fraction, description=text)
+                text = self._describe(look())
+                self._bar.update(self._bar_task, completed=self._share, description=text)
         elif elapsed >= self._next_line:
             self._next_line = elapsed + min(max(FIRST_LINE, (_GROWTH - 1.0) * elapsed), LONGEST_SILENCE)
-            print(f"{self._clock()} {self._describe(look(), since)}", file=sys.stderr, flush=True)
+            print(f"{self._clock()} {self._describe(look())}", file=sys.stderr, flush=True)
 
-    def _describe(self, standing: Standing, since: float) -> str:
-        """The line that is shown. What is over never falls, be it that more is left than was expected before."""
-        self._fraction = max(self._fraction, standing.fraction(since))
-        return standing.describe(self._fraction)
+    def _describe(self, standing: Standing) -> str:
+        """The line that is shown. What is done never falls, be it that more is left than was expected before."""
+        done = standing.n_done == standing.n_points
+        self._share = 1.0 if done else max(self._share, min(standing.share, _MOST_SHOWN))
+        return standing.describe(self._share)
 
     @property
     def seconds(self) -> float:

@@ -21,7 +21,7 @@ and 0.02. The same holds for 0.155 and 0.163 mm3 at 212.25 Hz.
 
 import argparse
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -109,13 +109,13 @@ def dovetail_starts(
     model: ReducedModel, frequencies: tuple[float, ...], settings: SolverSettings, change: float | None = None
 ) -> list[StartState]:
     """Start states. change: of the vibration in a step of the sweep; None for the one that follows rtol."""
-    before = path.LOADING
+    before = path.CHANGE_LIMITS
     if change is not None:
-        path.LOADING = replace(before, change_limits=(change, change))
+        path.CHANGE_LIMITS = (change, change)
     try:
         found = dict(follow_branch(model, 0.5, 0.5, np.array(frequencies), "up", settings))
     finally:
-        path.LOADING = before
+        path.CHANGE_LIMITS = before
     return [found[place] for place in range(len(frequencies))]
 
 

@@ -2,12 +2,9 @@
 
     python -m tests.benchmarks.fuzz_files [COUNT [SEED [FIRST [KIND ...]]]]
 
-The kinds: `scene` the scene file of a study under `run-study --plan`, `result` a result file there, `deck` a deck under
-`run-study --check`, `report` a result under `study-report`, `reader` one that is opened and asked whatever the accessor
-answers. Bytes are changed, and in the last two also whole attributes, values, types and dimensions. An
-input is known by its seed, its number and the kinds: COUNT 1 with its number for FIRST has it again. Prints what is
-wrong; status 1 where anything is. Random bytes in an HDF5 file may crash the library, which nothing here prevents:
-these are counted apart.
+The kinds are those of `tests.studyrunner.fuzzing`. An input is known by its seed, its number and the kinds: COUNT 1
+with its number for FIRST has it again. Prints what is wrong; status 1 where anything is. Random bytes in an HDF5 file
+may crash the library, which nothing here prevents: these are counted apart.
 """
 
 import sys
@@ -20,7 +17,6 @@ from pathlib import Path
 from tests.studyrunner.fuzzing import FILES, answers, write_whole_files
 
 PART = 100  # inputs of a process
-CRASHES = ("SIGSEGV", "SIGBUS", "SIGABRT", "SIGFPE")
 
 
 def main() -> int:
@@ -28,9 +24,11 @@ def main() -> int:
     kinds = tuple(sys.argv[4:]) or tuple(FILES)
     parts = [range(first, min(first + PART, begin + count)) for first in range(begin, begin + count, PART)]
     with tempfile.TemporaryDirectory() as name, ThreadPoolExecutor(2) as pool:
-        write_whole_files(Path(name))
-        found = list(chain.from_iterable(pool.map(lambda part: answers(Path(name), seed, part, kinds), parts)))
-    crashed = [answer.wrong for answer in found if answer.ended.endswith(CRASHES)]
+        whole = Path(name, "whole")
+        whole.mkdir()
+        write_whole_files(whole)
+        found = list(chain.from_iterable(pool.map(lambda part: answers(whole, seed, part, kinds), parts)))
+    crashed = [answer.wrong for answer in found if answer.ended.startswith("ended -")]
     wrong = [answer.wrong for answer in found if answer.wrong and answer.wrong not in crashed]
     print(*wrong, *crashed, *sorted(Counter(answer.ended for answer in found).items()), sep="\n")
     print(f"{len(wrong)} of {count} inputs are not answered as they should be, and {len(crashed)} crash a library")

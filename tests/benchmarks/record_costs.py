@@ -3,7 +3,7 @@
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.record_costs > tests/benchmarks/dovetail_costs.csv
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.record_costs samples > tests/benchmarks/scatter_costs.csv
 
-`dovetail`: a branch along 100 frequencies, and two marches from every fourth of them. A line of the table: frequency
+`dovetail`: a sweep along 100 frequencies, and two histories from every fourth of them. A line of the table: frequency
 (Hz), wear coefficient (1/Pa; 0 for the start state), CPU seconds, unknowns of the start state with the harmonics that
 it took, and whether anything moves there. `scatter`: a line for each sample, with the CPU seconds of its start state
 and of its history. A few minutes on one core each.
@@ -12,15 +12,12 @@ and of its history. A few minutes on one core each.
 import sys
 import time
 
-from studyrunner.evaluate import build_evaluator
-from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.results import StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.task import StartResult, Task
 from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
-from studyrunner.task_progress import start_marches
 
 STUDY = (
     "axes.frequency={start = 209.5, stop = 213.5, num = 100}",
@@ -35,21 +32,21 @@ def record_line() -> None:
     study = read_study("dovetail", STUDY)
     model = build_study_scene(study)
     plan = build_tasks(study, describe_scene(model).n_displacements)
-    evaluate = build_evaluator(model)
-    next(iter(evaluate(plan.branches[0], _forget)))  # compiles
+    models = {0: model}
+    next(iter(plan.sweeps[0].compute(models, _forget)))  # compiles
     print("frequency,wear_coefficient,seconds,n_unknowns,moves")
-    (branch,) = plan.branches
+    (sweep,) = plan.sweeps
     began = time.thread_time()
-    for started in evaluate(branch, _forget):
+    for started in sweep.compute(models, _forget):
         spent = time.thread_time() - began
         assert isinstance(started, StartResult)
-        place, kind = f"{branch.frequencies[started.position]:.4f}", f"{started.n_unknowns},{int(started.moves)}"
+        place, kind = f"{sweep.frequencies[started.place]:.4f}", f"{started.n_unknowns},{int(started.moves)}"
         print(f"{place},0,{spent:.4f},{kind}")
-        planned = plan.marches_from(0, started.position) if started.position % EVERY == 0 else ()
-        for march in start_marches(planned, started):
+        for planned in plan.waiting[0, started.place] if started.place % EVERY == 0 else ():
+            history = planned.from_start(started)
             began = time.thread_time()
-            list(evaluate(march, _forget))
-            print(f"{place},{march.wear_coefficient:g},{time.thread_time() - began:.4f},{kind}")
+            list(history.compute(models, _forget))
+            print(f"{place},{history.wear_coefficient:g},{time.thread_time() - began:.4f},{kind}")
         sys.stdout.flush()
         began = time.thread_time()
 
@@ -60,20 +57,20 @@ def record_samples() -> None:
     model, scenes = build_study_scene(study), find_scenes(study)
     facts = describe_scene(model)
     plan = build_tasks(study, facts.n_displacements, contact_changes(study, scenes, [facts]), scenes)
-    evaluate = build_evaluator(model)
-    next(iter(evaluate(plan.branches[0], _forget)))  # compiles
+    models = {0: model}
+    next(iter(plan.sweeps[0].compute(models, _forget)))  # compiles
 
-    def timed(task: BranchTask | MarchTask) -> tuple[object, float]:
+    def timed(task: Task) -> tuple[object, float]:
         began = time.thread_time()
-        (result,) = evaluate(task, _forget)
+        (result,) = task.compute(models, _forget)
         return result, time.thread_time() - began
 
     print("start_seconds,n_unknowns,moves,seconds")
-    for branch in plan.branches:
-        started, spent = timed(branch)
+    for sweep in plan.sweeps:
+        started, spent = timed(sweep)
         assert isinstance(started, StartResult)
-        (march,) = start_marches(plan.marches_from(branch.number, 0), started)
-        _, seconds = timed(march)
+        (planned,) = plan.waiting[sweep.number, 0]
+        _, seconds = timed(planned.from_start(started))
         print(f"{spent:.3f},{started.n_unknowns},{int(started.moves)},{seconds:.3f}", flush=True)
 
 

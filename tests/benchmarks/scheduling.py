@@ -5,8 +5,8 @@
 The costs are those of the bundled dovetail sector in `dovetail_costs.csv`, see `record_costs`. Every line of a study
 gets the recorded one, shifted along the frequency and scaled by a factor, and every task a factor of its own; all are
 drawn once and do not depend on the number of ranks. `known` is the efficiency where all costs are known before, with
-the longest way first. `possible` is the efficiency that no order of the tasks exceeds: the longest way along a branch
-and through a march from it bounds the time of a run.
+the longest way first. `possible` is the efficiency that no order of the tasks exceeds: the longest way along a sweep
+and through a history from it bounds the time of a run.
 
 4096 samples on 256 ranks are 0.965 busy. On 1024 ranks each has four samples, 8 tasks of about 3 to 6 s: 0.87, where
 known costs give 0.95, and the ranks end half a task apart on average. What a history takes follows from its start state
@@ -22,9 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
-from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.results import StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.task import StartResult, TaskPlan
+from studyrunner.kinds.wear import History, Sweep
 from studyrunner.study.study_file import read_study
 from tests.benchmarks.simulation import Overheads, Replay, lognormal, replay
 
@@ -38,7 +38,7 @@ LEAST_WEAR = 3e-12  # recorded: this and ten times as much
 
 @dataclass(frozen=True)
 class Shape:
-    """Sizes of the axes of a study of 10 000 points and the steps of a march."""
+    """Sizes of the axes of a study of 10 000 points and the steps of a history."""
 
     n_frequencies: int
     n_amplitudes: int
@@ -78,7 +78,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Samples:
-    """Sizes of a study with samples: each has a sweep of its own, and one march from the state that it leads to."""
+    """Sizes of a study with samples: each has a sweep of its own, and one history from the state that it leads to."""
 
     n_samples: int
 
@@ -105,7 +105,7 @@ SHAPES: dict[str, Shape | Samples] = {
     "samples": Samples(4096),
 }
 """usual: the range of the bundled study, most of which rests. focus: where the joint slips. band: a resonance only,
-little wear, no march ten times as long as others. steps: as band, uneven by the step axis, which the plan knows."""
+little wear, no history ten times as long as others. steps: as band, uneven by the step axis, which the plan knows."""
 
 
 class RecordedCosts:
@@ -128,38 +128,36 @@ class RecordedCosts:
         self._marches = marches
         self._n_steps = n_steps
         self._rng = np.random.default_rng(0)
-        self._shifts = self._rng.uniform(-SHIFT, SHIFT, len(plan.branches))
-        self._factors = [lognormal(self._rng, SPREAD_LINE) for _ in plan.branches]
-        self._start_factors = np.exp(SPREAD_TASK * self._rng.standard_normal((len(plan.branches), 10_000)))
-        n_marches = sum(len(line) for line in plan.marches)
-        self._march_factors = np.exp(SPREAD_TASK * self._rng.standard_normal(n_marches))
-        self._frequencies = plan.branches[0].frequencies
+        self._shifts = self._rng.uniform(-SHIFT, SHIFT, len(plan.sweeps))
+        self._factors = [lognormal(self._rng, SPREAD_LINE) for _ in plan.sweeps]
+        self._start_factors = np.exp(SPREAD_TASK * self._rng.standard_normal((len(plan.sweeps), 10_000)))
+        self._history_factors = np.exp(SPREAD_TASK * self._rng.standard_normal(len(plan.results)))
         self._recorded = [float(row["frequency"]) for row in starts]
 
-    def start(self, branch: BranchTask, position: int) -> tuple[StartResult, float]:
+    def start(self, sweep: Sweep, place: int) -> tuple[StartResult, float]:
         """A start state and its cost, s."""
-        place = self._place(branch.number, branch.frequencies[position])
-        seconds = self._starts[place]
-        if position == (0 if branch.sweep == "up" else branch.n_results - 1):
+        recorded = self._place(sweep.number, sweep.frequencies[place])
+        seconds = self._starts[recorded]
+        if place == sweep.order[0]:
             seconds += self._lead_in
-        seconds *= self._factors[branch.number] * self._start_factors[branch.number, position]
-        return StartResult(position, None, self._moves[place], self._unknowns[place]), seconds
+        seconds *= self._factors[sweep.number] * self._start_factors[sweep.number, place]
+        return StartResult(place, None, self._moves[recorded], self._unknowns[recorded]), seconds
 
-    def march(self, task: MarchTask) -> float:
-        """Cost of a march, s."""
-        place = self._place(task.branch, self._frequencies[task.position])
+    def history(self, task: History) -> float:
+        """Cost of a history, s."""
+        place = self._place(task.sweep, task.frequency)
         recorded = min(self._marches, key=lambda other: (self._moves[other] != self._moves[place], abs(other - place)))
         # Between the two wear coefficients that were recorded, and beyond, as a power of it.
         least, most = self._marches[recorded]
         seconds = least * (most / least) ** np.log10(task.wear_coefficient / LEAST_WEAR)
         if self._moves[place]:
             seconds *= self._n_steps * (1000.0 / task.step) / RECORDED_STEPS
-        return float(seconds) * self._factors[task.branch] * float(self._march_factors[task.number])
+        return float(seconds) * self._factors[task.sweep] * float(self._history_factors[task.number])
 
-    def _place(self, branch: int, frequency: float) -> int:
+    def _place(self, sweep: int, frequency: float) -> int:
         """Recorded frequency that stands for one of a line."""
         recorded = self._recorded
-        share = (frequency + self._shifts[branch] - recorded[0]) / (recorded[-1] - recorded[0])
+        share = (frequency + self._shifts[sweep] - recorded[0]) / (recorded[-1] - recorded[0])
         return int(np.clip(round(share * (len(recorded) - 1)), 0, len(recorded) - 1))
 
 
@@ -170,25 +168,25 @@ class CostsOfSamples:
         with Path(__file__).with_name("scatter_costs.csv").open(encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
         rng = np.random.default_rng(0)
-        self._rows = [rows[number] for number in rng.integers(len(rows), size=len(plan.branches))]
-        self._factors = np.exp(SPREAD_TASK * rng.standard_normal((len(plan.branches), 2)))
+        self._rows = [rows[number] for number in rng.integers(len(rows), size=len(plan.sweeps))]
+        self._factors = np.exp(SPREAD_TASK * rng.standard_normal((len(plan.sweeps), 2)))
 
-    def start(self, branch: BranchTask, position: int) -> tuple[StartResult, float]:
+    def start(self, sweep: Sweep, place: int) -> tuple[StartResult, float]:
         """A start state and its cost, s."""
-        row = self._rows[branch.number]
-        seconds = float(row["start_seconds"]) * float(self._factors[branch.number, 0])
-        return StartResult(position, None, row["moves"] == "1", int(row["n_unknowns"])), seconds
+        row = self._rows[sweep.number]
+        seconds = float(row["start_seconds"]) * float(self._factors[sweep.number, 0])
+        return StartResult(place, None, row["moves"] == "1", int(row["n_unknowns"])), seconds
 
-    def march(self, task: MarchTask) -> float:
-        """Cost of a march, s."""
-        return float(self._rows[task.branch]["seconds"]) * float(self._factors[task.branch, 1])
+    def history(self, task: History) -> float:
+        """Cost of a history, s."""
+        return float(self._rows[task.sweep]["seconds"]) * float(self._factors[task.sweep, 1])
 
 
 def replay_shape(shape: Shape | Samples, n_ranks: int, overheads: Overheads, *, known: bool = False) -> Replay:
     """A study of this shape on so many ranks. known: as in `replay`."""
     plan = shape.build_plan()
     costs = CostsOfSamples(plan) if isinstance(shape, Samples) else RecordedCosts(plan, shape.n_steps)
-    return replay(plan, costs.start, costs.march, n_ranks, overheads, known=known)
+    return replay(plan, costs.start, costs.history, n_ranks, overheads, known=known)
 
 
 def main() -> None:

@@ -1,23 +1,21 @@
 """Ranks with a simulated clock that work on the tasks of a study under the real scheduling code.
 
 Only the computing and the messages are simulated. Which rank gets which task, what is learnt of costs and which tasks a
-result makes possible is decided by `studyrunner.mpi.dispatch`, `plan.cost_model` and `task_progress`.
+result makes possible is decided by `studyrunner.mpi.dispatch`, `cost_model` and `task_progress`.
 """
 
 import heapq
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskPlan
+from studyrunner.kinds.wear import History, Sweep
+from studyrunner.mpi.cost_model import CostKeys, CostModel, Measurement
 from studyrunner.mpi.dispatch import Assignment, Dispatcher
-from studyrunner.plan.cost_model import CostKeys, CostModel, Measurement
-from studyrunner.plan.results import MarchResult, StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
 from studyrunner.task_progress import TaskProgress
-
-Task = BranchTask | MarchTask
 
 
 @dataclass(frozen=True)
@@ -36,45 +34,39 @@ class MemoryIndex:
     n_points_finished = 0
 
     def __init__(self, plan: TaskPlan) -> None:
-        self.plan = plan
-        self.starts: list[tuple[BranchTask, StartResult]] = []
-        self.histories: list[tuple[MarchTask, MarchResult]] = []
+        # keys as in a file
+        self.plan = replace(
+            plan,
+            sweeps=tuple(replace(task, key=f"sweep {task.number}") for task in plan.sweeps),
+            results=tuple(replace(task, key=str(task.number)) for task in plan.results),
+        )
 
-    def branches_left(self) -> list[BranchTask]:
+    def sweeps_left(self) -> list[Task]:
         """All of them."""
-        return list(self.plan.branches)
+        return list(self.plan.sweeps)
 
-    def is_finished(self, march: MarchTask) -> bool:
+    def is_finished(self, task: Task) -> bool:
         """None is."""
-        del march
+        del task
         return False
 
-    def is_suspect(self, key: str) -> bool:
-        """None is."""
-        del key
-        return False
+    is_suspect = is_finished
 
-    def known_starts(self, branch: BranchTask) -> list[StartResult]:
+    def known_starts(self) -> list[tuple[Task, StartResult]]:
         """None is known."""
-        del branch
         return []
 
-    def marches_from(self, branch: int, position: int) -> tuple[MarchTask, ...]:
+    def waiting_for(self, start: tuple[int, int] | None) -> Sequence[Task]:
         """All of them."""
-        return self.plan.marches_from(branch, position)
+        return () if start is None else self.plan.waiting.get(start, ())
 
-    def add_start(self, branch: BranchTask, result: StartResult) -> None:
-        """Takes note of it."""
-        self.starts.append((branch, result))
-
-    def add_history(self, march: MarchTask, result: MarchResult) -> None:
-        """Takes note of it."""
-        self.histories.append((march, result))
+    def add(self, task: Task, result: Result) -> None:
+        """It is not kept."""
 
 
 @dataclass(frozen=True)
 class Replay:
-    """How a replay went. work: sum of all costs, s. longest_way: s, of a start state along its branch and a march from
+    """How a replay went. work: sum of all costs, s. longest_way: s, of a start state along its sweep and a history from
     it, which no number of ranks shortens. n_unfinished: 0 unless there is a bug."""
 
     n_ranks: int
@@ -108,8 +100,8 @@ class KnownCosts(CostModel):
 
 def replay(
     plan: TaskPlan,
-    started: Callable[[BranchTask, int], tuple[StartResult, float]],
-    march_seconds: Callable[[MarchTask], float],
+    started: Callable[[Sweep, int], tuple[StartResult, float]],
+    history_seconds: Callable[[History], float],
     n_ranks: int,
     overheads: Overheads,
     *,
@@ -117,24 +109,25 @@ def replay(
 ) -> Replay:
     """Runs the tasks of a plan on simulated ranks. The same arguments give the same replay.
 
-    started: start state of a branch at a position and its cost, s. march_seconds: cost of a march, s. known: the costs
-    are known before: branches with the longest way to the end of a history go first, then the longest histories.
+    started: start state of a sweep at a place and its cost, s. history_seconds: cost of a history, s. known: the costs
+    are known before: sweeps with the longest way to the end of a history go first, then the longest histories.
     """
     clock = 0.0
-    progress = TaskProgress(MemoryIndex(plan))
+    index = MemoryIndex(plan)
+    plan, progress = index.plan, TaskProgress(index)  # type: ignore[arg-type]
     dispatcher: Dispatcher[Task] = Dispatcher(n_ranks, KnownCosts() if known else progress.costs, lambda: clock)
 
     def foreseen(tasks: Iterable[Task]) -> list[Task]:
         return [replace(task, cost=_longest_way(task)) for task in tasks] if known else list(tasks)
 
     def _longest_way(task: Task) -> float:
-        if isinstance(task, MarchTask):
-            return march_seconds(task)
-        first = sum(started(task, position)[1] for position in task.order)
-        return first + max((march_seconds(march) for march in plan.marches[task.number]), default=0.0)
+        if isinstance(task, History):
+            return history_seconds(task)
+        first = sum(started(task, place)[1] for place in task.order)
+        return first + max((history_seconds(each) for each in plan.results if each.sweep == task.number), default=0.0)
 
     ticket = itertools.count()
-    arrivals: list[tuple[float, int, int, int, float, StartResult | MarchResult]] = []
+    arrivals: list[tuple[float, int, int, int, float, Result]] = []
     queues: list[list[tuple[float, Assignment[Task]]]] = [[] for _ in range(n_ranks)]
     free_at = [0.0] * n_ranks
     computing = [False] * n_ranks
@@ -147,17 +140,17 @@ def replay(
         computing[rank] = True
         task = assignment.task
         now = max(sent + overheads.latency, free_at[rank])
-        results: list[tuple[StartResult | MarchResult, float]] = []
-        if isinstance(task, BranchTask):
+        results: list[tuple[Result, float]] = []
+        if isinstance(task, Sweep):
             way = 0.0
-            for position in task.order:
-                start, seconds = started(task, position)
+            for place in task.order:
+                start, seconds = started(task, place)
                 way += seconds
-                ways[task.number, position] = way
+                ways[task.number, place] = way
                 results.append((start, seconds))
         else:
-            seconds = march_seconds(task)
-            longest_way = max(longest_way, ways[task.branch, task.position] + seconds)
+            seconds = history_seconds(task)
+            longest_way = max(longest_way, ways[task.sweep, task.position] + seconds)
             results.append((_history(task), seconds))
         for result, seconds in results:
             now += seconds
@@ -175,7 +168,7 @@ def replay(
             if not computing[rank]:
                 begin(rank)
 
-    dispatcher.add(foreseen(plan.branches))
+    dispatcher.add(foreseen(plan.sweeps))
     hand_out()
     left: dict[int, int] = {}
     while arrivals:
@@ -196,8 +189,8 @@ def replay(
     return Replay(n_ranks, work, last_end, longest_way, plan.n_points - progress.n_points)
 
 
-def _history(task: MarchTask) -> MarchResult:
-    return MarchResult(task.points, {"outcome": 0})
+def _history(task: History) -> PointResult:
+    return PointResult(task.points(0), {"outcome": 0})
 
 
 def lognormal(rng: np.random.Generator, spread: float) -> float:

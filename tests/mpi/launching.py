@@ -130,16 +130,8 @@ class Running:
 
     def ranks(self) -> dict[int, int]:
         """The processes that compute, by their number: run-study alone, or those that the launcher has given one."""
-        found = {}
-        processes = self.processes()
-        for pid, variables in processes.items():
-            number = variables.get(b"PMI_RANK", variables.get(b"OMPI_COMM_WORLD_RANK"))
-            if number is not None and _same_rank(variables, processes.get(_parent(pid), {})):
-                # what a rank itself has started
-                continue
-            if number is not None:
-                found[int(number)] = pid
-        return found or {0: self.process.pid}
+        numbers = {pid: variables.get(b"PMI_RANK") for pid, variables in self.processes().items()}
+        return {int(number): pid for pid, number in numbers.items() if number is not None} or {0: self.process.pid}
 
 
 def run_to_end(
@@ -153,16 +145,7 @@ def run_to_end(
 
     Fails where a process outlives the run.
     """
-    return watch_to_end([*launcher(n_ranks), sys.executable, *arguments], folder, environment, disturb)
-
-
-def watch_to_end(
-    command: Sequence[str],
-    folder: Path,
-    environment: dict[str, str] | None = None,
-    disturb: Callable[[Running], object] = lambda _: None,
-) -> Ended:
-    """As run_to_end, with any launcher."""
+    command = [*launcher(n_ranks), sys.executable, *arguments]
     mark = uuid.uuid4().hex
     with (
         tempfile.TemporaryFile() as stderr,
@@ -199,11 +182,11 @@ def run_here(arguments: Sequence[str], folder: Path) -> xr.Dataset:
 
 def fake_here(arguments: Sequence[str], folder: Path, environment: dict[str, str] | None = None) -> int:
     """Exit status of a run with the stand-in for the solver, in this process. arguments: FAKED first, as elsewhere."""
-    from tests.mpi.run_faked import build_fake
+    from tests.mpi.run_faked import compute_fake
 
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setattr(task_runs, "build_evaluator", build_fake)
+        patch.setattr(task_runs, "compute_task", compute_fake)
         for name, value in (environment or {}).items():
             patch.setenv(name, value)
         return main(arguments[1:])
@@ -221,31 +204,6 @@ def _environment(process: Path) -> list[bytes]:
         return (process / "environ").read_bytes().split(b"\0")
     except OSError:
         return []
-
-
-def _parent(pid: int) -> int:
-    """0 for a process that has ended."""
-    try:
-        return int(Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()[1])
-    except OSError:
-        return 0
-
-
-def _same_rank(one: dict[bytes, bytes], other: dict[bytes, bytes]) -> bool:
-    return any(name in one and one[name] == other.get(name) for name in (b"PMI_RANK", b"OMPI_COMM_WORLD_RANK"))
-
-
-def memory_of_mapping(name: str) -> dict[str, int]:
-    """What this process has of a mapped file: all of it, and what it has copied for itself, kB."""
-    found = {"Rss": 0, "Anonymous": 0}
-    inside = False
-    for line in Path("/proc/self/smaps").read_text(encoding="utf-8", errors="replace").splitlines():
-        head, *rest = line.split()
-        if not head.endswith(":"):
-            inside = name in line
-        elif inside and head[:-1] in found:
-            found[head[:-1]] += int(rest[0])
-    return found
 
 
 def count_entries(kind: str, result: Path = Path("out.nc")) -> int:

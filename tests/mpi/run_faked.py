@@ -1,18 +1,16 @@
 """run-study with a stand-in for the solver, to be started by the tests under mpiexec.
 
-FAKE_SECONDS: longest time of a march; each rank then notes those that it took in a file.
-FAKE_FAILURE: rank whose first march gives more results than it should: a bug, which raises. The marches of the
+FAKE_SECONDS: longest time of a history; each rank then notes those that it took in a file.
+FAKE_FAILURE: rank whose first history gives more results than it should: a bug, which raises. The histories of the
 others wait for that.
-FAKE_TOGETHER: no march goes on before as many ranks have had one.
-FAKE_STEPS: every march takes as many steps of FAKE_SECONDS each and says after each how far it is; every start state
+FAKE_STEPS: every history takes as many steps of FAKE_SECONDS each and says after each how far it is; every start state
 takes two. Each step is noted in a file, what was gone on from in another one, and what was done when in a third.
-FAKE_HOLDS: each step of a march keeps the interpreter from all other threads in so many calls, as of C, of a second.
 FAKE_PROGRESS: a task says so often how far it is, s; 0.03 where it is not given.
-FAKE_CRASH: what each march at the second frequency does instead: "segfault" or "abort"; so does each branch on its way
-to the fourth one where "in branch" stands behind.
+FAKE_CRASH: what each history at the second frequency does instead: "segfault" or "abort"; so does each sweep on its way
+to the fourth one where "in sweep" stands behind.
 FAKE_NOTHING: tasks take no time at all; in the end rank 0 says how much memory and time it has taken.
 FAKE_TELLING: seconds between two lines that say how far the run is.
-FAKE_PATIENCE: each branch stops after its first start state until a march from it is done; after this time it raises.
+FAKE_PATIENCE: each sweep stops after its first start state until a history from it is done; after this time it raises.
 """
 
 import ctypes
@@ -20,7 +18,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,14 +29,14 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from solver.packing import Packed
 from studyrunner import task_runs
 from studyrunner.cli import main
+from studyrunner.kinds.task import Keep, PointResult, Result, Task
+from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi import schedule
-from studyrunner.mpi.launcher import launcher_rank
-from studyrunner.plan.results import Keep, MarchResult, StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask
-from studyrunner.scene.scene import describe_scene
+from studyrunner.mpi.ranks import launcher_rank
+from studyrunner.scene.scene import SceneFacts, describe_scene
 from studyrunner.system import progress
 from tests.mpi.losses import DONE
-from tests.studyrunner.fakes import changed, fake_branch, fake_evaluate
+from tests.studyrunner.fakes import changed, fake_evaluate, fake_sweep
 
 BULK = np.random.default_rng(0).random(0 if "FAKE_NOTHING" in os.environ else 100_000)
 """Goes with every start state: larger than what MPI sends off at once, and not smaller when it is compressed."""
@@ -47,65 +45,83 @@ PATIENCE = 200.0
 """Seconds: less than the tests have."""
 
 
-def build_fake(model: object, *_: object) -> Callable[..., Iterator[StartResult | MarchResult]]:
-    facts = describe_scene(model)
+def compute_fake(task: Task, models: Mapping[int, object], keep: Keep) -> Iterator[Result]:
+    """Stands for `task_runs.compute_task`."""
+    facts = facts_of(models[task.scenes[0]])
     seconds = float(os.environ.get("FAKE_SECONDS", "0.0" if "FAKE_NOTHING" in os.environ else "0.002"))
-    failing = int(os.environ.get("FAKE_FAILURE", "-1"))
     n_steps = int(os.environ.get("FAKE_STEPS", "0"))
-    crash, _, in_branch = os.environ.get("FAKE_CRASH", "").partition(" ")
+    if isinstance(task, Sweep):
+        yield from compute_sweep(task, n_steps, seconds, keep)
+    else:
+        assert isinstance(task, History)
+        yield from compute_history(task, facts, n_steps, seconds, keep)
 
-    def evaluate(task: BranchTask | MarchTask, keep: Keep) -> Iterator[StartResult | MarchResult]:
-        if isinstance(task, BranchTask):
-            left = [position for position in task.order if position not in task.known]
-            for place, started in enumerate(fake_branch(replace(task, known=frozenset()))):
-                if not left:
-                    return
-                if in_branch and started.position == 3:
-                    # what was given before is on the disk by then
-                    time.sleep(1.0)
-                    end_process(crash)
-                if place < gone_on_from(task):
-                    continue
-                if n_steps:
-                    time.sleep(2.0 * seconds)
-                    note_step(task, place)
-                if started.position in left:
-                    left.remove(started.position)
-                    if n_steps:
-                        note_done("result", task, started.position)
-                    yield replace(started, start=replace(started.start, arrays=(*started.start.arrays, BULK)))
-                if n_steps:
-                    keep(Packed("branch", (np.array([place + 1.0]),)))
-                if "FAKE_PATIENCE" in os.environ:
-                    wait_until(Path(f"branch{task.number}.txt").exists, float(os.environ["FAKE_PATIENCE"]))
-        else:
-            yield from march(task, keep)
 
-    def march(task: MarchTask, keep: Keep) -> Iterator[MarchResult]:
-        if crash and not in_branch and task.position == 1:
-            end_process(crash)
-        if launcher_rank() == failing:
-            # not the task, but what is around it
-            yield from fake_evaluate(task, facts=facts)
-        elif failing >= 0:
-            time.sleep(PATIENCE)
-        if "FAKE_TOGETHER" in os.environ:
-            meet(int(os.environ["FAKE_TOGETHER"]))
-        carried = walk(task, n_steps, seconds, keep) if n_steps else 0.0
-        for result in fake_evaluate(task, facts=facts, seconds=0.0 if n_steps else seconds):
-            assert isinstance(result, MarchResult)
-            if "FAKE_SECONDS" in os.environ and not n_steps:
-                for name in (f"rank{launcher_rank()}.txt", f"branch{task.branch}.txt"):
-                    with Path(name).open("a", encoding="utf-8") as file:
-                        file.write(f"{result.values['run_time']}\n")
+FACTS: dict[int, tuple[object, SceneFacts]] = {}
+
+
+def facts_of(model: object) -> SceneFacts:
+    """Facts of a model, found once."""
+    if id(model) not in FACTS:
+        FACTS[id(model)] = model, describe_scene(model)
+    return FACTS[id(model)][1]
+
+
+def crash_in(kind: str) -> str:
+    """How tasks of a kind are to crash; empty for not at all."""
+    crash, _, in_sweep = os.environ.get("FAKE_CRASH", "").partition(" ")
+    return crash if (kind == "sweep") == bool(in_sweep) else ""
+
+
+def compute_sweep(task: Sweep, n_steps: int, seconds: float, keep: Keep) -> Iterator[Result]:
+    left = list(task.places)
+    for number, started in enumerate(fake_sweep(replace(task, known=frozenset()))):
+        if not left:
+            return
+        if crash_in("sweep") and started.place == 3:
+            # what was given before is on the disk by then
+            time.sleep(2.0)
+            end_process(crash_in("sweep"))
+        if number < gone_on_from(task):
+            continue
+        if n_steps:
+            time.sleep(2.0 * seconds)
+            note_step(task, number)
+        if started.place in left:
+            left.remove(started.place)
             if n_steps:
-                note_done("result", task, result.place)
-            yield changed(result, error_estimate=carried)
+                note_done("result", task, started.place)
+            yield replace(started, start=replace(started.start, arrays=(*started.start.arrays, BULK)))
+        if n_steps:
+            keep(Packed("sweep", (np.array([number + 1.0]),)))
+        if "FAKE_PATIENCE" in os.environ:
+            wait_until(Path(f"sweep{task.number}.txt").exists, float(os.environ["FAKE_PATIENCE"]))
 
-    return evaluate
+
+def compute_history(
+    task: History, facts: SceneFacts, n_steps: int, seconds: float, keep: Keep
+) -> Iterator[PointResult]:
+    failing = int(os.environ.get("FAKE_FAILURE", "-1"))
+    if crash_in("history") and task.position == 1:
+        end_process(crash_in("history"))
+    if launcher_rank() == failing:
+        # not the task, but what is around it
+        yield from fake_evaluate(task, facts=facts)
+    elif failing >= 0:
+        time.sleep(PATIENCE)
+    carried = walk(task, n_steps, seconds, keep) if n_steps else 0.0
+    for result in fake_evaluate(task, facts=facts, seconds=0.0 if n_steps else seconds):
+        assert isinstance(result, PointResult)
+        if "FAKE_SECONDS" in os.environ and not n_steps:
+            for name in (f"rank{launcher_rank()}.txt", f"sweep{task.sweep}.txt"):
+                with Path(name).open("a", encoding="utf-8") as file:
+                    file.write(f"{result.values['run_time']}\n")
+        if n_steps:
+            note_done("result", task, result.place)
+        yield changed(result, error_estimate=carried)
 
 
-def gone_on_from(task: BranchTask | MarchTask) -> int:
+def gone_on_from(task: Task) -> int:
     """Step that an earlier run has come to."""
     if task.resume is None:
         return 0
@@ -114,42 +130,29 @@ def gone_on_from(task: BranchTask | MarchTask) -> int:
     return int(task.resume.arrays[0][0])
 
 
-def walk(task: MarchTask, n_steps: int, seconds: float, keep: Keep) -> float:
+def walk(task: History, n_steps: int, seconds: float, keep: Keep) -> float:
     """A number that depends on every bit of what is carried from step to step."""
     first = gone_on_from(task)
     carried = 0.1 + 0.01 * (task.number % 50) if task.resume is None else float(task.resume.arrays[0][1])
     for step in range(first, n_steps):
         carried = 3.99 * carried * (1.0 - carried)
-        compute(seconds)
+        time.sleep(seconds)
         note_step(task, step)
-        keep(Packed("march", (np.array([step + 1.0, carried]),)))
+        keep(Packed("history", (np.array([step + 1.0, carried]),)))
     return carried
 
 
-def compute(seconds: float) -> None:
-    """Takes so long."""
-    time.sleep(seconds)
-    for _ in range(int(os.environ.get("FAKE_HOLDS", "0"))):
-        ctypes.PyDLL(None).usleep(1_000_000)
-
-
-def note_step(task: BranchTask | MarchTask, number: int) -> None:
+def note_step(task: Task, number: int) -> None:
     """A line for every step of any rank."""
     with Path("steps.txt").open("a", encoding="ascii") as file:
         file.write("step\n")
     note_done("step", task, number)
 
 
-def note_done(what: str, task: BranchTask | MarchTask, number: int) -> None:
+def note_done(what: str, task: Task, number: int) -> None:
     """When a step or a result of a task was finished, before anybody hears of it."""
     with Path(DONE).open("a", encoding="ascii") as file:
         file.write(f"{time.time()} {what} {task.key} {number}\n")
-
-
-def meet(n_ranks: int) -> None:
-    """Returns when so many ranks have been here."""
-    Path(f"met{launcher_rank()}.txt").touch()
-    wait_until(lambda: len(list(Path().glob("met*.txt"))) >= n_ranks, PATIENCE)
 
 
 def watch_memory(samples: list[int]) -> None:
@@ -183,7 +186,7 @@ def wait_until(condition: Callable[[], bool], patience: float) -> None:
 
 
 if __name__ == "__main__":
-    task_runs.build_evaluator = build_fake
+    task_runs.compute_task = compute_fake
     schedule.SECONDS_TO_PROGRESS = float(os.environ.get("FAKE_PROGRESS", "0.03"))
     if "FAKE_TELLING" in os.environ:
         progress.FIRST_LINE = progress.LONGEST_SILENCE = float(os.environ["FAKE_TELLING"])

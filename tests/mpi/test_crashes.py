@@ -38,7 +38,7 @@ def crash_until_it_is_given_up(n_ranks, arguments, folder, crash):
     raise AssertionError(ended.said)
 
 
-def test_a_march_that_crashes_is_one_bad_point(whole, tmp_path):
+def test_a_history_that_crashes_is_one_bad_point(whole, tmp_path):
     assert crash_until_it_is_given_up(2, STUDY, tmp_path, "segfault") == [0, Outcome.CRASHED, 0, 0, 0]
     message = str(results(tmp_path / "out.nc").squeeze().message.values[1])
     assert message == f"{MOST_CRASHES} runs in a row have crashed or were killed while they were at it"
@@ -50,9 +50,9 @@ def test_a_march_that_crashes_is_one_bad_point(whole, tmp_path):
     assert results(tmp_path / "out.nc").identical(whole)
 
 
-def test_a_branch_that_crashes_ends_there(tmp_path):
+def test_a_sweep_that_crashes_ends_there(tmp_path):
     """States before the crash that were lost with the process are computed again, what lies behind it is lost."""
-    outcomes = crash_until_it_is_given_up(0, STUDY, tmp_path, "abort in branch")
+    outcomes = crash_until_it_is_given_up(0, STUDY, tmp_path, "abort in sweep")
     assert outcomes == [0, 0, 0, Outcome.CRASHED, Outcome.CRASHED]
 
 
@@ -61,6 +61,8 @@ def test_a_run_that_is_killed_says_nothing_of_its_tasks(whole, tmp_path):
         started = running.reaches(lambda: "] " in running.said and len(running.ranks()) == 2)
         assert started, running.said
         assert running.reaches(lambda: count_entries("start", tmp_path / "out.nc") > 0), running.said
+        # a kill leaves no memory behind
+        assert not any(running.shared_memory().values())
         os.kill(running.ranks()[1], signal.SIGKILL)
 
     for _ in range(2):

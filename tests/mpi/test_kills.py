@@ -157,7 +157,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_result(tmp_path):
     assert sum(int(how.split()[1]) for how in found) >= len(seeds)
     assert max((age for seed in seeds for age in ages_of_losses(tmp_path / str(seed))), default=0.0) <= PROMISED
     resumed = "".join(path.read_text(encoding="utf-8") for path in tmp_path.glob("*/resumed.txt")).splitlines()
-    assert "march" in {line.split()[0] for line in resumed}
+    assert "history" in {line.split()[0] for line in resumed}
 
 
 @pytest.fixture(scope="module")
@@ -193,6 +193,39 @@ def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks, number, whole,
     assert f"holds {n_there} of {N_POINTS} points, the same command goes on" in ended.said
     for name in set(left.data_vars) - {"message", "outcome"}:
         xr.testing.assert_equal(left[name].where(there), whole[name].where(there))
+
+
+STUCK = """
+import sys, time
+from studyrunner.checkpoint.store import Store
+from studyrunner.system import endings
+endings.SECONDS_OF_GRACE = 1.0
+
+def hang(*_, **__):
+    print("hangs", file=sys.stderr, flush=True)
+    while True:
+        time.sleep(600)
+
+Store.tick = hang
+from studyrunner.cli import main
+sys.exit(main())
+"""
+
+
+def test_one_more_signal_ends_a_run_that_cannot_end(tmp_path):
+    """A disk that does not answer, for one."""
+    script = tmp_path / "stuck.py"
+    script.write_text(STUCK, encoding="utf-8")
+
+    def end_twice(running):
+        for seconds in (0.0, 0.2, 2.0):
+            running.wait_for("hangs")
+            time.sleep(seconds)
+            running.process.send_signal(signal.SIGTERM)
+
+    ended = run_to_end(0, [str(script), "two_masses", "-o", "out.nc"], tmp_path, {}, end_twice)
+    assert (ended.status, ended.seconds < SOON) == (130, True)
+    assert "run-study: ended at once: the same command goes on where it was" in ended.said
 
 
 @pytest.mark.parametrize("rank_0_too", [False, True])

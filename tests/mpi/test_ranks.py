@@ -1,17 +1,15 @@
 """run-study under mpiexec: the same result for any number of ranks, and an end in good order for all of them."""
 
-import json
 import re
 import signal
 import sys
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import xarray as xr
 
 from solver.outcome import Outcome
 from tests.benchmarks.overhead import run
-from tests.mpi.launching import CHEAP, FAKED, ROOT, SOON, launcher, run_command, run_to_end
+from tests.mpi.launching import CHEAP, FAKED, SOON, launcher, run_command, run_to_end
 from tests.studyrunner.test_progress import LINE
 
 GRID = [
@@ -44,8 +42,8 @@ def test_result_does_not_depend_on_the_number_of_ranks(tmp_path):
     assert len(tables) == 1
 
 
-def test_marches_are_done_while_their_branch_goes_on(tmp_path):
-    """Every branch stands still after its first start state until a march from it is done, which no rank but one has
+def test_histories_are_done_while_their_sweep_goes_on(tmp_path):
+    """Every sweep stands still after its first start state until a history from it is done, which no rank but one has
     time for."""
     arguments = [FAKED, *GRID, "--set", "axes.sweep=up"]
     done = start(2, arguments, tmp_path, {"FAKE_SECONDS": "0.01", "FAKE_PATIENCE": "120"})
@@ -56,7 +54,7 @@ def test_an_exception_on_one_rank_ends_all(tmp_path):
     done = start(2, [FAKED, *GRID], tmp_path, {"FAKE_FAILURE": "1"})
     assert done.returncode == 1
     assert "unexpected failure on rank 1 of 2" in done.stderr
-    assert re.search(r"ValueError: not \d results from MarchTask", done.stderr)
+    assert re.search(r"ValueError: not \d results from History", done.stderr)
     # What was finished is kept, and the result is written when the run ends in good order only.
     left = {path.name for path in tmp_path.iterdir() if path.suffix != ".partial"}
     assert left - {"two_masses.nc.progress-journal"} == {"two_masses.nc.progress"}
@@ -75,7 +73,7 @@ def default_signals():
 @pytest.mark.parametrize(("n_ranks", "number"), [(0, signal.SIGHUP), (2, signal.SIGINT), (2, signal.SIGUSR1)])
 def test_an_interrupted_run_ends_at_once(n_ranks, number, tmp_path, default_signals):
     def interrupt(running):
-        running.wait_for("along 2 sweeps")
+        running.wait_for("by 2 sweeps")
         running.process.send_signal(number)
 
     ended = run_to_end(n_ranks, [FAKED, *GRID, "-o", "out.nc"], tmp_path, {"FAKE_SECONDS": "60"}, interrupt)
@@ -100,29 +98,6 @@ def test_bad_input_is_said_once(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_plan_is_printed_once(tmp_path):
-    alone, together = (start(n_ranks, [FAKED, *CHEAP, "--plan"], tmp_path).stdout for n_ranks in (0, 2))
-    assert alone
-    # a plan tells the time with that of its own process
-    assert re.sub(r"[0-9.]+ s\b", "seconds", together) == re.sub(r"[0-9.]+ s\b", "seconds", alone)
-
-
-def test_processes_of_srun_without_mpi(tmp_path):
-    """Processes that do not find each other say so once and compute nothing."""
-
-    def start_rank(rank):
-        return start(0, [FAKED, *GRID], tmp_path, {"SLURM_STEP_NUM_TASKS": "2", "SLURM_PROCID": str(rank)})
-
-    with ThreadPoolExecutor() as pool:
-        ranks = list(pool.map(start_rank, range(2)))
-    assert [done.returncode for done in ranks] == [2, 2]
-    (line,) = ranks[0].stderr.splitlines()
-    assert "2 processes were started" in line
-    assert "mpiexec" in line
-    assert [done.stderr for done in ranks[1:]] == [""]
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_run_on_two_ranks_says_how_far_it_is(tmp_path):
     """Both ranks are seen at work, and the rank that serves them is not too busy to say so."""
     study = (*CHEAP, "--set", "axes.scheme=['implicit', 'explicit']", "-o", "out.nc")
@@ -137,26 +112,6 @@ def test_a_run_on_two_ranks_says_how_far_it_is(tmp_path):
     assert done[0] < done[-1]
     assert int(found[0]["percent"]) < int(found[-1]["percent"])
     assert max(len(match["running"].split(", ")) for match in found if match["running"]) == 2, ended.said
-
-
-SCRIPT = str(ROOT / "tests/mpi/share_arrays.py")
-N_BYTES = 64_000_000
-
-
-def test_ranks_of_a_machine_share_what_is_handed_out(tmp_path):
-    """But the last one, which does not see the file."""
-    refused = 2
-    environment = {"SHARED_BYTES": str(N_BYTES), "CANNOT_MAP": str(refused)}
-    done = start(3, [SCRIPT], tmp_path, environment)
-    assert done.returncode == 0, done.stderr
-    for rank in range(3):
-        said = json.loads((tmp_path / f"{rank}.json").read_text(encoding="utf-8"))
-        assert said["sum"] == N_BYTES // 8
-        assert said["Anonymous"] == 0
-        if rank == refused:
-            assert said["Rss"] == 0
-        else:
-            assert said["Rss"] * 1024 >= N_BYTES
 
 
 def test_rank_0_does_not_hold_results(tmp_path):

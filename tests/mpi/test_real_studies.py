@@ -77,7 +77,7 @@ cycles = 2000
     [
         # when some of the scenes are built, then when some of the histories are there
         (SCENES, [("computed", 0, 1), ("result", 0, 0)]),
-        (MODES, [("start", 2, 1)]),
+        (MODES, [("result", 2, 1)]),
         # two points with two scenes each: a rank gets both models of a mission with its task
         (MISSIONS, []),
         (ROOT, []),

@@ -102,7 +102,14 @@ def masses_tangent(case: MassCase, start: FloatArray) -> tuple[FloatArray, Float
     basis, share = case.basis, case.step_share
     given = case.predicted_t(case.predicted_h), friction_of(case.predicted_h), (case.mass, case.drag, case.line)
     series = basis.synthesis, basis.synthesis * share[:, None], basis.analysis / share
-    return mass_tangent(*given, case.step, start, case.has_normal, series)
+    out = no_tangents(len(start))
+    mass_tangent(np.arange(len(start)), *given, case.step, start, case.has_normal, series, out)
+    return out
+
+
+def no_tangents(n_contact: int) -> tuple[FloatArray, FloatArray]:
+    """Arrays for the derivatives of forces and slip work."""
+    return np.zeros((n_contact, 21, 21)), np.zeros((n_contact, 21))
 
 
 def friction_of(predicted: FloatArray) -> FloatArray:
@@ -110,19 +117,14 @@ def friction_of(predicted: FloatArray) -> FloatArray:
     return np.full(len(predicted), FRICTION)
 
 
-def both_tangents(n_contact: int) -> np.ndarray:
-    """Lines (n_contact,) of pairs with two tangents."""
-    return np.full(n_contact, -1)
-
-
 def kernel_results() -> dict[str, FloatArray]:
     case = kernel_case(3, BASIS.n_samples, seed=20)
     friction = friction_of(case.predicted_t)
     force_t, state_t, status_t, periods, error = march_period(case.predicted_t, friction, case.start, 1e-9, 6)
     marched = case.predicted_t, friction, case.start, state_t, periods
-    force_tangent, wear_tangent = march_tangent(
-        *marched, both_tangents(3), case.has_normal, (BASIS.synthesis, BASIS.analysis)
-    )
+    series, (force_tangent, wear_tangent) = (BASIS.synthesis, BASIS.analysis), no_tangents(3)
+    march_tangent(np.arange(3), *marched, np.full(3, -1), case.has_normal, series, (force_tangent, wear_tangent))
+    mean_normal_tangent(np.arange(2), case.predicted_t, *series, force_tangent)
     masses = mass_case(6, seed=21)
     mass_force_t, velocity_t, place_t, mass_status_t, slip_work, _ = run_masses(masses, masses.predicted_h)
     mass_force_tangent, mass_wear_tangent = masses_tangent(masses, velocity_t[:, :, 0])
@@ -134,7 +136,6 @@ def kernel_results() -> dict[str, FloatArray]:
         "error": error,
         "wear": integrate_slip_work(force_t, state_t),
         "mean_normal": mean_normal_force(case.predicted_t),
-        "normal_tangent": mean_normal_tangent(case.predicted_t, BASIS.synthesis, BASIS.analysis, case.has_normal),
         "force_tangent": force_tangent,
         "wear_tangent": wear_tangent,
         "mass_force": mass_force_t,

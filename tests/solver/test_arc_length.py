@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.continuation.arc_length import Arc, follow_arc
+from solver.continuation.arc_length import ARC_CORRECTORS, Arc, follow_arc
 from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
 from solver.harmonic_balance.dlft import Balance
@@ -62,7 +62,7 @@ def test_arc_length_gives_up_where_the_branch_does_not_reach_the_target():
     budget = Budget()
     result = follow_arc(Arc(balance_at, first(0.01), 0.01, Run(TOLERANCE, budget)), np.inf)
     assert result.state is None
-    assert budget.iterations <= CONTINUATION.arc_correctors * CONTINUATION.near_iterations
+    assert budget.iterations <= ARC_CORRECTORS * CONTINUATION.near_iterations
 
 
 def test_arc_length_does_not_go_on_where_stability_is_lost_without_a_fold():

@@ -1,7 +1,5 @@
 """What is kept of the steps of a wear history, and what is read between their ends."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from solver.accuracy.certificate import Certificate
 from solver.results.state_report import StateReport
 from solver.settings import Resolution, WearTarget
 from solver.wear import output as output_module
-from solver.wear.options import WEAR
 from solver.wear.output import CERTIFIED, INTERPOLATED, DenseOutput
 
 AREA = np.array([1.0, 3.0])
@@ -31,7 +28,7 @@ def report(depth, value, resolution=RESOLUTIONS[0], **more):
 
 def taken(counts, smooth=False, n_steps=3, **more):
     """Steps of 10 cycles; the first pair wears as t^2, the second one nothing."""
-    output = DenseOutput(AREA, None if counts is None else np.array(counts, float), smooth=smooth, **more)
+    output = DenseOutput(AREA, smooth, np.array(counts or (), float), **more)
     for n in range(n_steps + 1):
         at = 10.0 * n
         output.add(at, report([at**2, 0.0], float(n), RESOLUTIONS[n // 2 % 2]), np.array([2.0 * at, 0.0]), 0.5)
@@ -70,24 +67,12 @@ def test_within_an_adaptive_step_the_depth_is_a_cubic_and_all_else_linear_in_the
 
 
 def test_a_cubic_never_falls_however_steep_its_ends_are():
-    output = DenseOutput(AREA, np.array([10.0]), smooth=True)
+    output = DenseOutput(AREA, smooth=True)
     output.add(0.0, report([0.0, 0.0], 0.0), np.array([100.0, 0.0]), 0.0)
     output.add(10.0, report([1.0, 1.0], 1.0), np.array([0.0, 100.0]), 0.0)
     depth = output.read(np.linspace(0.0, 10.0, 101))["wear_depth"]
     assert (np.diff(depth, axis=0) >= 0.0).all()
     assert depth[-1].tolist() == [1.0, 1.0]
-
-
-def test_steps_that_nothing_is_read_of_are_not_kept():
-    counts = [0.0, 31.0, 40.0, 72.0]
-    output, whole = taken(counts, n_steps=9), taken(None, n_steps=9)
-    # the ends of the steps with a count, and the last one, which the next step begins at
-    assert [node.cycle for node in output.taken.nodes] == [0.0, 30.0, 40.0, 70.0, 80.0, 90.0]
-    one, other = (each.read(np.array(counts)) for each in (output, whole))
-    for name, values in one.items():
-        assert np.array_equal(values, other[name]), name
-    # the course is that of all steps
-    assert output.taken.course.ends == whole.taken.course.ends == tuple(np.arange(10) * 10.0)
 
 
 @pytest.mark.parametrize("smooth", [False, True])
@@ -103,14 +88,14 @@ def test_a_target_is_found_within_the_step_that_reaches_it(quantity, wanted, smo
 
 
 def test_a_shift_of_the_resonance_is_found_as_a_function_of_the_worn_volume():
-    output = DenseOutput(AREA, None, smooth=False, target=WearTarget("frequency_shift", 0.02))
+    output = DenseOutput(AREA, smooth=False, target=WearTarget("frequency_shift", 0.02))
     for n, resonance in enumerate((100.0, 101.0, 97.0)):
         output.add(10.0 * n, report([n, n], 0.0, resonance=resonance), np.ones(2), 0.0)
     # by 1 % up, then by 3 % down
     assert output.taken.reached == pytest.approx(17.5)
     assert output.taken.reached_within == 0.0
     # a parabola through the end before and both ends of the step
-    output = DenseOutput(AREA, None, smooth=False, target=WearTarget("frequency_shift", 0.06))
+    output = DenseOutput(AREA, smooth=False, target=WearTarget("frequency_shift", 0.06))
     for n in range(4):
         output.add(10.0 * n, report([n, n], 0.0, resonance=100.0 + 10.0 * (n / 3.0) ** 0.5), np.ones(2), 0.0)
     ends = [0.0, 10.0, 20.0]
@@ -132,13 +117,17 @@ def test_even_counts_are_as_far_from_each_other_in_volume_and_cycles_together():
     assert taken(None, n_steps=0).even_counts(3).tolist() == [0.0, 0.0, 0.0]
 
 
-def test_of_many_steps_those_that_go_far_are_kept(monkeypatch):
-    monkeypatch.setattr(output_module, "WEAR", replace(WEAR, kept_steps=20))
-    output = taken(None, n_steps=200)
-    monkeypatch.setattr(output_module, "WEAR", WEAR)
+def test_of_many_steps_those_that_go_far_and_those_that_are_read_are_kept(monkeypatch):
+    asked = [5.0, 15.0, 1005.0]
     whole = taken(None, n_steps=200)
-    assert len(output.taken.nodes) <= 20
+    monkeypatch.setattr(output_module, "KEPT_STEPS", 20)
+    output = taken(asked, n_steps=200)
+    assert len(output.taken.nodes) <= 26
     assert [output.taken.nodes[place].cycle for place in (0, -1)] == [0.0, 2000.0]
+    assert output.taken.course.ends == tuple(np.arange(201) * 10.0)
     counts = np.linspace(0.0, 2000.0, 11)
     one, other = (each.read(counts)["wear_depth"] for each in (output, whole))
     assert np.abs(one - other).max() < 0.02 * other.max()
+    one, other = (each.read(np.array(asked)) for each in (output, whole))
+    for name, values in one.items():
+        assert np.array_equal(values, other[name]), name

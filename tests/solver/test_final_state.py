@@ -17,9 +17,9 @@ from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
-from solver.wear.final_state.active_set import NoActiveSetError, wear_off
-from solver.wear.final_state.cooperation import failure, work_slopes
+from solver.wear.final_state.active_set import SLOPE_RTOL, NoActiveSetError, not_cooperative, wear_off
 from solver.wear.final_state.find import find_final_state
+from solver.wear.rate_slope import rate_changes
 from solver.wear.solutions import SlowTime
 from solver.wear.wearing_joint import WearingJoint
 from studies import build_scene
@@ -167,7 +167,8 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case):
     work, state = begun(case)
     joint, at = work.at(state), state.point.evaluation
     pairs = np.argsort(-at.slip_work)[:3]
-    slopes = work_slopes(joint, at, work.wearing, work.run.fresh(), pairs)
+    one, run = np.ones(at.wear_depth.size), work.run.fresh()
+    slopes = rate_changes(joint, at, one, work.wearing, np.eye(one.size)[pairs], run, SLOPE_RTOL).T
     step = 1e-5 * float(at.slip_work.max() / np.abs(slopes).max())
     for place, pair in enumerate(pairs):
         works = []
@@ -184,19 +185,19 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states(case):
 def test_the_tests_of_cooperation_refuse_other_final_states():
     work, before = begun("cylinder")
     final = worn_off(work, before)
-    assert failure(work, before, final, 1e-4) == ""
+    assert not_cooperative(work, before, final, 1e-4) == ""
     # pairs that slip are left out of the set
     fewer = final.off.copy()
     fewer[np.flatnonzero(final.off)[0]] = False
-    assert "wear that do not in the end" in failure(work, before, replace(final, off=fewer), 1e-4)
+    assert "wear that do not in the end" in not_cooperative(work, before, replace(final, off=fewer), 1e-4)
     # pairs that stick are taken off
     more = np.ones_like(final.off)
-    assert "stick under pressure" in failure(work, before, replace(final, off=more), 1e-4)
+    assert "stick under pressure" in not_cooperative(work, before, replace(final, off=more), 1e-4)
     # it stops short of the end
     point = final.state.point
     half = replace(point.evaluation, wear_depth=0.5 * point.evaluation.wear_depth)
     short = replace(final, state=replace(final.state, point=State(half, point.history, 0.0)))
-    assert "still wear" in failure(work, before, short, 1e-4)
+    assert "still wear" in not_cooperative(work, before, short, 1e-4)
 
 
 def test_the_front_door_takes_it_to_the_end_only():

@@ -1,7 +1,6 @@
 """Histories whose frequency follows the resonance: exact motions, brute force, interruption, loss of the resonance."""
 
 import math
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -13,7 +12,6 @@ from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import FollowedFrequency, Scheme, SolverSettings
-from solver.wear.options import WEAR as WEAR_OPTIONS
 from tests.followed_states import at_maximum, followed_states, in_quadrature, responses_around
 from tests.references import slider_orbit
 from tests.solver.models import march_wear as march_from
@@ -118,7 +116,7 @@ def slider_start(word):
 @pytest.mark.slow
 @pytest.mark.parametrize("word", ["resonance", "peak"])
 def test_an_interrupted_history_is_equal_to_the_last_bit(word, monkeypatch):
-    monkeypatch.setattr("solver.wear.integrate.WEAR", replace(WEAR_OPTIONS, iterations_per_save=8))
+    monkeypatch.setattr("solver.wear.integrate.ITERATIONS_PER_SAVE", 8)
     model, follow, settings = scene("sdof_slider", damping=DAMPING), FollowedFrequency(word, *BETWEEN), SolverSettings()
     kept: list[Packed] = []
 

@@ -7,7 +7,7 @@ from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
-from solver.wear import wearing_joint
+from solver.wear import step
 from solver.wear.solutions import SlowTime, Solutions
 from solver.wear_history import march_wear
 from tests.references import slider_amplitude, slider_wear_depth
@@ -58,7 +58,7 @@ def test_sticking_pairs_slide_along_the_way_of_a_step(monkeypatch):
 
     fine = volume(1e-3)
     assert volume(1e-2) == pytest.approx(fine, rel=3e-3)
-    monkeypatch.setattr(wearing_joint, "history_along", lambda *given: given[2])
+    monkeypatch.setattr(step, "history_along", lambda _, state, __: state.point.history)
     assert volume(1e-2) < 0.99 * fine
 
 
@@ -68,7 +68,7 @@ def test_a_pair_that_only_just_slips_goes_on_as_in_a_time_integration_of_every_c
     start, settings = dovetail_start(212.5), SolverSettings(9, 128)
     volume = steps_and_volume("dovetail_sector", start, settings, 1e5)[1]
     assert volume == pytest.approx(2.026e-9, rel=4e-3)
-    monkeypatch.setattr(wearing_joint, "history_along", lambda *given: given[2])
+    monkeypatch.setattr(step, "history_along", lambda _, state, __: state.point.history)
     assert steps_and_volume("dovetail_sector", start, settings, 1e5)[1] < 0.95 * volume
 
 

@@ -14,13 +14,25 @@ from solver.contact.wear_law import WearLaw, WearTable
 from solver.harmonic_balance.state import Failure
 from solver.missions import solutions
 from solver.missions.block_run import BlockCase, BlockRun, run_block
-from solver.missions.blocks import Begin, Mission
+from solver.missions.block_start import Begun
+from solver.missions.blocks import Mission
 from solver.missions.course import MissionCourse
-from solver.missions.delay import Delay, half_width
 from solver.missions.history import integrate_missions
-from solver.missions.options import MISSIONS
-from solver.missions.passage import Swept, SweptState, _states, _swept, in_order, interval_errors, run_passage
-from solver.missions.step import Step, take_step
+from solver.missions.passage import (
+    FIRST_FREQUENCIES,
+    LARGEST_SWEEP_RATE,
+    MOST_FREQUENCIES,
+    Swept,
+    SweptState,
+    find_states,
+    half_width,
+    in_order,
+    interval_errors,
+    parts_of,
+    run_passage,
+    states_at,
+)
+from solver.missions.step import Step, attempt_step
 from solver.packing import Packed
 from solver.results.history import StartState
 from solver.settings import Resolution, WearTarget
@@ -54,38 +66,23 @@ def integrate(blocks, missions, **more):
 # --- one block ---
 
 
-@pytest.mark.parametrize("computed", [(1, 4e4), (4, 1e4)], ids=["one mission", "continued"])
-def test_one_block_is_a_wear_history_to_the_last_bit(computed):
-    missions, cycles = computed
-    counts = cycles * np.arange(missions + 1.0)
-    one = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, counts, settings=SETTINGS)
-    begin: Begin = "up" if missions == 1 else "continue"
-    history = integrate((Block(slider(), 160.0, 10.0, FRICTION, cycles, begin),), np.arange(missions + 1))
-    for name in ("worn_volume", "worn_volume_error", "wear_depth", "wear_depth_error", "reference_volume"):
-        np.testing.assert_array_equal(getattr(history, name), getattr(one, name))
-    np.testing.assert_array_equal(history.response_end[1:, 0], one.response[1:])
-    np.testing.assert_array_equal(history.response_begin[1:, 0], one.response[:-1])
-    np.testing.assert_array_equal(history.response_peak_end[1:, 0], one.response_peak[1:])
-    np.testing.assert_array_equal(history.response_peak_begin[1:, 0], one.response_peak[:-1])
-    np.testing.assert_array_equal(
-        history.response_error[1:, 0], np.fmax(one.response_error[1:], one.response_error[:-1])
-    )
-    np.testing.assert_array_equal(history.excitation_frequency, [[160.0, 160.0]])
-    assert history.outcome is one.outcome is Outcome.CONVERGED
-
-
 @pytest.mark.slow
-def test_two_halves_with_continue_are_the_whole():
-    """And the first block of several is the wear history of its cycles, but for its last step, which ends there."""
-    half = Block(slider(), 160.0, 10.0, FRICTION, 2e4, "continue")
-    history = integrate((half, half), 1)
-    whole = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, [2e4, 4e4], settings=SETTINGS)
-    bars = history.wear_depth_error[-1] + whole.wear_depth_error[-1]
-    assert (np.abs(history.wear_depth[-1] - whole.wear_depth[-1]) < bars).all()
-    assert (bars < 0.02 * whole.wear_depth[-1]).all()
-    np.testing.assert_allclose(history.block_volume[-1, 0], whole.worn_volume[1], rtol=1e-4)
-    anew = integrate((replace(half, begin="up"), replace(half, begin="up")), 1)
-    assert anew.block_volume[-1, 0] == history.block_volume[-1, 0]
+@pytest.mark.parametrize(("missions", "n_blocks", "begin"), [(1, 1, "up"), (4, 1, "continue"), (1, 2, "continue")])
+def test_a_mission_is_a_wear_history_in_parts(missions, n_blocks, begin):
+    cycles = 4e4 / (missions * n_blocks)
+    block = Block(slider(), 160.0, 10.0, FRICTION, cycles, begin)
+    history = integrate((block,) * n_blocks, np.arange(missions + 1))
+    counts = cycles * np.arange(missions * n_blocks + 1.0)
+    whole = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, counts, settings=SETTINGS)
+    assert history.outcome is whole.outcome is Outcome.CONVERGED
+    rows = np.arange(missions + 1) * n_blocks
+    bars = history.wear_depth_error + whole.wear_depth_error[rows]
+    assert (np.abs(history.wear_depth - whole.wear_depth[rows]) <= bars).all()
+    assert (bars <= 0.02 * whole.wear_depth[rows]).all()
+    end = history.response_end[-1, -1]
+    assert abs(end - whole.response[-1]) < (history.response_error[-1, -1] + whole.response_error[-1]) * abs(end)
+    np.testing.assert_array_equal(history.response_begin[0, 0], whole.response[0])
+    np.testing.assert_array_equal(history.excitation_frequency, [[160.0, 160.0]] * n_blocks)
 
 
 # --- exact volumes ---
@@ -160,7 +157,7 @@ EXACT = SolverSettings(harmonics=25, samples=512, rtol=0.05)
 def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, monkeypatch):
     """Against the exact differential equation: at least the true error, and not many times more."""
     # without damping the delay of a passage is not known
-    monkeypatch.setattr("solver.missions.passage.delay_of", lambda *_: Delay(0.0, 0.0))
+    monkeypatch.setattr("solver.missions.passage.delay_of", lambda *_: (0.0, 0.0))
     given = tuple(Block(slider(), f, load, FRICTION, cycles, begin) for begin, f, load, cycles in blocks)
     history = integrate_mission(given, WEAR, missions, settings=settings)
     exact = exact_growth(given, missions)
@@ -173,26 +170,36 @@ def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, mo
 # --- states that keep nothing of their way ---
 
 
-def begun_again(begin, depth, before=0.0, **more):
-    """A block at a depth by its own way, and from its state at another depth."""
-    block = Block(scene("sdof_slider"), 160.0, more.pop("amplitude", 10.0), FRICTION, 500.0, begin)
-    mission = Mission((block,), WEAR, (0, 2), SETTINGS)
-    first, own = (
-        run_block(BlockCase(mission, 0, np.array([at]), None, with_slope=False, settings=SETTINGS))
-        for at in (before, depth)
-    )
-    case = BlockCase(mission, 0, np.array([depth]), None, with_slope=False, settings=SETTINGS, begun=first.begun)
-    return own, run_block(case)
+def slipping(begin):
+    return Block(slider(), 160.0, 10.0, FRICTION, 500.0, begin)
+
+
+def begun_again(block, depth):
+    """A block at an even depth by its own way, and as at the depth 0 before."""
+    mission, pairs = Mission((block,), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
+    first, own = (run_block(BlockCase(mission, 0, at * pairs, None, SETTINGS)) for at in (0.0, depth))
+    return own, run_block(BlockCase(mission, 0, depth * pairs, None, SETTINGS, begun=first.begun))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("begin", ["ramp", "up"])
 def test_where_the_pair_slips_the_way_is_not_gone_again(begin):
-    own, again = begun_again(begin, 8e-6)
+    own, again = begun_again(slipping(begin), 8e-6)
     np.testing.assert_allclose(again.growth, own.growth, rtol=1e-6)
     np.testing.assert_allclose(again.response, own.response, rtol=1e-6)
     assert again.iterations < 20 < own.iterations
     assert again.begun is not None
+
+
+@pytest.mark.slow
+def test_where_a_pair_sticks_the_way_leads_through_the_same_nodes_and_where_much_changes_it_is_another_one():
+    dovetail = Block(scene("dovetail_sector", mesh=1), 212.6, 0.5, FRICTION, 10.0, "up")
+    own, again = begun_again(dovetail, 5e-9)
+    np.testing.assert_allclose(again.response, own.response, rtol=5e-3)
+    assert again.iterations < 0.6 * own.iterations
+    own, again = begun_again(slipping("up"), 6e-5)
+    assert again.iterations >= own.iterations
+    np.testing.assert_array_equal(again.growth, own.growth)
 
 
 @pytest.mark.slow
@@ -202,14 +209,6 @@ def test_an_interrupted_mission_with_such_states_goes_on_to_the_last_bit():
     whole = integrate_missions(mission, keep=kept.append)
     for place in (0, len(kept) // 2 - 1, len(kept) // 2, len(kept) - 2):
         assert equal(integrate_missions(mission, resume=kept[place]), whole)
-
-
-@pytest.mark.slow
-def test_where_a_pair_sticks_or_the_vibration_changes_much_the_way_is_gone_again():
-    for more in ({"amplitude": 4.0, "depth": 1e-6}, {"depth": 6e-5}):
-        own, again = begun_again("up", **more)
-        assert again.iterations >= own.iterations
-        np.testing.assert_array_equal(again.growth, own.growth)
 
 
 # --- many missions against missions one by one, with blocks whose wear is known exactly ---
@@ -238,7 +237,7 @@ def exact_run(case, like=None):
     growth = vectors @ (decay * (vectors.T @ (rate - loss @ case.depth)))
     response = np.array([[complex(depth.sum())] for depth in (case.depth, case.depth + growth)])
     slope = slope if case.with_slope else None
-    return BlockRun(Failure(Outcome.CONVERGED), growth, slope, response, np.abs(response), like=Like((), 1.0, 1))
+    return BlockRun(Failure(Outcome.CONVERGED), growth, response, np.abs(response), slope, like=Like((), 1.0, 1))
 
 
 @pytest.fixture
@@ -254,10 +253,14 @@ def exact_blocks(monkeypatch):
     return computed
 
 
-def exactly_known(missions, cycles=1.0, order=1, **more):
+def known_blocks(missions, cycles=1.0, **more):
     model = pairs()
     blocks = (Block(model, 1.0, 1.0, 0.5, cycles), Block(model, 2.0, 1.0, 0.5, 2.0 * cycles))
-    return integrate_missions(Mission(blocks[::order], 1.0, missions, SETTINGS, **more))
+    return Mission(blocks, 1.0, missions, SETTINGS, **more)
+
+
+def exactly_known(missions, cycles=1.0, **more):
+    return integrate_missions(known_blocks(missions, cycles, **more))
 
 
 @pytest.mark.slow
@@ -266,7 +269,7 @@ def test_two_thousand_missions_agree_with_missions_one_by_one(exact_blocks, cycl
     """The longer the blocks, the more they adapt the pressures against each other within few missions."""
     rows = (0, 1, 7, 200, 1000, 2000)
     once = exactly_known(rows, cycles, largest_step=1)
-    flown_once = len(exact_blocks)
+    n_once = len(exact_blocks)
     many = exactly_known(rows, cycles)
     assert many.outcome is once.outcome is Outcome.CONVERGED
     bars = many.wear_depth_error + once.wear_depth_error
@@ -276,23 +279,22 @@ def test_two_thousand_missions_agree_with_missions_one_by_one(exact_blocks, cycl
     of_blocks = many.block_volume_error * many.block_volume + once.block_volume_error * once.block_volume
     assert (np.abs(many.block_volume - once.block_volume) <= of_blocks).all()
     # each mission is two blocks and their reference solution
-    computed = (len(exact_blocks) - flown_once) / 4
+    computed = (len(exact_blocks) - n_once) / 4
     assert computed < limit
-    assert flown_once == 2000 * 4
+    assert n_once == 2000 * 4
     assert many.missions[-1] == many.steps.sum() == many.last_mission == 2000
 
 
 def test_a_step_is_of_second_order_and_its_error_is_known(exact_blocks):
     """After exact missions 0, H and 2H: against missions one by one."""
-    model = pairs()
-    mission = Mission((Block(model, 1.0, 1.0, 0.5, 1.0), Block(model, 2.0, 1.0, 0.5, 2.0)), 1.0, (0, 64), SETTINGS)
-    nodes = list(MissionCourse.begun(2, 2).nodes)
+    mission = known_blocks((0, 64))
+    nodes = list(MissionCourse.unworn(2, 2).nodes)
 
     def run(place, depth, carried, with_slope):
-        return exact_run(BlockCase(mission, place, depth, carried, with_slope, SETTINGS))
+        return exact_run(BlockCase(mission, place, depth, carried, SETTINGS, with_slope))
 
     def step(before, length):
-        taken = take_step(mission, tuple(before), length, run, lambda *_: 1e-16)
+        taken = attempt_step(mission, tuple(before), length, run, lambda *_: 1e-16)
         assert isinstance(taken, Step)
         return taken
 
@@ -303,26 +305,15 @@ def test_a_step_is_of_second_order_and_its_error_is_known(exact_blocks):
         taken = step(nodes[: 2 * length + 1 : length], length)
         apart = np.abs(taken.node.depth - nodes[3 * length].depth) @ mission.area
         if length > 1:
-            assert apart == pytest.approx(taken.error, rel=0.15)
+            assert apart == pytest.approx(1e-16 * taken.ratio, rel=0.15)
             np.testing.assert_allclose(taken.node.growth, nodes[3 * length].growth, rtol=5e-3)
         errors.append(apart)
     assert errors[0] < 1e-12 * float(nodes[-1].depth @ mission.area)
     assert 6.0 < errors[4] / errors[3] < 8.5
 
 
-def test_the_order_of_blocks_counts_by_less_than_a_mission(exact_blocks):
-    one, other = (exactly_known((0, 40), 5.0, order, largest_step=1) for order in (1, -1))
-    many = [exactly_known((0, 40), 5.0, order) for order in (1, -1)]
-    apart = one.wear_depth[-1] - other.wear_depth[-1]
-    assert np.abs(apart).max() > 1e-4 * one.wear_depth[-1].max()
-    for literal, history in zip((one, other), many, strict=True):
-        assert (np.abs(history.wear_depth - literal.wear_depth) <= history.wear_depth_error).all()
-
-
 def test_an_interrupted_mission_goes_on_to_the_last_bit(exact_blocks):
-    model = pairs()
-    blocks = (Block(model, 1.0, 1.0, 0.5, 3.0), Block(model, 2.0, 1.0, 0.5, 6.0))
-    mission, kept = Mission(blocks, 1.0, (0, 100, 301), SETTINGS), list[Packed]()
+    mission, kept = known_blocks((0, 100, 301), 3.0), list[Packed]()
     whole = integrate_missions(mission, keep=kept.append)
     n_runs = len(exact_blocks)
     for place in (0, 1, 5, len(kept) // 2, len(kept) - 2, len(kept) - 1):
@@ -352,7 +343,7 @@ def test_a_target_ends_the_missions(exact_blocks):
     assert np.isnan(whole.missions_to_target)
 
 
-def test_a_block_that_fails_at_once_is_flown_in_shorter_steps(monkeypatch):
+def test_a_block_that_fails_at_once_is_computed_in_shorter_steps(monkeypatch):
     """And one that fails in a single mission ends the history there, with what was computed."""
 
     def run(case, like=None):
@@ -467,21 +458,25 @@ def test_the_half_power_width_is_that_of_the_damping():
     assert half_width(at[:150], peak[:150]) == 0.0
 
 
+def passing(passage, wear=WEAR, settings=SETTINGS):
+    """A passage of the damped slider."""
+    block = Block(scene("sdof_slider", damping=6.0), passage, 10.0, FRICTION)
+    return BlockCase(Mission((block,), wear, (0, 1), settings), 0, np.zeros(1), None, settings)
+
+
 @pytest.mark.slow
 def test_a_vibration_is_late_by_its_decay_time():
     """The free slider with 6 N s/m and 0.1 kg decays by exp(-30 t): at 7 Hz/s it is late by 7/30 Hz."""
 
     def case(rate):
-        block = Block(scene("sdof_slider", damping=6.0), Passage(180.0, 220.0, rate), 10.0, FRICTION, begin="up")
         # too little wear to change the pressures on the way
-        mission = Mission((block,), 1e-6 * WEAR, (0, 1), SETTINGS)
-        return BlockCase(mission, 0, np.zeros(1), None, with_slope=False, settings=SETTINGS)
+        return passing(Passage(180.0, 220.0, rate), 1e-6 * WEAR)
 
     fast, slow = run_passage(case(7.0)), run_passage(case(0.07))
     assert fast.sweep_rate == pytest.approx(7.0 / (30.0 / (2.0 * np.pi)) ** 2)
     assert slow.sweep_rate == pytest.approx(0.01 * fast.sweep_rate)
     # as if the largest wear over frequency were missed, or added, over the lag
-    states = _states(case(7.0), Passage(180.0, 220.0, 7.0), np.linspace(190.0, 210.0, 41), None)
+    states = states_at(case(7.0), Passage(180.0, 220.0, 7.0), np.linspace(190.0, 210.0, 41))
     assert isinstance(states, list)
     most = max(float(each.density[0]) for each in states)
     assert fast.growth_error - slow.growth_error == pytest.approx(6.93 / 30.0 * most / fast.growth[0], rel=0.02)
@@ -489,28 +484,25 @@ def test_a_vibration_is_late_by_its_decay_time():
 
 @pytest.mark.slow
 def test_a_passage_wears_as_a_fixed_grid_of_frequencies():
-    model, passage = scene("sdof_slider", damping=6.0), Passage(185.0, 215.0, 5.0)
-    block = Block(model, passage, 10.0, FRICTION, begin="up")
-    history = integrate((block,), 1)
-    mission = Mission((block,), WEAR, (0, 1), SETTINGS)
-    case = BlockCase(mission, 0, np.zeros(1), None, with_slope=False, settings=SETTINGS)
+    passage = Passage(185.0, 215.0, 5.0)
+    case = passing(passage)
+    mission = case.mission
+    history = integrate(mission.blocks, 1)
     grid = np.linspace(185.0, 215.0, 33)
-    fixed = _states(case, passage, grid, None)
+    fixed = states_at(case, passage, grid)
     assert isinstance(fixed, list)
     volume = trapezoid([float(of.density @ mission.area) for of in fixed], grid)
     bar = float(interval_errors(fixed, mission.area).sum()) + history.error_estimate * history.worn_volume[-1]
     assert history.worn_volume[-1] == pytest.approx(volume, abs=bar)
     assert bar < 0.02 * volume
     assert history.outcome is Outcome.CONVERGED
-    assert 0.0 < history.sweep_rate[0] < MISSIONS.largest_sweep_rate
+    assert 0.0 < history.sweep_rate[0] < LARGEST_SWEEP_RATE
 
 
 @pytest.mark.slow
 def test_the_reference_of_a_passage_takes_its_resolutions_and_estimates_no_errors():
-    # a passage begins with a sweep
-    block = Block(scene("sdof_slider", damping=6.0), Passage(185.0, 215.0, 5.0), 10.0, FRICTION)
     settings = SolverSettings(rtol=2e-3)
-    case = BlockCase(Mission((block,), WEAR, (0, 1), settings), 0, np.zeros(1), None, False, settings)
+    case = passing(Passage(185.0, 215.0, 5.0), settings=settings)
     fine = run_passage(case)
     assert fine.like is not None
     assert len({resolution for _, resolution in fine.like.resolutions}) > 1
@@ -543,26 +535,27 @@ def swept_with(monkeypatch, density, depth, near=()):
     def states(_case, _passage, frequencies, _like):
         return [state(at, density(at), response=1e-3) for at in frequencies]
 
-    monkeypatch.setattr("solver.missions.passage._states", states)
+    monkeypatch.setattr("solver.missions.passage.states_at", states)
     passage = Passage(1.0, 2.0, 1e-4)
     block = Block(scene("sdof_slider"), passage, 10.0, FRICTION, begin="up")
-    case = BlockCase(Mission((block,), WEAR, (0, 1), SETTINGS), 0, np.array([depth]), None, False, SETTINGS, near)
-    swept = _swept(case, passage, None)
+    mission, begun = Mission((block,), WEAR, (0, 1), SETTINGS), Begun(None, near) if near else None
+    case = BlockCase(mission, 0, np.array([depth]), None, SETTINGS, begun=begun)
+    swept = find_states(case, passage, None)
     assert isinstance(swept, Swept)
     return swept
 
 
 def test_wear_that_is_round_off_asks_for_no_more_frequencies(monkeypatch):
     noise = np.random.default_rng(0)
-    assert len(swept_with(monkeypatch, lambda _: 1e-25 * noise.uniform(), 0.0).states) == MISSIONS.first_frequencies
-    assert len(swept_with(monkeypatch, lambda _: 1e-14 * noise.uniform(), 1e-6).states) == MISSIONS.first_frequencies
+    assert len(swept_with(monkeypatch, lambda _: 1e-25 * noise.uniform(), 0.0).states) == FIRST_FREQUENCIES
+    assert len(swept_with(monkeypatch, lambda _: 1e-14 * noise.uniform(), 1e-6).states) == FIRST_FREQUENCIES
 
 
 def test_a_resonance_without_any_limit_does_not_ask_for_frequencies_without_end(monkeypatch):
     """The integral over its steady states is infinite; the error tells that it is not known."""
     swept = swept_with(monkeypatch, lambda at: 1e-12 / max(abs(at - 1.3), 1e-12), 0.0)
-    assert len(swept.states) < 150 < MISSIONS.most_frequencies
-    assert swept.error > SETTINGS.rtol * float(swept.wear.sum()) * 1e-4
+    assert len(swept.states) < 150 < MOST_FREQUENCIES
+    assert swept.error > SETTINGS.rtol * float(parts_of(swept.states).sum()) * 1e-4
 
 
 def test_the_next_passage_begins_with_the_frequencies_that_count(monkeypatch):
@@ -573,32 +566,30 @@ def test_the_next_passage_begins_with_the_frequencies_that_count(monkeypatch):
 
     first = swept_with(monkeypatch, peak(1.3), 0.0)
     again = swept_with(monkeypatch, peak(1.3), 0.0, first.needed)
-    assert len(first.states) > len(again.states) - 2 >= MISSIONS.first_frequencies
+    assert len(first.states) > len(again.states) - 2 >= FIRST_FREQUENCIES
     moved = swept_with(monkeypatch, peak(1.7), 0.0, first.needed)
     for swept, middle in ((first, 1.3), (again, 1.3), (moved, 1.7)):
         exact = 2e-11 * (np.arctan((2.0 - middle) / 0.02) - np.arctan((1.0 - middle) / 0.02))
-        assert swept.wear[0] == pytest.approx(exact, rel=SETTINGS.rtol)
+        assert parts_of(swept.states).sum() == pytest.approx(exact, rel=SETTINGS.rtol)
     assert sum(1.2 < at < 1.4 for at in moved.needed) < 0.6 * sum(1.2 < at < 1.4 for at in first.needed)
 
 
 # --- what users may get wrong ---
 
+PASSAGE = {"frequency": Passage(2.0, 3.0, 1.0), "cycles": None}
+
 
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"begin": "sweep"}, r"blocks\[1\]: begin: give one of ramp, up, down, continue instead of 'sweep'"),
+        ({"begin": "sweep"}, r"blocks\[1\]: begin: give one of"),
         ({"cycles": 0.0}, r"blocks\[1\]: cycles: give values above 0"),
-        ({"frequency": Passage(2.0, 2.0, 1.0), "cycles": None}, r"blocks.*: frequency.stop: give another"),
-        ({"frequency": Passage(2.0, 3.0, -1.0), "cycles": None}, r"blocks.*: frequency.rate: give values above 0"),
-        ({"frequency": Passage(2.0, 3.0, 1.0)}, r"blocks.*: cycles: the cycles of a passage follow"),
-        (
-            {"frequency": Passage(2.0, 3.0, 1.0), "cycles": None, "begin": "down"},
-            r'blocks.*: begin: this passage goes up: give "up"',
-        ),
         ({"cycles": None}, r"blocks.*: cycles: missing"),
+        ({"frequency": Passage(2.0, 2.0, 1.0), "cycles": None}, r"blocks.*: frequency.stop"),
+        ({"frequency": Passage(2.0, 3.0, -1.0), "cycles": None}, r"blocks.*: frequency.rate"),
+        ({**PASSAGE, "cycles": 1.0}, r"blocks.*: cycles"),
+        ({**PASSAGE, "begin": "down"}, r'blocks.*: begin: .* give "up"'),
         ({"frequency": np.nan}, r"blocks\[1\]: frequency: give finite numbers"),
-        ({"excitation_amplitude": -1.0}, r"blocks\[1\]: excitation_amplitude: give values of at least 0"),
         ({"excitation_amplitude": 0.0}, r"blocks\[1\]: excitation_amplitude: give values above 0"),
         ({"friction_coefficient": [0.1, 0.2]}, r"blocks\[1\]: friction_coefficient has shape"),
         ({"friction_coefficient": 0.4}, r"begin: continue goes with the model and friction"),
@@ -615,14 +606,11 @@ def test_a_wrong_block_is_named(changed, said):
     ("wrong", "said"),
     [
         ({"missions": [1.5]}, "missions: give ascending whole numbers"),
-        ({"missions": [3, 2]}, "missions: give ascending whole numbers"),
         ({"missions": 0}, "missions: give ascending whole numbers, the last of at least 1"),
         ({"blocks": ()}, "blocks: give at least one block"),
-        ({"largest_step": 0}, "largest_step: give values of at least 1"),
         ({"largest_step": 1.5}, "largest_step: give a whole number"),
         ({"until": WearTarget("frequency_shift", 0.1)}, "until.quantity: give one of wear_depth, worn_volume"),
         ({"sweep": "continue"}, "sweep: give one of up, down, ramp"),
-        ({"law": WearLaw("rust")}, 'wear law "rust"'),
     ],
 )
 def test_a_wrong_mission_is_a_sentence(wrong, said):
@@ -634,5 +622,5 @@ def test_a_block_without_a_start_state_is_an_outcome():
     """The time is over before the first state."""
     history = integrate_mission(two_blocks("up"), WEAR, 10, settings=replace(SETTINGS, time_limit=0.0))
     assert history.outcome is Outcome.TIME_LIMIT
-    assert np.isnan(history.error_estimate) or history.last_mission == 0
+    assert history.last_mission == 0
     assert np.isnan(history.worn_volume[1:]).all()

@@ -1,7 +1,7 @@
 """The progress of a history and of a sweep survives being kept, and what goes on from there ends with equal numbers."""
 
 import math
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -78,7 +78,7 @@ def from_every_stop(model, friction, start, wear, step, scheme, end, settings):
 @pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "step"), [("implicit", 800.0), ("adaptive", 1.0)])
 def test_a_history_goes_on_to_the_same_numbers(scheme, step, monkeypatch):
-    monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=8))
+    monkeypatch.setattr(integrate, "ITERATIONS_PER_SAVE", 8)
     (start,) = branch_states(dovetail(7), 0.5, 0.5, [2 * np.pi * 213.0], AUTO)
     whole, kept = from_every_stop(dovetail(7), 0.5, start, 1.1e-11, step, scheme, 8e3, AUTO)
     assert whole.outcome is Outcome.CONVERGED
@@ -89,8 +89,8 @@ def test_a_history_goes_on_to_the_same_numbers(scheme, step, monkeypatch):
 
 @pytest.mark.slow
 def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch):
-    monkeypatch.setattr(integrate, "WEAR", replace(integrate.WEAR, iterations_per_save=30))
+    monkeypatch.setattr(integrate, "ITERATIONS_PER_SAVE", 30)
     settings = SolverSettings(11, 128)
     whole, kept = from_every_stop(worn_wall(1.0), 1e-3, impacting_start(), 1e-7, 100.0, "implicit", 1000.0, settings)
-    cycles = [at.progress.state.cycle for at in kept if at.fine is None]
+    cycles = [at.state.cycle for at in kept if at.fine is None]
     assert min(cycles) < whole.jump_cycle < max(cycles)

@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.accuracy.error_estimate import Estimate, euler_error
+from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.period_events import left_out
+from solver.harmonic_balance.state import Failure
 from solver.march.steps import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
+from solver.outcome import Outcome
 from solver.packing import in_rows, pack, unpack
 from solver.settings import Scheme, SolverSettings
 from solver.wear import control
 from solver.wear.check import chosen_for_another
-from solver.wear.control import AdaptiveSteps, GivenSteps
-from solver.wear.options import WEAR as OPTIONS
+from solver.wear.control import Adaptive, Given, Growing, LargestDepth, one_step
 from solver.wear.state import Choice
 from solver.wear.step import Step
 from tests.solver.worn_slider import AREA, END, WEAR, begun
@@ -21,14 +22,18 @@ from tests.solver.worn_slider import AREA, END, WEAR, begun
 SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit")
 
 
+def planned(kind, *given):
+    """Steps of a joint."""
+    return lambda work: kind(work, *given)
+
+
 def steps_of(plan, n_steps, wear=WEAR):
     """The unworn state and those behind each of the first steps, and the steps."""
     work, state = begun(wear)
-    states, steps = [plan.begin(work, state)], []
+    states, steps = [plan(work).begin(state)], []
     for _ in range(n_steps):
-        step = plan.step(work, states[-1])
+        step = one_step(plan(work), states[-1])
         assert isinstance(step, Step)
-        assert step.arrived
         steps.append(step)
         states.append(step.state)
     return states, steps
@@ -55,27 +60,26 @@ def bdf2_depth(length, before, grown, depth, rate):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_given_step_follows_its_own_equation(scheme):
-    states, steps = steps_of(GivenSteps(scheme, 4000.0, END), 3)
+    states, steps = steps_of(planned(Given, scheme, 4000.0, END), 3)
     assert counts(states).tolist() == [0.0, 4000.0, 8000.0, 12000.0]
     rate = rates(states)
     # W + h g(W) if explicit, W_new = W + h g(W_new) if implicit
     taken = rate[:-1] if scheme == "explicit" else rate[1:]
     assert np.diff(depths(states)) == pytest.approx(4000.0 * taken, rel=1e-9)
-    expected = euler_error(4000.0, np.abs(np.diff(rate)) * AREA)
+    # the difference to the trapezoidal rule
+    expected = 0.5 * 4000.0 * np.abs(np.diff(rate)) * AREA
     assert [step.volume_error(np.array([AREA])) for step in steps] == pytest.approx(expected, rel=1e-9)
 
 
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
     # Eq. (22): one pair, so each step wears just that depth
-    states, _ = steps_of(GivenSteps("explicit", 1.0, END, 2e-6), 4)
+    states, _ = steps_of(planned(LargestDepth, "explicit", 1.0, END, 2e-6), 4)
     assert np.diff(depths(states)) == pytest.approx(np.full(4, 2e-6), rel=1e-9)
-    # the bound is one of stability of the explicit scheme
-    assert counts(steps_of(GivenSteps("implicit", 1000.0, END, 1e-8), 1)[0]).tolist() == [0.0, 1000.0]
 
 
 def test_without_an_end_each_step_wears_as_much_as_the_first_and_is_at_most_twice_the_last():
-    states, steps = steps_of(GivenSteps("implicit", 2e4, np.inf), 12)
-    lengths, rate = np.array([step.length for step in steps]), rates(states)
+    states, _ = steps_of(planned(Growing, "implicit", 2e4, np.inf), 12)
+    lengths, rate = np.diff(counts(states)), rates(states)
     slower = np.maximum.accumulate(rate) / rate
     allowed = np.concatenate([[2e4], LARGEST_STEP_RATIO * lengths[:-1]])
     assert lengths == pytest.approx(np.minimum(allowed, 2e4 * slower[:-1]), rel=1e-12)
@@ -84,15 +88,15 @@ def test_without_an_end_each_step_wears_as_much_as_the_first_and_is_at_most_twic
 
 def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     rtol = 1e-2
-    states, steps = steps_of(AdaptiveSteps(rtol), 12)
+    states, steps = steps_of(planned(Adaptive, rtol), 12)
     at, worn = counts(states), depths(states) * AREA
-    lengths = np.array([step.length for step in steps])
+    lengths = np.diff(at)
     for place, step in enumerate(steps):
-        at_mean_rate = worn[place + 1] * step.length / at[place + 1]
-        allowed = OPTIONS.step_error_fraction * rtol * max(worn[place + 1] - worn[place], at_mean_rate)
+        at_mean_rate = worn[place + 1] * lengths[place] / at[place + 1]
+        allowed = control.STEP_ERROR_FRACTION * rtol * max(worn[place + 1] - worn[place], at_mean_rate)
         assert step.volume_error(np.array([AREA])) <= allowed
     assert (lengths[1:] <= LARGEST_STEP_RATIO * lengths[:-1] * (1.0 + 1e-12)).all()
-    assert (steps_of(AdaptiveSteps(1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
+    assert (steps_of(planned(Adaptive, 1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
 
 
 def failing(monkeypatch, fails):
@@ -108,47 +112,54 @@ def failing(monkeypatch, fails):
 
 
 def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch):
-    first = steps_of(AdaptiveSteps(1e-2), 0)[0][0].length
+    first = steps_of(planned(Adaptive, 1e-2), 0)[0][0].length
     with monkeypatch.context() as patch:
         tried, _ = failing(patch, lambda n, _, scheme: scheme == "adaptive" and n == 1)
-        _, (shorter, *_) = steps_of(AdaptiveSteps(1e-2), 1)
+        states, _ = steps_of(planned(Adaptive, 1e-2), 1)
     assert tried[:2] == [first, SMALLEST_STEP_RATIO * first]
-    assert shorter.length == tried[-1]
+    assert counts(states)[1] == tried[-1]
     failing(monkeypatch, lambda _, __, scheme: scheme == "adaptive")
-    states, (euler, *_) = steps_of(AdaptiveSteps(1e-2), 1)
-    assert euler.length == pytest.approx(OPTIONS.shortest_slow_step * first, rel=2e-3)
-    assert depths(states)[1] == pytest.approx(euler.length * rates(states)[1], rel=1e-6)
+    states, _ = steps_of(planned(Adaptive, 1e-2), 1)
+    length = counts(states)[1]
+    assert length == pytest.approx(control.SHORTEST_SLOW_STEP * first, rel=2e-3)
+    assert depths(states)[1] == pytest.approx(length * rates(states)[1], rel=1e-6)
 
 
 @pytest.mark.parametrize(("found_from", "end", "doublings"), [(3.0, np.inf, 2), (3.0, 3.5, None), (40.0, np.inf, None)])
 def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeypatch, found_from, end, doublings):
     work, state = begun(WEAR)
-    first = AdaptiveSteps(1e-2).begin(work, state)
-    shortest, ended = OPTIONS.shortest_slow_step * first.length, list[Step]()
-    tried, _ = failing(monkeypatch, lambda *at: at[2] != "adaptive" or not ended or at[1] <= found_from * shortest)
+    first = Adaptive(work, 1e-2).begin(state)
+    shortest, euler = control.SHORTEST_SLOW_STEP * first.length, list[float]()
 
-    def end_here(_, at, length, __):
-        ended.append(Step(at, np.zeros(1), length, arrived=False, end_known_to=0.01 * length))
-        return ended[-1]
+    def fails(_, length, scheme):
+        return scheme != "adaptive" or not euler or length <= found_from * shortest
 
-    monkeypatch.setattr(control, "end_of_branch", end_here)
-    step = AdaptiveSteps(1e-2, end=end * shortest).step(work, first)
-    (corner,) = ended
-    assert step.arrived == (doublings is not None)
+    tried, euler = failing(monkeypatch, fails)
+    monkeypatch.setattr(control, "step_in_parts", lambda *_: None)
+    monkeypatch.setattr(control, "jump", lambda *_: Failure(Outcome.MARCH_FAILED))
+    step = one_step(Adaptive(work, 1e-2, end=end * shortest), first)
     if doublings is None:
-        assert step.state.cycle == corner.state.cycle
-        assert step.end_known_to == corner.end_known_to
+        assert step == Failure(Outcome.MARCH_FAILED)
     else:
-        assert tried[-2:] == [2.0 * corner.length, 4.0 * corner.length]
-        assert step.state.cycle == step.length == 2.0**doublings * corner.length
+        assert isinstance(step, Step)
+        assert tried[-2:] == [2.0 * shortest, 4.0 * shortest]
+        assert step.state.cycle == 2.0**doublings * shortest
         assert step.volume_error(work.area) > 0.0
+
+
+def test_a_given_step_that_is_not_found_is_taken_in_parts(monkeypatch):
+    whole, _ = steps_of(planned(Given, "implicit", 4000.0, END), 2)
+    monkeypatch.setattr(control, "attempt_step", lambda *_: None)
+    parts, _ = steps_of(planned(Given, "implicit", 4000.0, END), 2)
+    assert counts(parts).tolist() == counts(whole).tolist()
+    assert depths(parts) == pytest.approx(depths(whole), rel=1e-7)
 
 
 def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
     # no error is refused, so that steps grow as they may
-    monkeypatch.setattr(control, "WEAR", replace(OPTIONS, step_error_fraction=1e9))
-    states, steps = steps_of(AdaptiveSteps(1e-2), 3)
-    depth, rate, h = depths(states), rates(states), [step.length for step in steps]
+    monkeypatch.setattr(control, "STEP_ERROR_FRACTION", 1e9)
+    states, _ = steps_of(planned(Adaptive, 1e-2), 3)
+    depth, rate, h = depths(states), rates(states), np.diff(counts(states))
     assert depth[1] == pytest.approx(h[0] * rate[1], rel=1e-9)
     for n in (1, 2):
         expected = bdf2_depth(h[n], h[n - 1], depth[n] - depth[n - 1], depth[n], rate[n + 1])
@@ -157,7 +168,7 @@ def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
 
 @pytest.mark.parametrize(
     "plan",
-    [GivenSteps("explicit", 4000.0, END), GivenSteps("implicit", 4000.0, np.inf), AdaptiveSteps(1e-2)],
+    [planned(Given, "explicit", 4000.0, END), planned(Growing, "implicit", 4000.0, np.inf), planned(Adaptive, 1e-2)],
     ids=["explicit", "implicit", "adaptive"],
 )
 def test_a_state_is_data_that_survives_being_kept(plan):
@@ -167,7 +178,7 @@ def test_a_state_is_data_that_survives_being_kept(plan):
     def next_of(state):
         work, _ = begun()
         work.drop_factor()
-        step = plan.step(work, state)
+        step = one_step(plan(work), state)
         assert isinstance(step, Step)
         return step.state
 

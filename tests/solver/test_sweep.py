@@ -8,8 +8,7 @@ import pytest
 
 from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
-from solver.loading_history.frequency_sweep import FrequencySweep
-from solver.loading_history.options import LOADING
+from solver.loading_history.frequency_sweep import FIRST_ITERATIONS, FrequencySweep
 from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import find_origin
 from solver.outcome import Outcome
@@ -74,8 +73,7 @@ def test_the_error_holds_what_the_steps_of_the_sweep_leave_wrong(monkeypatch):
     settings = SolverSettings(harmonics=9, samples=128)
     found = {}
     for change in (0.3, 0.02):
-        options = replace(LOADING, change_limits=(change, change))
-        monkeypatch.setattr(path_module, "LOADING", options)
+        monkeypatch.setattr(path_module, "CHANGE_LIMITS", (change, change))
         found[change] = starts([213.25], settings=settings)[213.25]
     coarse, fine = found[0.3], found[0.02]
     assert coarse.reference is not None
@@ -125,7 +123,7 @@ def test_a_joint_without_grip_ends_within_bounded_effort():
     assert start.state is None
     assert start.outcome in (Outcome.UNSTABLE, Outcome.UNSETTLED, Outcome.ADRIFT)
     # to begin the sweep, to begin it anew, and at the point; each ends with one solve under way
-    assert start.newton_iterations < 4 * LOADING.first_iterations
+    assert start.newton_iterations < 4 * FIRST_ITERATIONS
 
 
 def test_a_first_state_that_more_harmonics_refuse_begins_no_sweep(monkeypatch):
@@ -176,7 +174,7 @@ INTERRUPTED = {
 @pytest.mark.slow
 @pytest.mark.parametrize("case", INTERRUPTED)
 def test_runs_that_end_at_each_save_arrive_at_the_same_numbers(case, monkeypatch):
-    monkeypatch.setattr(sweep_module, "LOADING", replace(LOADING, iterations_per_save=5))
+    monkeypatch.setattr(sweep_module, "ITERATIONS_PER_SAVE", 5)
     build, friction, amplitude, frequencies, way = INTERRUPTED[case]
     model, at = build(), np.array(frequencies)
     whole = dict(follow_branch(model, friction, amplitude, at, way, AUTOMATIC))

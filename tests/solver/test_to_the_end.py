@@ -12,7 +12,6 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
 from solver.wear.final_state.find import find_final_state
-from solver.wear.options import WEAR
 from solver.wear.solutions import SlowTime
 from studies import build_scene
 from tests.solver.models import march_wear
@@ -53,7 +52,7 @@ def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme):
 
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
 def test_a_march_that_goes_on_is_the_same_to_the_last_bit(scheme, monkeypatch):
-    monkeypatch.setattr("solver.wear.integrate.WEAR", replace(WEAR, iterations_per_save=30))
+    monkeypatch.setattr("solver.wear.integrate.ITERATIONS_PER_SAVE", 30)
     kept: list[Packed] = []
     whole = worn(ToTheEnd(9), scheme, keep=kept.append)
     assert kept

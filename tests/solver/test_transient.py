@@ -127,10 +127,9 @@ def test_steps_in_time_converge_to_the_motion_of_the_structure():
     errors = []
     for steps in (250, 500):
         transient = Transient(case, joint)
-        rest = transient.rest()
-        displacement = rest.displacement.copy()
+        displacement = np.zeros((3, 2), complex)
         displacement[0, 1] = 0.01
-        motion = Motion(displacement, rest.velocity)
+        motion = Motion(displacement, np.zeros_like(displacement))
         inverse = steps / end
         predicted = np.zeros((1, 5))
         for _ in range(steps):

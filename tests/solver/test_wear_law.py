@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline, RegularGridInterpolator
 from scipy.optimize import brentq
 
 from solver import march_wear as march_model
-from solver.contact.archard import slip_work_rate, slip_work_slopes
+from solver.contact.period_march import slip_work_rate, slip_work_slopes
 from solver.contact.wear_law import ARCHARD, ARCHARDS_WORK, WearingWork, WearLaw, WearTable, wearing_work
 from solver.settings import Scheme, SolverSettings
 from tests.solver.models import march_wear, random_balance, random_model

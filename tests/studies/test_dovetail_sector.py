@@ -133,12 +133,8 @@ def test_loss_factor_is_exact_at_the_first_frequency(at_rest):
     ("key", "value"),
     [
         ("nodal_diameter", 24),
-        ("rim_radius", 0.230),
         ("flank_length", 0.016),
         ("flank_top_half_width", 0.02),
-        ("platform_gap", 0.03),
-        ("fillet_height", 0.2),
-        ("mouth_clearance", 0.02),
         ("rotation_speed", 1e6),
     ],
 )

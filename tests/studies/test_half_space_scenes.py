@@ -9,7 +9,7 @@ from scipy.integrate import dblquad, quad
 from solver import march_wear
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
-from studies import SceneError, build_scene
+from studies import build_scene
 from studies.model_check import check_model
 from studies.scenes.closed_forms.hertz import (
     line_half_width,
@@ -212,11 +212,3 @@ def test_the_frequency_has_no_influence():
 @pytest.mark.parametrize("values", [{}, {"stroke": 1e-6}])
 def test_the_scenes_are_possible_structures(name, values):
     check_model(build_scene(name, **values), n_harmonics=3)
-
-
-def test_what_does_not_go_together_is_one_sentence():
-    for name in ("cylinder_on_flat", "sphere_on_flat"):
-        with pytest.raises(SceneError, match="give Q or stroke, not both"):
-            build_scene(name, Q=1.0, stroke=1e-6)
-    with pytest.raises(SceneError, match=r"give more than the width of all strips, 0\.008 m"):
-        build_scene("cylinder_on_flat", half_width=4e-3)

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from solver.contact.wear_law import ARCHARD, WearLaw, WearTable
 from studies.scene_answers import WearQuestion, stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_has, scene_mesh, scene_parameters
+from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_mesh, scene_parameters
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studies.scenes.dovetail_mesh import build_dovetail_mesh
 from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
@@ -227,12 +227,3 @@ def test_a_displacement_without_mass_has_no_frequency():
 def test_a_model_without_such_frequencies_says_so(model, words):
     with pytest.raises(SceneError, match=words):
         stuck_frequencies(model)
-
-
-def test_which_scene_tells_what():
-    functions = ("describe_mesh", "natural_frequencies", "exact_answer")
-    found = {
-        model: [name for name in functions if scene_has(model, name)] for model in ("dovetail_sector", "sdof_slider")
-    }
-    assert found == {"dovetail_sector": ["describe_mesh", "natural_frequencies"], "sdof_slider": ["exact_answer"]}
-    assert not any(scene_has(model, name) for model in ("two_masses", "vibro_impact") for name in functions)

@@ -1,6 +1,5 @@
 """The registry of scenes and the three textbook scenes against their equations and exact motions."""
 
-import pickle
 import subprocess
 import sys
 
@@ -61,17 +60,6 @@ def test_an_unknown_scene_is_named_with_the_known_ones():
         scene_parameters("bladeless")
     assert caught.value.key == "model"
     assert all(name in caught.value.remedy for name in BUNDLED)
-
-
-def test_parameters_of_another_scene_are_a_bug():
-    with pytest.raises(TypeError, match="two_masses"):
-        build_scene("two_masses", scene_parameters("sdof_slider")(), 1)
-
-
-def test_a_scene_error_survives_the_way_between_ranks_and_is_one_sentence():
-    error = pickle.loads(pickle.dumps(SceneError("contact/area", "-1.0 at index 3", "give a positive area in m2")))
-    assert (error.key, error.value, error.remedy) == ("contact/area", "-1.0 at index 3", "give a positive area in m2")
-    assert str(error) == "contact/area: -1.0 at index 3; give a positive area in m2."
 
 
 def test_listing_the_scenes_imports_nothing_heavy():

@@ -18,12 +18,6 @@ def not_hermitian(file):
     file["nd/2/stiffness"][0, 1] = np.conj(file["nd/2/stiffness"][0, 1])
 
 
-def without_stiffness_and_mass(file):
-    for key in ("stiffness", "mass"):
-        file[key][0, :] = 0
-        file[key][:, 0] = 0
-
-
 def rank_deficient(file):
     # The motion (1, 1, 0, ...) gets neither stiffness nor mass.
     motion = np.zeros(7)
@@ -39,31 +33,9 @@ def free_where_no_contact_is(file):
     file["stiffness"][:, 6] = 0
 
 
-def external(file):
-    del file["mass"]
-    file["mass"] = h5py.ExternalLink("other.h5", "/mass")
-
-
 def soft(file):
     del file["mass"]
     file["mass"] = h5py.SoftLink("/stiffness")
-
-
-def external_storage(file):
-    del file["mass"]
-    file.create_dataset("mass", (7, 7), "f8", external=[("/dev/zero", 0, 392)])
-
-
-def virtual(file):
-    del file["mass"]
-    layout = h5py.VirtualLayout((7, 7), "f8")
-    layout[...] = h5py.VirtualSource("other.h5", "mass", (7, 7))
-    file.create_virtual_dataset("mass", layout)
-
-
-def huge(file):
-    del file["mass"]
-    file.create_dataset("mass", (10**6, 10**6), "f8", chunks=True)
 
 
 def attribute(name, value):
@@ -80,74 +52,48 @@ FRICTION = "contact/friction_coefficient"
 
 WRONG_PLAIN: list[tuple[Change, str, str]] = [
     (drop("stiffness"), "stiffness", "missing"),
-    (drop("contact/dofs"), "contact/dofs", "missing"),
     (drop("response/names"), "response/names", "missing"),
     (drop("contact/normal_load"), "contact/normal_load", "0.0 at index 1"),
     (put("inertia", np.eye(7)), "inertia", "unknown dataset"),
-    (put("nd", np.eye(7)), "nd", "unknown dataset"),
     (put("stiffness", np.eye(7)[:, :6]), "stiffness", "shape (7, 6)"),
     (put("load/static", np.ones(7, dtype=complex)), "load/static", "complex"),
-    (put("mass", np.eye(7) == 1), "mass", "type"),
     (put("mass", h5py.Empty("f8")), "mass", "single value or nothing"),
     (poke("stiffness", (2, 3), np.nan), "stiffness", "nan at index 2, 3"),
     (asymmetric, "stiffness", "not symmetric"),
-    (put("stiffness", plain().linear[0].stiffness * (1 + 0.1j)), "stiffness", "not Hermitian"),
     (put("stiffness", linear_model(7, hermitian=True, seed=5).stiffness), "stiffness", "complex"),
     (poke("mass", (6, 6), -5.0), "mass", "negative eigenvalue"),
-    (without_stiffness_and_mass, "stiffness", "row of zeros"),
     (rank_deficient, "stiffness", "rank"),
     (free_where_no_contact_is, "stiffness", "row of zeros"),
     (poke("contact/area", 1, -1e-4), "contact/area", "-0.0001 at index 1"),
-    (put("contact/area", np.ones(4)), "contact/area", "shape (4,)"),
-    (put(FRICTION, np.full(2, 0.5)), FRICTION, "shape (2,)"),
     (put(FRICTION, np.array([0.5, 0.5, -0.1])), FRICTION, "-0.1 at index 2"),
-    (put("contact/edge", np.ones(2)), "contact/edge", "shape (2,)"),
     (put("contact/edge", np.array([0, 1, 2])), "contact/edge", "2"),
-    (put("contact/dofs", np.array([[0, 1.5, 2]] * 3)), "contact/dofs", "1.5"),
-    (poke("contact/dofs", (0, 1), 7), "contact/dofs", "7 at index 0, 1"),
     (poke("contact/dofs", (0, 1), 4), "contact/dofs", "index 4 is used twice"),
     (poke("contact/dofs", (2, 0), -1), "contact/dofs", "pair 2 has no direction"),
-    (poke("contact/normal_load", 1, -3.0), "contact/normal_load", "-3.0 at index 1"),
     (put("contact/surface", ["a", "b"]), "contact/surface", "2 labels"),
-    (put("contact/surface", np.arange(3)), "contact/surface", "type"),
     (put("contact/surface", np.array([b"\xff\xfe", b"a", b"b"])), "contact/surface", "UTF-8"),
     (put("response/names", ["a", "b", "c"]), "response/dofs", "shape (2, 7)"),
-    (put("response/names", ["a", "a"]), "response/names", "more than once"),
-    (put("response/names", np.array([], dtype="S1")), "response/names", "no name"),
     (put("response/dofs", np.array([0, 7])), "response/dofs", "7"),
-    (external, "mass", "link"),
     (soft, "mass", "link"),
-    (external_storage, "mass", "another file"),
-    (virtual, "mass", "another file"),
-    (huge, "mass", "1000000"),
     (attribute("nodal_diameter", 1), "nodal_diameter", "1"),
 ]
 
 WRONG_MESH: list[tuple[Change, str, str]] = [
     (drop("mesh/y"), "mesh/y", "missing"),
-    (put("mesh/z", np.zeros(5)), "mesh/z", "shape (5,)"),
     (poke("mesh/x", 1, np.nan), "mesh/x", "not finite"),
     (put("mesh/quad", np.zeros((2, 3), dtype=int)), "mesh/quad", "shape (2, 3)"),
-    (poke("mesh/quad", (1, 2), 6), "mesh/quad", "6"),
     (put("mesh/quad", np.full((2, 4), 0.5)), "mesh/quad", "0.5"),
     (put("mesh/part", ["blade"]), "mesh/part", "1 labels"),
-    (put("mesh/node", np.zeros(3)), "mesh/node", "unknown dataset"),
 ]
 
 WRONG_SECTOR: list[tuple[Change, str, str]] = [
     (not_hermitian, "nd/2/stiffness", "not Hermitian"),
-    (drop("nd/2/mass"), "nd/2/mass", "missing"),
     (drop("nd/2"), "nd/2", "missing"),
-    (drop("nd/0/response/names"), "response/names", "missing"),
     (put("nd/2/response/names", ["tip", "other"]), "nd/2/response/names", "tip, other"),
-    (put("mass", np.eye(7)), "mass", "unknown dataset"),
     (poke("nd/2/load/harmonic", 0, np.nan), "nd/2/load/harmonic", "nan"),
     (put("nd/0/stiffness", linear_model(8, hermitian=True, seed=4).stiffness), "nd/0/stiffness", "complex"),
     (lambda file: file.copy("nd/2", "nd/4"), "nd/4", "6 sectors"),
     (attribute("n_sectors", None), "n_sectors", "missing"),
-    (attribute("nodal_diameter", None), "nodal_diameter", "missing"),
     (attribute("n_sectors", -6), "n_sectors", "-6"),
-    (attribute("n_sectors", "six"), "n_sectors", "six"),
     (attribute("nodal_diameter", 1), "nd/1", "missing"),
 ]
 
@@ -201,10 +147,3 @@ def test_a_file_that_is_no_hdf5_or_damaged_is_said_so(tmp_path):
         with pytest.raises(SceneError, match=r"scene\.h5") as caught:
             read_scene(path)
         assert caught.value.key == "model"
-
-
-def test_a_missing_file_and_a_folder_are_the_systems_errors(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        read_scene(tmp_path / "none.h5")
-    with pytest.raises(IsADirectoryError):
-        read_scene(tmp_path)

@@ -66,7 +66,7 @@ class FakedBlocks:
         ended = Failure(self.fails.get(block.name, Outcome.CONVERGED), "")
         slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
         return BlockRun(
-            ended, cycles * rate, slope, response.astype(complex), 1.5 * response, 1e-3, like=Like((), 1.0, 1),
+            ended, cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, like=Like((), 1.0, 1),
             iterations=7,
         )  # fmt: skip
 

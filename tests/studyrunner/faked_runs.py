@@ -5,12 +5,9 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from studyrunner import task_runs
-from studyrunner.plan.results import Keep, MarchResult, StartResult
-from studyrunner.plan.tasks import BranchTask, MarchTask
+from studyrunner.kinds.task import Keep, Result, Task
 from studyrunner.scene.scene import describe_scene
 from tests.studyrunner.fakes import fake_evaluate
-
-Task = BranchTask | MarchTask
 
 SMALL = [
     "sdof_slider",
@@ -30,12 +27,11 @@ class Solver:
         self.n_results = 0
         self.disturb: Callable[[Task, int], None] = lambda *_: None
 
-        def build_fake(model: object, *_: object) -> Callable[..., Iterator[StartResult | MarchResult]]:
-            return lambda task, keep: self.evaluate(model, task, keep)
+        monkeypatch.setattr(
+            task_runs, "compute_task", lambda task, models, keep: self.evaluate(models[task.scenes[0]], task, keep)
+        )
 
-        monkeypatch.setattr(task_runs, "build_evaluator", build_fake)
-
-    def evaluate(self, model: object, task: Task, keep: Keep) -> Iterator[StartResult | MarchResult]:
+    def evaluate(self, model: object, task: Task, keep: Keep) -> Iterator[Result]:
         self.tasks.append(task)
         for result in fake_evaluate(task, keep, describe_scene(model)):
             self.n_results += 1

@@ -11,13 +11,10 @@ from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
-from studyrunner.plan.identity import Identities, hash_of_kind
-from studyrunner.plan.results import Keep, MarchResult, StartResult
-from studyrunner.plan.sharing import Index
-from studyrunner.plan.tasks import BranchTask, MarchTask, TaskPlan
+from studyrunner.kinds.task import Identity, Index, Keep, PointResult, Result, StartResult, Task, TaskPlan, digest
+from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
-from studyrunner.task_progress import start_marches
 from studyrunner.variables import ASKED, KEPT, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 FACTS = SceneFacts(
@@ -30,32 +27,32 @@ FACTS = SceneFacts(
 )
 
 
-def no_keep(progress: Packed) -> None:
+def no_keep(progress: Packed | str) -> None:
     """Progress that nobody keeps."""
 
 
 def fake_evaluate(
-    task: BranchTask | MarchTask, keep: Keep = no_keep, facts: SceneFacts = FACTS, seconds: float = 0.0
-) -> Iterator[StartResult | MarchResult]:
-    """Results that depend on everything in the task but its cost; a march takes up to `seconds`, unevenly."""
-    if isinstance(task, BranchTask):
-        yield from fake_branch(task)
+    task: Task, keep: Keep = no_keep, facts: SceneFacts = FACTS, seconds: float = 0.0
+) -> Iterator[Result]:
+    """Results that depend on everything in the task but its cost; a history takes up to `seconds`, unevenly."""
+    if isinstance(task, Sweep):
+        yield from fake_sweep(task)
     else:
-        for place in range(task.n_results):
-            yield fake_march(task, facts, 0.0 if place else seconds, place)
+        assert isinstance(task, History)
+        for place in task.places:
+            yield fake_history(task, facts, 0.0 if place else seconds, place)
 
 
-def fake_branch(task: BranchTask) -> Iterator[StartResult]:
+def fake_sweep(task: Sweep) -> Iterator[StartResult]:
     """Start states in the order of the sweep, those that are known left out."""
     given = (task.settings.harmonics, task.settings.samples, task.settings.tolerance, task.settings.rtol)
     settings = tuple(0.5 if value == "auto" else value for value in given)
-    for position in task.order:
-        if position not in task.known:
-            start = (task.frequencies[position], task.excitation_amplitude, task.sweep == "up", *settings)
-            yield StartResult(position, Packed("fake", (np.array(start),)), moves=position % 2 == 0, n_unknowns=18)
+    for place in task.places:
+        start = (task.frequencies[place], task.excitation_amplitude, task.direction == "up", *settings)
+        yield StartResult(place, Packed("fake", (np.array(start),)), moves=place % 2 == 0, n_unknowns=18)
 
 
-def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> MarchResult:
+def fake_history(task: History, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> PointResult:
     """A history whose values tell which of the task it is."""
     scaled = task.histories[place]
     fingerprint = float(np.dot(task.start.arrays[0], [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0, 1.0]))
@@ -79,29 +76,41 @@ def fake_march(task: MarchTask, facts: SceneFacts = FACTS, seconds: float = 0.0,
     totals |= dict.fromkeys(("jump_cycle", "cycles_to_target", "cycles_to_target_error", "fold_frequency"), np.nan)
     totals |= {"step_limit": np.inf, "last_cycle": task.cycles[-1], "newton_iterations": round(fingerprint)}
     totals |= {"run_time": pause, "error_estimate": 0.01, "largest_wear_depth": 1e-6, "message": ""}
-    return MarchResult(scaled.points, {**values, **totals}, place)
+    return PointResult(scaled.points, {**values, **totals}, place)
 
 
-def changed(result: MarchResult, **values: object) -> MarchResult:
+def changed(result: PointResult, **values: object) -> PointResult:
     """The result with other values of some variables."""
     assert values.keys() <= result.values.keys()
     return replace(result, values={**result.values, **values})
 
 
-def fake_histories(plan: TaskPlan) -> Iterator[tuple[MarchTask, MarchResult]]:
-    """The results of all marches of a study."""
-    for branch in plan.branches:
-        for task in fake_starts(plan, branch.number):
-            for place in range(task.n_results):
-                yield task, fake_march(task, place=place)
+def started(plan: TaskPlan) -> list[History]:
+    """All histories of a plan with their start states."""
+    return [
+        task.from_start(start)
+        for sweep in plan.sweeps
+        for start in fake_sweep(sweep)
+        for task in plan.waiting[sweep.number, start.place]
+    ]
 
 
-def totals_of(result: MarchResult, *names: str) -> list[float]:
+def fake_histories(plan: TaskPlan) -> Iterator[tuple[History, PointResult]]:
+    """The results of all histories of a study, with their tasks."""
+    return ((task, fake_history(task, place=place)) for task in started(plan) for place in task.order)
+
+
+def points_of(task: Task) -> list[Index]:
+    """All points that get a result from a task."""
+    return [point for place in task.order for point in task.points(place)]
+
+
+def totals_of(result: PointResult, *names: str) -> list[float]:
     """Values of some variables without further dimensions."""
     return [result.values[name] for name in names]
 
 
-def without_values(result: MarchResult, outcome: int) -> MarchResult:
+def without_values(result: PointResult, outcome: int) -> PointResult:
     """The result as it is where there is no state: NaN, or 0 where the variable is a whole number."""
     values = {
         name: np.full_like(array, np.nan if array.dtype.kind == "f" else 0)
@@ -117,36 +126,21 @@ def open_completion(
 ) -> CompletionIndex:
     """What is in the file of a study; its store is to be closed."""
     kind = record_type(study, facts)
-    identities = Identities(facts.digest, hash_of_kind(kind.descr))
-    completion = CompletionIndex(plan, identities, Store(path), kind)
+    completion = CompletionIndex(plan, Identity((facts.digest,), digest(repr(kind.descr))), Store(path), kind)
     if fresh:
         completion.forget_all()
     return completion
 
 
 def fake_completion(
-    study: Study, plan: TaskPlan, results: Iterable[MarchResult], path: Path, facts: SceneFacts = FACTS
+    study: Study, plan: TaskPlan, results: Iterable[PointResult], path: Path, facts: SceneFacts = FACTS
 ) -> CompletionIndex:
     """The file of a run that had these results and no others, some in a transaction."""
-    marches = march_of_points(plan)
     completion = open_completion(study, plan, path, facts, fresh=True)
-    for place, result in enumerate(results):
-        completion.add_history(marches[result.points], result)
-        if place % 3 == 0:
+    tasks = {task.points(place): task for task in completion.plan.results for place in task.order}
+    for number, result in enumerate(results):
+        completion.add(tasks[result.points], result)
+        if number % 3 == 0:
             completion.store.flush()
     completion.store.flush()
     return completion
-
-
-def march_of_points(plan: TaskPlan) -> dict[tuple[Index, ...], MarchTask]:
-    """The march of each history, which is known by its points."""
-    return {scaled.points: task for line in plan.marches for task in line for scaled in task.histories}
-
-
-def fake_starts(plan: TaskPlan, branch: int) -> list[MarchTask]:
-    """All marches of a branch with their start states."""
-    return [
-        march
-        for started in fake_branch(plan.branches[branch])
-        for march in start_marches(plan.marches_from(branch, started.position), started)
-    ]

@@ -18,8 +18,7 @@ from scipy.stats import norm, qmc
 from solver.outcome import Outcome
 from studyrunner.checkpoint.records import variable_sizes
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.plan.results import MarchResult
-from studyrunner.plan.sharing import Index
+from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates, scene_arrays
 from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.result.view import Result, open_for_report
@@ -350,7 +349,7 @@ def made_result(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Inde
 
 
 def build_dataset(
-    study: Study, facts: SceneFacts, results: Sequence[MarchResult], of_scene: Sequence[SceneVariable] = ()
+    study: Study, facts: SceneFacts, results: Sequence[PointResult], of_scene: Sequence[SceneVariable] = ()
 ) -> xr.Dataset:
     """The result of a study: axes in the order of the study, then cycle, then contact or response."""
     axes, sizes = study.dimensions, variable_sizes(study, facts)

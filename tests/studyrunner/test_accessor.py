@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from solver.outcome import Outcome
 from studyrunner.accessor import find_grid, join_results
+from studyrunner.api import open_result
 from tests.studyrunner.results import build_file
 
 SURFACES = ("pressure side", "back")
@@ -146,12 +147,24 @@ def test_loop_is_closed(result):
 
 
 def test_loop_that_is_not_there_says_what_to_ask_for(result):
-    with pytest.raises(ValueError, match=r"holds no loops; ask for it by \[outputs\] loops = \[7\]\."):
-        result.drop_vars(["loop_force", "loop_displacement"]).fretwear.loop(PAIR)
-    with pytest.raises(ValueError, match=r"holds no loop of contact pair 6; ask for it by \[outputs\] loops = \[6\]"):
-        result.fretwear.loop(6)
-    with pytest.raises(ValueError, match="no contact pair 99"):
-        result.fretwear.loop(99)
+    without = result.drop_vars(["loop_force", "loop_displacement"])
+    for dataset, pair in ((without, 7), (result, 6), (result, 99)):
+        with pytest.raises(ValueError, match=rf"no loop of contact pair {pair}; .* \[outputs\] loops = \[{pair}\]"):
+            dataset.fretwear.loop(pair)
+
+
+def test_an_opened_result_holds_the_loops_that_were_asked_for_alone(result, tmp_path):
+    result.attrs["study"] += f"[outputs]\nloops = [{PAIR}]\n"
+    result.to_netcdf(tmp_path / "out.nc")
+    with open_result(tmp_path / "out.nc") as opened:
+        assert opened["loop_force"].dims == ("frequency", "scheme", "cycle", "loop_contact", "phase", "component")
+        assert opened["loop_contact"].values.tolist() == [PAIR]
+        assert opened.fretwear.loop(PAIR).equals(
+            result.fretwear.loop(PAIR)
+            .drop_vars([name for name in result.coords if name.startswith("contact_")])
+            .rename(contact="loop_contact")
+        )
+        assert opened.fretwear.outcomes().values.tolist() == [["converged"] * 2] * 3
 
 
 def test_parts_of_a_result_make_the_result_again(result, tmp_path):
@@ -204,12 +217,6 @@ def test_what_cannot_be_joined_is_refused(result):
         join_results([result, result.assign_coords(contact_x=2 * result.contact_x)])
     with pytest.raises(ValueError, match="gravity is not one value in the study of 'A study'"):
         join_results([result, result], dim="gravity")
-
-
-@pytest.mark.parametrize("study", ["a = " + "[" * 50_000, "a = " + "9" * 6000, "= nonsense", "a = 1"])
-def test_a_study_that_is_none_is_not_joined(study, result):
-    with pytest.raises(ValueError, match="study"):
-        join_results([result.assign_attrs(study=study)], dim="friction_coefficient")
 
 
 def test_points_of_no_result_are_marked(result):

@@ -69,27 +69,15 @@ def test_a_truncated_file(share, place, folder, refused):
         assert "result: " in refused(["result"], report.main)
 
 
-@pytest.mark.parametrize("command", [main, report.main])
-def test_a_file_that_claims_to_be_hdf5(command, folder, refused):
-    (folder / "result").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
-    assert "result: " in refused(["result"], command)
-
-
 def test_a_result_that_is_none(folder, refused):
     (folder / "result").write_bytes(b"CDF\x01" + bytes(100))
     assert "is no NetCDF file (NetCDF-4)" in refused(["result"], report.main)
     assert "there is none of this name" in refused(["none.nc"], report.main)
 
 
-def huge(file):
-    del file["mass"]
-    file.create_dataset("mass", (10**7, 10**7), "f8", chunks=(100, 100))
-
-
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (huge, "mass: shape (10000000, 10000000) is too large: reduce the model: all datasets together may take 2 GiB"),
         (poke("stiffness", (0, 0), np.nan), "stiffness"),
         (put("response/names", ["\x1b[31mred", "\x1b[31mred"]), r"\x1b[31mred"),
     ],

@@ -11,13 +11,12 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.store import Store
 from studyrunner.cli import main
+from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi import schedule
-from studyrunner.plan.tasks import BranchTask, MarchTask
 from tests.mpi.launching import count_entries, results
 from tests.studyrunner.faked_runs import SMALL
-from tests.studyrunner.fakes import fake_branch
+from tests.studyrunner.fakes import fake_sweep
 
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.processes]
 
@@ -68,38 +67,11 @@ def test_an_interrupt_in_any_task(at, solver, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("where", "at"), [("flush", 5), ("note_life", 3), ("put", 6)])
-def test_an_interrupt_anywhere_in_the_main_thread(where, at, solver, monkeypatch):
-    """Before and after each of the calls that change what is kept."""
-    expected = whole(solver)
-    own, n_calls = getattr(Store, where), 0
-
-    def called(store, *arguments, **named):
-        nonlocal n_calls
-        n_calls += 1
-        if n_calls == at:
-            raise KeyboardInterrupt
-        found = own(store, *arguments, **named)
-        if n_calls + 1 == at:
-            n_calls += 1
-            raise KeyboardInterrupt
-        return found
-
-    with monkeypatch.context() as changed:
-        changed.setattr(Store, where, called)
-        status = main(TWO_WAYS)
-    assert status == (130 if n_calls >= at else 0)
-    assert_partial(results(), expected)
-    assert main(TWO_WAYS) == 0
-    xr.testing.assert_identical(results(), expected)
-
-
-@pytest.mark.slow
 def test_an_exception_is_one_bad_point(solver, capsys):
     expected = whole(solver)
 
     def fail(task, _):
-        if isinstance(task, MarchTask) and (task.branch, task.position, task.wear_coefficient) == (1, 0, 1e-11):
+        if isinstance(task, History) and (task.sweep, task.position, task.wear_coefficient) == (1, 0, 1e-11):
             raise ZeroDivisionError("a bug in\nthe solver")
 
     solver.disturb = fail
@@ -134,13 +106,13 @@ def test_a_second_run_of_the_same_study_is_refused(solver, capsys, monkeypatch):
             second.append(main(TWO_WAYS))
 
     monkeypatch.setattr("studyrunner.cli.take_endings", lambda: None)
-    monkeypatch.setattr("studyrunner.checkpoint.database._SECONDS_TO_DIE", 0.1)
+    monkeypatch.setattr("studyrunner.checkpoint.store._SECONDS_TO_DIE", 0.1)
     solver.disturb = run_again
     assert main(TWO_WAYS) == 0
     assert second == [2]
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study:")]
     assert "out.nc.progress: in use: by process" in line
-    assert "another run is writing there: wait for its end, or give another result file with -o" in line
+    assert "wait for its end, or give another result file with -o" in line
 
 
 @pytest.mark.slow
@@ -150,7 +122,7 @@ def test_progress_is_gone_on_from(solver, monkeypatch):
     evaluate = solver.evaluate
 
     def slow(model, task, keep):
-        if isinstance(task, MarchTask) and task.resume is None:
+        if isinstance(task, History) and task.resume is None:
             time.sleep(0.02)
             keep(Packed("half of it", (np.array([task.number]),)))
             raise KeyboardInterrupt
@@ -159,7 +131,7 @@ def test_progress_is_gone_on_from(solver, monkeypatch):
     monkeypatch.setattr(solver, "evaluate", slow)
     # each run comes as far as to the first half of one more march
     assert [main(TWO_WAYS) for _ in range(9)] == [130] * 8 + [0]
-    marches = [task for task in solver.tasks if isinstance(task, MarchTask)]
+    marches = [task for task in solver.tasks if isinstance(task, History)]
     assert len(marches) == 8
     assert all(task.resume == Packed("half of it", (np.array([task.number]),)) for task in marches)
     xr.testing.assert_identical(results(), expected)
@@ -172,21 +144,23 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver, monkeypatch):
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", -1.0)
     own, ended = solver.evaluate, False
 
-    def resuming(model, task, keep):
+    def resume(task, models, keep):
         nonlocal ended
-        if isinstance(task, MarchTask):
-            yield from own(model, task, keep)
-            return
         passed = 0 if task.resume is None else int(task.resume.arrays[0])
-        for place, start in enumerate(fake_branch(replace(task, known=frozenset()))):
-            if place >= passed and start.position not in task.known:
+        for number, start in enumerate(fake_sweep(replace(task, known=frozenset()))):
+            if number >= passed and start.place not in task.known:
                 yield start
-                if place == 1 and not ended:
+                if number == 1 and not ended:
                     ended = True
                     raise KeyboardInterrupt
-                keep(Packed("branch", (np.array(place + 1),)))
+                keep(Packed("sweep", (np.array(number + 1),)))
 
-    monkeypatch.setattr(solver, "evaluate", resuming)
+    monkeypatch.setattr(Sweep, "_compute", resume)
+    monkeypatch.setattr(
+        solver,
+        "evaluate",
+        lambda model, task, keep: task.compute({}, keep) if task.gives_starts else own(model, task, keep),
+    )
     assert main(TWO_WAYS) == 130
     assert count_entries("progress") > 0
     with contextlib.closing(sqlite3.connect("out.nc.progress")) as database, database:
@@ -199,7 +173,7 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver, monkeypatch):
 def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
     """With the solver itself: to the numbers of a march that had the time at once."""
     from solver.newton import run as newton
-    from studyrunner import evaluate
+    from studyrunner.kinds.wear import History
 
     study = [
         *("sdof_slider", "--set", "axes.frequency=[160]", "--set", "axes.scheme=['implicit']"),
@@ -207,12 +181,12 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
         *("--set", "axes.step=500"),
     ]
     assert main([*study, "-o", "whole.nc"]) == 0
-    own, begun = evaluate._solve, []
+    own, begun = History.integrate, []
     own_clock, n_looks = newton.computing_time, 0
 
-    def solve(model, task, *rest):
+    def integrate(task, *given):
         begun.append(task.resume)
-        return own(model, task, *rest)  # type: ignore[arg-type]
+        return own(task, *given)
 
     def clock():
         # the time is over in the midst of the march, however fast the machine is
@@ -220,7 +194,7 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
         n_looks += bool(begun)
         return np.inf if n_looks > 150 else own_clock()
 
-    monkeypatch.setattr(evaluate, "_solve", solve)
+    monkeypatch.setattr(History, "integrate", integrate)
     study += ["-o", "out.nc"]
     with monkeypatch.context() as slow:
         slow.setattr(newton, "computing_time", clock)
@@ -235,24 +209,3 @@ def test_a_march_that_was_given_up_goes_on_with_more_time(monkeypatch):
     # but for the limit, which stands in their attributes
     xr.testing.assert_equal(results(), results("whole.nc"))
     assert count_entries("progress") == 0
-
-
-def test_an_exception_on_a_branch_costs_what_lies_behind_it(solver):
-    expected = whole(solver)
-
-    def fail(task, _):
-        # the second state of the sweep upwards
-        if isinstance(task, BranchTask) and task.number == 0 and (place := seen.setdefault(id(task), 0)) < 2:
-            seen[id(task)] = place + 1
-            if place == 1:
-                raise ZeroDivisionError("a bug")
-
-    seen: dict[int, int] = {}
-    solver.disturb = fail
-    assert main(TWO_WAYS) in (0, 3)
-    assert len(solver.tasks) == 2 + 8
-    solver.begin_again()
-    assert main([*TWO_WAYS, "--retry-failed"]) == 0
-    assert [type(task) for task in solver.tasks][:1] == [BranchTask]
-    assert solver.n_results == 1 + 2 or solver.n_results == 1
-    xr.testing.assert_identical(results(), expected)

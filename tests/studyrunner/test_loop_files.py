@@ -8,12 +8,12 @@ import pytest
 
 from solver.results.loops import LOOP_PHASES
 from studyrunner import variables
-from studyrunner.plan.planning import build_tasks
+from studyrunner.kinds.kind import build_tasks
 from studyrunner.result.arrays import coordinates
 from studyrunner.result.write import write_result
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
-from tests.studyrunner.fakes import FACTS, changed, fake_march, fake_starts, open_completion, without_values
+from tests.studyrunner.fakes import FACTS, changed, fake_history, open_completion, started, without_values
 
 OVERRIDES = ("axes.frequency=[160, 150]", "axes.scheme=implicit", "slow_time.outputs=3")
 
@@ -31,8 +31,8 @@ def write(tmp_path):
         study = read_study("sdof_slider", (*OVERRIDES, f"outputs.loops={asked}", "outputs.variables=['worn_volume']"))
         plan = build_tasks(study, facts.n_displacements)
         completion = open_completion(study, plan, tmp_path / "parts", facts, fresh=True)
-        for task in fake_starts(plan, 0):
-            result = fake_march(task, facts)
+        for task in started(completion.plan):
+            result = fake_history(task, facts)
             if task.position == 1:
                 result = without_values(result, 6)
                 # noise does not shrink: what is on the disk is what was written
@@ -40,7 +40,7 @@ def write(tmp_path):
                 loops = {name: result.values[name].shape for name in variables.LOOPS if name in result.values}
                 noise = {name: np.random.default_rng(1).normal(size=shape) for name, shape in loops.items()}
                 result = changed(result, **noise)
-            completion.add_history(task, result)
+            completion.add(task, result)
         completion.store.flush()
         path = tmp_path / f"{n_contact}.nc"
         with contextlib.closing(completion.store):

@@ -7,9 +7,9 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from studyrunner.cli import main
+from studyrunner.kinds.wear import History, Sweep
+from studyrunner.mpi.cost_model import CostModel
 from studyrunner.mpi.dispatch import Dispatcher
-from studyrunner.plan.cost_model import CostModel
-from studyrunner.plan.tasks import BranchTask, MarchTask
 from tests.mpi.launching import results
 from tests.studyrunner.faked_runs import SMALL
 from tests.studyrunner.test_schedule import Job
@@ -35,7 +35,7 @@ def failing(error, n_times, kind):
 
 
 @pytest.mark.parametrize("error", FAULTS, ids=lambda error: type(error).__name__)
-@pytest.mark.parametrize("kind", [BranchTask, MarchTask])
+@pytest.mark.parametrize("kind", [Sweep, History])
 def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(error, kind, solver, capsys):
     assert main([*SMALL[:-1], "whole.nc"]) == 0
     solver.begin_again()
@@ -48,7 +48,7 @@ def test_a_task_that_a_fault_of_the_machine_has_ended_is_done_again(error, kind,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", [BranchTask, MarchTask])
+@pytest.mark.parametrize("kind", [Sweep, History])
 def test_a_fault_that_stays_is_never_a_result(kind, solver):
     assert main([*SMALL[:-1], "whole.nc"]) == 0
     solver.begin_again()

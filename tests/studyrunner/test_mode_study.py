@@ -7,12 +7,13 @@ import xarray as xr
 from solver import backbone
 from studies import build_scene
 from studyrunner.api import run_study
-from studyrunner.plan.planning import build_tasks
+from studyrunner.kinds.kind import build_tasks
 from studyrunner.report.contents import draw_report
 from studyrunner.report.page.page import write_page
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study, read_study
+from tests.studyrunner.fakes import points_of
 
 pytestmark = pytest.mark.slow
 
@@ -119,15 +120,9 @@ def test_points_of_a_line_share_a_task(study_file):
     study: Study = read_study(study_file, {"scene.worn.depth": [[0.0], [0.0]], "axes.sweep": ["up", "down"]})
     plan = build_tasks(study, 2)
     assert plan.n_points == 2 * 2 * 2 * 3 * 2
-    assert [branch.frequencies for branch in plan.branches] == [(1e-6, 1e-4, 1e-3)] * len(plan.branches)
-    points = [point for line in plan.marches for march in line for point in march.points]
+    assert [mode.amplitudes for mode in plan.results] == [(1e-6, 1e-4, 1e-3)] * len(plan.results)
+    points = [point for mode in plan.results for point in points_of(mode)]
     assert len(set(points)) == len(points) == plan.n_points
-
-
-def test_equal_ratios_end_where_they_are_told_to():
-    table = {"start": 1e-6, "stop": 1e-2, "num": 5, "spacing": "log"}
-    study = read_study("sdof_slider", {"axes.wear_coefficient": table})
-    assert study.axes.wear_coefficient == (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 
 
 def test_the_report_draws_frequency_and_damping(result, study_file, tmp_path):
@@ -143,4 +138,4 @@ def test_the_report_draws_frequency_and_damping(result, study_file, tmp_path):
     drawn = {line.get_label(): line.get_ydata() for line in lines}
     for label, values in zip(("mode 1, cycle 10\N{NO-BREAK SPACE}000", "mode 1, cycle 0"), found, strict=True):
         np.testing.assert_allclose(drawn[label], values[[1, 2, 0]])
-    shown.close()
+    shown.dataset.close()

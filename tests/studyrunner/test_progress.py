@@ -10,14 +10,14 @@ import pytest
 
 from studyrunner import task_runs
 from studyrunner.cli import main
-from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.results import StartResult
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.task import StartResult
 from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay, Standing
 from studyrunner.task_progress import TaskProgress
 from tests.benchmarks.simulation import MemoryIndex, Overheads, replay
-from tests.studyrunner.fakes import fake_branch, fake_evaluate, fake_march
+from tests.studyrunner.fakes import fake_evaluate, fake_history, fake_sweep
 
 LINE = re.compile(
     r"\[ *[\d.]+ (?:s|min|h)\] (?P<done>\d+) of (?P<all>\d+) points?, (?P<percent>\d+) %"
@@ -47,16 +47,15 @@ def test_a_line_every_half_minute_at_least(clock, capsys):
 
     def look():
         looks.append(clock.now)
-        return Standing(5, 20, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
+        return Standing(5, 20, 0.25, 3.0 * (clock.now - 1000.0), ("sweep up to 211 Hz", "210 Hz implicit"))
 
     with ProgressDisplay() as shown:
-        shown.say("marching")
-        shown.begin_tasks()
+        shown.say("computing")
         for tenth in range(36_000):
             clock.now = 1000.0 + 0.1 * tenth
             shown.tick(look)
     first, *lines = capsys.readouterr().err.splitlines()
-    assert first == "[    0 s] marching"
+    assert first == "[    0 s] computing"
     assert lines[0] == ("[    2 s] 5 of 20 points, 25 %, about 6 s left, running: sweep up to 211 Hz, 210 Hz implicit")
     gaps = [later - before for before, later in itertools.pairwise(looks)]
     assert len(lines) == len(looks)
@@ -81,11 +80,10 @@ def test_a_bar_on_a_terminal(clock, monkeypatch):
 
     def look():
         looks.append(clock.now)
-        return Standing(5, 20, 30.0, ("210 Hz implicit",))
+        return Standing(5, 20, 0.25, 30.0, ("210 Hz implicit",))
 
     with ProgressDisplay() as shown:
-        shown.say("marching")
-        shown.begin_tasks()
+        shown.say("computing")
         for _ in range(1000):
             clock.now += 0.01
             shown.tick(look)
@@ -98,21 +96,16 @@ def test_a_bar_on_a_terminal(clock, monkeypatch):
     assert 90 <= len(looks) <= 101
 
 
-def build_slow(model, *_):
-    """The stand-in for the solver; each start state and each march takes a while."""
-    facts = describe_scene(model)
-
-    def evaluate(task, keep):
-        for result in fake_evaluate(task, keep, facts):
-            time.sleep(0.15)
-            yield result
-
-    return evaluate
+def compute_slowly(task, models, keep):
+    """The stand-in for the solver; each start state and each history takes a while."""
+    for result in fake_evaluate(task, keep, describe_scene(models[0])):
+        time.sleep(0.15)
+        yield result
 
 
 @pytest.mark.parametrize("compiles", [True, False])
 def test_a_run_that_has_to_compile_says_so_once(compiles, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(task_runs, "build_evaluator", build_slow)
+    monkeypatch.setattr(task_runs, "compute_task", compute_slowly)
     numbers = itertools.count(3) if compiles else itertools.repeat(3)
     monkeypatch.setattr(task_runs, "n_compiled", lambda: next(numbers))
     assert main(["sdof_slider", "--set", "axes.frequency=100", "-o", str(tmp_path / "out.nc")]) == 0
@@ -129,16 +122,15 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
     plan = plan_of()
     progress = TaskProgress(MemoryIndex(plan))
     assert progress.look(()).seconds_left == pytest.approx(plan.cost)
-    marches = []
-    for branch in plan.branches:
-        for started in fake_branch(branch):
-            progress.costs.learn(branch.cost_keys, branch.cost_of(first=False), 1.0)
-            marches.extend(progress.take(branch, started))
-    assert progress.n_starts_left == 0
-    for number, task in enumerate(marches, start=1):
+    histories = []
+    for sweep in plan.sweeps:
+        for start in fake_sweep(sweep):
+            progress.costs.learn(sweep.cost_keys, sweep.cost_of(first=False), 1.0)
+            histories.extend(progress.take(sweep, start))
+    for number, task in enumerate(histories, start=1):
         progress.costs.learn(task.cost_keys, task.cost, 2.0 * task.cost)
-        progress.take(task, fake_march(task))
-        left = 2.0 * sum(march.cost for march in marches[number:])
+        progress.take(task, fake_history(task))
+        left = 2.0 * sum(history.cost for history in histories[number:])
         if number > 8:
             assert progress.look(()).seconds_left == pytest.approx(left, rel=0.3, abs=1e-9)
     assert progress.look(()).seconds_left == pytest.approx(0.0, abs=1e-9)
@@ -148,34 +140,48 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
 def test_tasks_that_run_count_for_the_time_left_and_are_named():
     plan = plan_of()
     progress = TaskProgress(MemoryIndex(plan))
-    up, down = plan.branches
-    (march, *_) = progress.take(up, next(iter(fake_branch(up))))
+    up, down = plan.sweeps
+    (history, *_) = progress.take(up, next(iter(fake_sweep(up))))
     all_of_it = progress.look(()).seconds_left
-    expected = march.cost
-    half = progress.look([(march, 1, 0.5 * expected)])
+    expected = history.cost
+    half = progress.look([(history, 1, 0.5 * expected)])
     assert half.seconds_left == pytest.approx(all_of_it - 0.5 * expected)
-    both = progress.look([(march, 1, 0.5 * expected), (down, down.n_results - 2, 0.0)])
+    both = progress.look([(history, 1, 0.5 * expected), (down, down.n_results - 2, 0.0)])
     assert both.seconds_left == pytest.approx(0.5 * half.seconds_left)
     assert half.running == ("1 Hz implicit",)
     # a sweep down that has given two states is on the way to the third
     assert both.running[1] == f"sweep down to {down.frequencies[-3]:.6g} Hz"
     # what is late is not over at once, and takes less than once more what it has taken
     alone = TaskProgress(MemoryIndex(plan))
-    assert 0.2e6 <= alone.look([(march, 1, 1e6)]).seconds_left <= 0.5e6
+    assert 0.2e6 <= alone.look([(history, 1, 1e6)]).seconds_left <= 0.5e6
+
+
+def test_the_time_left_of_a_task_follows_the_share_of_it_that_is_done():
+    """The task takes more than three times as long as it was expected to."""
+    progress = TaskProgress(MemoryIndex(plan_of()))
+    (task, *_) = progress.tasks
+    expected, true = 57.0, 190.0
+    left = []
+    for percent in range(0, 100, 5):
+        progress.keep(task, 0.01 * percent)
+        left.append(progress._still(task, expected, 0.01 * percent * true))
+    assert left[0] == expected
+    assert max(left) < 2.0 * expected
+    assert left[10:] == pytest.approx([0.01 * (100 - percent) * true for percent in range(50, 100, 5)])
 
 
 @pytest.mark.parametrize("n_ranks", [1, 3, 1000])
 def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks):
-    """Equal costs and no overheads: the time is that of the work, or of a branch and a march."""
+    """Equal costs and no overheads: the time is that of the work, or of a sweep and a history."""
     plan = plan_of()
 
-    def started(branch, position):
-        return StartResult(position, None, moves=True, n_unknowns=6), 1.0
+    def started(_, place):
+        return StartResult(place, None, moves=True, n_unknowns=6), 1.0
 
     found = replay(plan, started, lambda _: 10.0, n_ranks, Overheads(0.0, 0.0, 0.0))
-    n_starts, n_marches = 16, sum(len(line) for line in plan.marches)
+    n_starts, n_histories = 16, len(plan.results)
     assert found.n_unfinished == 0
-    assert found.work == pytest.approx(n_starts + 10.0 * n_marches)
+    assert found.work == pytest.approx(n_starts + 10.0 * n_histories)
     assert found.longest_way == pytest.approx(8.0 + 10.0)
     shortest = max(found.longest_way, found.work / n_ranks)
     assert shortest - 1e-9 <= found.makespan <= shortest + 10.0

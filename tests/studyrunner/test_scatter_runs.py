@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.plan.planning import build_tasks
+from studyrunner.kinds.kind import build_tasks
 from studyrunner.result.sample_coordinates import sample_coordinates
 from studyrunner.scene import drawn_contacts
 from studyrunner.scene.drawn_contacts import contact_changes, pair_values
@@ -61,7 +61,7 @@ def test_scatter_of_the_wear_coefficient_alone_is_one_history():
     given = (*CHEAP, "axes.scheme=adaptive", "scatter.samples=64", WEAR)
     study = read_study("sdof_slider", given)
     plan = build_tasks(study, 2)
-    assert (len(plan.branches), [len(line) for line in plan.marches]) == (1, [1])
+    assert (len(plan.sweeps), len(plan.results)) == (1, 1)
     (cause,) = plan.left_out
     assert cause.n_points == 63
     assert "adaptive" in cause.reason
@@ -159,7 +159,7 @@ def test_factors_of_surfaces_scatter():
     (drawn,) = draw_inputs(study).values()
     assert [dict(part.study.wear.surfaces or {})["support"] for part in realise(study)] == drawn.tolist()
     assert np.median(drawn) == pytest.approx(0.5, rel=0.15)
-    assert len(build_tasks(study, 2).branches) == 1, "all samples start from one state"
+    assert len(build_tasks(study, 2).sweeps) == 1, "all samples start from one state"
     Path("again.toml").write_text(format_study(study), encoding="utf-8")
     assert format_study(read_study("again.toml")) == format_study(study)
 

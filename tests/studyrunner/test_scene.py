@@ -11,9 +11,8 @@ from solver.model import ReducedModel, needed_nodal_diameters
 from studies import build_scene
 from studies.scene_file import write_scene
 from studyrunner.cli import main
+from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
-from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.tasks import BranchTask
 from studyrunner.scene.scene import (
     AUTOMATIC_HARMONICS_OF_A_WAVE,
     build_study_scene,
@@ -136,7 +135,7 @@ class Sent:
 
     def __init__(self, folder):
         study = read_study("sdof_slider", [f"axes.stiffness={list(STIFFNESSES)}"])
-        self.branches = {branch.joint.scene: branch for branch in build_tasks(study, 2).branches}
+        self.sweeps = {sweep.joint.scene: sweep for sweep in build_tasks(study, 2).sweeps}
         self.models = [build_scene("sdof_slider", stiffness=stiffness) for stiffness in STIFFNESSES]
         self.read: list[int] = []
         self._handed = SceneModels(self._read, {0, 1}, folder / "out.nc.progress")
@@ -146,8 +145,7 @@ class Sent:
         return self.models[scene]
 
     def __call__(self, rank, scene):
-        task = self._handed.with_model(rank, self.branches[scene])
-        assert isinstance(task, BranchTask)
+        task = self._handed.with_model(rank, self.sweeps[scene])
         return task.models[0] if task.models else None
 
 

@@ -9,7 +9,8 @@ import pytest
 import xarray as xr
 
 from studyrunner.cli import main
-from studyrunner.plan.planning import build_tasks
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.result.opening import open_known
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
@@ -76,11 +77,39 @@ def test_a_key_that_changes_the_scene_is_studies_with_these_scenes():
 
 
 @pytest.mark.slow
+def test_ratios_are_frequencies_of_each_scene():
+    """Of two chains whose natural frequencies differ: to the last bit the points of studies in Hz."""
+    given = (
+        "axes.excitation_amplitude=20",
+        "axes.mass_1=[1.0, 2.0]",
+        "slow_time.cycles=0",
+        "outputs.variables=['response_peak']",
+    )
+    Path("s.toml").write_text(
+        '[study]\nname = "s"\n[scene]\nmodel = "two_masses"\n[axes]\nfrequency_ratio = [0.8, 1.1]\n', encoding="utf-8"
+    )
+    assert main(["s.toml", "--plan"]) == 0
+    whole = compute("s.toml", "whole.nc", *given)
+    assert whole.frequency.dims == ("frequency_ratio", "mass_1")
+    np.testing.assert_array_equal(whole.frequency, whole.frequency_ratio * whole.stuck_frequency)
+    assert open_known("whole.nc").frequency.equals(whole.frequency)
+    assert np.ptp(whole.stuck_frequency.values) > 0.02
+    xr.testing.assert_identical(compute("whole.nc", "again.nc").drop_attrs(), whole.drop_attrs())
+    for mass in (1.0, 2.0):
+        hertz = whole.frequency.sel(mass_1=mass).values.tolist()
+        text = '[study]\nname = "h"\n[scene]\nmodel = "two_masses"\n[axes]\n'
+        Path("h.toml").write_text(f"{text}frequency = {hertz}\n", encoding="utf-8")
+        alone = compute("h.toml", f"{mass}.nc", *given[:1], f"axes.mass_1={mass}", *given[2:])
+        for name in ("outcome", "response_peak", "newton_iterations"):
+            np.testing.assert_array_equal(whole[name].sel(mass_1=mass), alone[name].squeeze("mass_1"))
+
+
+@pytest.mark.slow
 def test_thresholds_share_start_states():
     law = ("wear.law=threshold", "axes.threshold=[0, 5, 1e9]")
     plan = build_tasks(read_study("sdof_slider", [*CHEAP, *law]), 2)
-    assert len(plan.branches) == 1
-    assert len(plan.marches[0]) == 3
+    assert len(plan.sweeps) == 1
+    assert len(plan.results) == 3
     whole = compute("sdof_slider", "whole.nc", *CHEAP, *law)
     assert whole.threshold.attrs["units"] == "J/m2"
     volume = whole.worn_volume.isel(cycle=-1).squeeze().values

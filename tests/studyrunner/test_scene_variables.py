@@ -8,7 +8,7 @@ import xarray as xr
 
 from studies.finite_element.joint.reduction import GluedStructureError, Reduction
 from studyrunner.cli import main
-from studyrunner.plan.planning import build_tasks
+from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
 from studyrunner.scene import computed
 from studyrunner.scene.scene import build_study_scene

@@ -7,21 +7,20 @@ from dataclasses import dataclass
 import pytest
 
 from studyrunner.mpi import dispatch
+from studyrunner.mpi.cost_model import CostModel
 from studyrunner.mpi.dispatch import Dispatcher
-from studyrunner.mpi.launcher import LauncherError, launcher_rank, launcher_size
-from studyrunner.mpi.ranks import Alone, start_ranks
-from studyrunner.mpi.schedule import Handlers, serve_tasks
-from studyrunner.plan.cost_model import CostModel
+from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_size, start_ranks
+from studyrunner.mpi.schedule import Office, serve_tasks
 
 
-def take_nothing(job, result):
-    return []
+class Tasks(Office):
+    def __init__(self, tasks, take):
+        self.begin = lambda: tasks
+        self.take = take
 
 
-def serve(tasks, run, take=take_nothing):
-    costs = CostModel()
-    serve_tasks(Alone(), tasks, lambda job, _: run(job), Handlers(take), costs)
-    return costs
+def serve(tasks, run, take=lambda *_: []):
+    serve_tasks(Ranks(), Tasks(tasks, take), lambda job, _: run(job))
 
 
 def test_long_tasks_go_first_and_results_make_new_ones():
@@ -34,7 +33,7 @@ def test_long_tasks_go_first_and_results_make_new_ones():
         done.append((job.kind, result))
         return [Job("a1", 1e5), Job("a2", 1e6)] if job.kind == "a" else []
 
-    serve([Job("b", 10.0), Job("a", 1.0, opens_others=True)], run, take)
+    serve([Job("b", 10.0), Job("a", 1.0, gives_starts=True)], run, take)
     assert done == [("a", "A"), ("a2", "A2"), ("a1", "A1"), ("b", "B")]
 
 
@@ -89,7 +88,7 @@ class Job:
     kind: str
     cost: float
     n_results: int = 1
-    opens_others: bool = False
+    gives_starts: bool = False
 
     def cost_of(self, *, first):
         del first
@@ -130,10 +129,10 @@ def test_what_waits_is_bounded(monkeypatch):
         ((rank, assignment),) = dispatcher.assign()
         for _ in range(assignment.task.n_results):
             dispatcher.deliver(rank, assignment.number, 1.0)
-            if assignment.task.opens_others:
+            if assignment.task.gives_starts:
                 dispatcher.add([Job("march", 1.0)])
                 held += 1
-        if not assignment.task.opens_others:
+        if not assignment.task.gives_starts:
             n_done, held = n_done + 1, held - 1
         most = max(most, held)
     assert (n_done, held) == (200, 0)

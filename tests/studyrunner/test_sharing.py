@@ -15,12 +15,12 @@ from solver.outcome import Outcome
 from solver.packing import pack
 from solver.results.history import StartState
 from solver.settings import Resolution
-from studyrunner.history_result import build_result
-from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.sharing import ScaledHistory, describe_left_out, march_counts, share_histories
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.sharing import ScaledHistory, counts_of, describe_left_out, share_histories
+from studyrunner.kinds.wear_result import build_result
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
-from tests.studyrunner.fakes import totals_of
+from tests.studyrunner.fakes import points_of, totals_of
 from tests.studyrunner.histories import history
 
 WEARS = ["0", "1e-12", "2e-12", "3e-12", "1e-11", "1.5e-11"]
@@ -65,24 +65,24 @@ def alike(study, wears, steps, one, other):
 def test_histories_are_shared_where_they_are_the_same(wears, steps, schemes, by_depth):
     overrides = ["slow_time.largest_depth=1e-6"] if by_depth else []
     study = study_with(wears, steps, schemes, *overrides)
-    sharing = share_histories(study)
-    march_of = {
+    tasks, causes = share_histories(study)
+    task_of = {
         choice: number
-        for number, found in enumerate(sharing.marches)
+        for number, found in enumerate(tasks)
         for choice in itertools.chain.from_iterable(found.histories)
     }
     choices = list(itertools.product(*(range(len(axis)) for axis in (wears, steps, schemes))))
-    assert sorted(march_of) == choices
+    assert sorted(task_of) == choices
     exact = [[Fraction(text) for text in axis] for axis in (wears, steps)]
     for one, other in itertools.combinations(choices, 2):
-        assert (march_of[one] == march_of[other]) == alike(study, *exact, one, other)
-    assert sum(item.n_points for item in describe_left_out(sharing.causes)) == len(choices) - len(sharing.marches)
-    for found in sharing.marches:
+        assert (task_of[one] == task_of[other]) == alike(study, *exact, one, other)
+    assert sum(item.n_points for item in describe_left_out(causes)) == len(choices) - len(tasks)
+    for found in tasks:
         by_history = [{study.axes.wear_coefficient[wear] for wear, _, _ in scaled} for scaled in found.histories]
         assert all(len(of_one) == 1 for of_one in by_history)
         descending = [min(of_one) for of_one in by_history]
         assert descending == sorted(descending, reverse=True)
-        assert found.held == (descending[0] == 0.0)
+        assert found.unworn == (descending[0] == 0.0)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_histories_are_shared_where_they_are_the_same(wears, steps, schemes, by_
     [
         (("axes.wear_coefficient=[0, 1e-11]", "axes.step=[1, 2, 3]"), {"wear_coefficient = 0": 5}),
         (("axes.step=[1, 2, 3]", "axes.scheme=['adaptive', 'implicit']"), {"the adaptive scheme chooses": 2}),
-        (("axes.wear_coefficient=[1e-12, 2e-12]", "axes.scheme=adaptive"), {"the adaptive scheme takes the same": 1}),
+        (("axes.wear_coefficient=[1e-12, 2e-12]", "axes.scheme=adaptive"), {"the adaptive scheme chooses": 1}),
         (("axes.wear_coefficient=[1e-12, 2e-12]", "axes.step=[100, 200]"), {"wear_coefficient times step": 2}),
         (("axes.step=[1, 2]", "axes.scheme=adaptive", "slow_time.cycles=0"), {"only the unworn states": 1}),
         (("axes.wear_coefficient=[1e-12, 2e-12]", "axes.step=[100, 201]"), {}),
@@ -111,15 +111,15 @@ def test_counts_at_the_ends_of_steps_belong_to_the_step_that_ends_there(faster, 
     own = ScaledHistory(1e-12 * faster, step, ((0,),))
     other = ScaledHistory(1e-12 * slower, step * faster / slower, ((1,),))
     cycles = tuple(n * other.step for n in sorted(set(whole)))
-    counts = march_counts(cycles, other, own, steps_of_given_length=True)
+    counts = counts_of(cycles, other, own, steps_of_given_length=True)
     for n, count in zip(sorted(set(whole)), counts, strict=True):
         assert n - 1 < count / step <= n * (1.0 - 5e-13)
         assert count / step == pytest.approx(n, rel=2e-12)
-    assert march_counts(cycles, own, own, steps_of_given_length=True) == cycles
+    assert counts_of(cycles, own, own, steps_of_given_length=True) == cycles
 
 
 @pytest.mark.parametrize(
-    ("overrides", "n_branches"),
+    ("overrides", "n_sweeps"),
     [
         ((), 1),
         (("solver.harmonics=auto",), 3),
@@ -129,32 +129,31 @@ def test_counts_at_the_ends_of_steps_belong_to_the_step_that_ends_there(faster, 
         (("axes.harmonics=[1, 'auto', 5]",), 5),
     ],
 )
-def test_rtol_shares_branches_where_nothing_uses_it(overrides, n_branches):
+def test_rtol_shares_sweeps_where_nothing_uses_it(overrides, n_sweeps):
     fixed = ("axes.rtol=[1e-3, 1e-2, 1e-1]", "axes.frequency=[150, 160]", "solver.harmonics=3", "solver.samples=64")
     plan = build_tasks(study_of(*fixed, "axes.wear_coefficient=[0, 1e-12, 1e-11]", *overrides), 2)
-    assert len(plan.branches) == n_branches
-    points = Counter(point for line in plan.marches for task in line for point in task.points)
+    assert len(plan.sweeps) == n_sweeps
+    points = Counter(point for task in plan.results for point in points_of(task))
     assert len(points) == points.total() == plan.n_points
-    n_marches = sum(len(line) for line in plan.marches)
-    assert sum(item.n_points for item in plan.left_out) == plan.n_points - n_marches
-    assert any(item.reason.startswith("rtol") for item in plan.left_out) == (n_branches in (1, 5))
+    assert sum(item.n_points for item in plan.left_out) == plan.n_points - len(plan.results)
+    assert any(item.reason.startswith("rtol") for item in plan.left_out) == (n_sweeps in (1, 5))
 
 
 def test_a_law_whose_rate_is_not_proportional_shares_no_other_wear_coefficient(monkeypatch):
     study = study_with(["0", "1e-12", "2e-12"], ["100", "200"], SCHEMES)
-    assert len(share_histories(study).marches) < 15
+    assert len(share_histories(study)[0]) < 15
     monkeypatch.setattr(Study, "wear_law", WearLaw("other", proportional=False))
-    sharing = share_histories(study)
+    tasks, causes = share_histories(study)
     # adaptive steps do not depend on the step axis, whatever the law is
-    assert len(sharing.marches) == 3 * (2 + 2 + 1)
-    for found in sharing.marches:
+    assert len(tasks) == 3 * (2 + 2 + 1)
+    for found in tasks:
         choices = list(itertools.chain.from_iterable(found.histories))
         assert len({wear for wear, _, _ in choices}) == 1
-        assert not found.held
-    left_out = {item.reason: item.n_points for item in describe_left_out(sharing.causes)}
+        assert not found.unworn
+    left_out = {item.reason: item.n_points for item in describe_left_out(causes)}
     assert list(left_out.values()) == [3]
     unworn = study_with(["0", "1e-12"], ["100", "200"], SCHEMES, "slow_time.cycles=0")
-    assert all(found.held for found in share_histories(unworn).marches)
+    assert all(found.unworn for found in share_histories(unworn)[0])
 
 
 ADAPTIVE = ("axes.wear_coefficient=[2e-12, 1e-11, 4e-12]", "axes.scheme=adaptive", "axes.step=[1, 2]")
@@ -164,7 +163,7 @@ COUNTS = [0.0, 2.0, 4.0, 5.0, 10.0]
 def shared_task(*overrides):
     """A march of three histories at cycles 0 and 10, which are read at 0, 10; 0, 4; 0, 2 cycles of the first."""
     study = study_of(*ADAPTIVE, "slow_time.cycles=10", "slow_time.outputs=2", *overrides)
-    ((task,),) = build_tasks(study, 2).marches
+    (task,) = build_tasks(study, 2).results
     start = StartState(Outcome.CONVERGED, None, 1.0, Resolution((1,), 64), 0.0, 0.0, 0, 0.0)
     return replace(task, start=pack(start))
 
@@ -204,9 +203,9 @@ def test_histories_of_a_march_that_ended_early_are_results_all_the_same(last, ou
         assert there == [True, last >= shared_task().counts(shared_task().histories[place])[-1]]
         assert result.values["error_estimate"] == pytest.approx(0.03 * result.values["worn_volume"][there][-1])
     # the message of the march counts its own cycles
-    assert found[0].message == "at cycle 9"
-    assert all(result.message == "" for result in found if result.outcome == 0)
-    assert all("at cycle 9" not in result.message for result in found[1:])
+    assert found[0].values["message"] == "at cycle 9"
+    assert all(result.values["message"] == "" for result in found if result.outcome == 0)
+    assert all("at cycle 9" not in result.values["message"] for result in found[1:])
 
 
 @pytest.mark.parametrize(
@@ -224,8 +223,8 @@ def test_a_scaled_history_is_inaccurate_by_its_own_counts(first, ended, expected
     found = replace(history(COUNTS, ended), inaccurate_from=first, inaccurate_in="wear rate", inaccurate_error=0.04)
     results = [build_result(shared_task(), replace(found, message="of it"), place) for place in range(3)]
     assert [result.outcome for result in results] == expected
-    assert results[0].message == "of it"
+    assert results[0].values["message"] == "of it"
     # 4 cycles of the integrated history are 10 of the second, 2 of them 10 of the third
     for result, slower in zip(results[1:], (0.4, 0.2), strict=True):
         said = f"from cycle {first / slower:.0f} on the wear rate is known to 4 % only"
-        assert result.message == (said if result.outcome else "")
+        assert result.values["message"] == (said if result.outcome else "")

@@ -167,6 +167,7 @@ def line_of(arguments, capsys):
         (["missing.toml"], ("missing.toml", "no such file")),
         (["unheard_of"], ("unheard_of", "dovetail")),
         (["."], (".", "folder")),
+        (["s.toml", "--from", "deck.inp"], ("command line", "--from", "--new NAME")),
         (["s.toml", "--bogus"], ("command line", "--bogus", "--help")),
         (["s.toml", "--set", "axes.step"], ("command line", "--set", "axes.step", "KEY=VALUE")),
         (["s.toml", "--set", "axes.step=[1,"], ("command line", "axes.step", "[1,", "TOML")),

@@ -167,7 +167,7 @@ def test_another_scene_or_solver_is_said_and_computed_all_the_same(slider, capsy
     monkeypatch.setattr(provenance, "solver_digest", lambda: "another")
     change(slider, lambda file: file["scene/contact/area"].write_direct(np.array([1.1e-4])))
     assert main(["slider.nc", "-o", "again.nc"]) == 0
-    warned = [line for line in capsys.readouterr().err.splitlines() if line.startswith("run-study: ")]
+    warned = [line for line in capsys.readouterr().err.splitlines() if "] slider.nc: " in line]
     assert len(warned) == 2
     assert "another scene" in warned[0]
     assert "computed by another solver" in warned[1]

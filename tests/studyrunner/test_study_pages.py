@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from studyrunner.cli import main
-from studyrunner.study.keys import key_table
+from studyrunner.study.keys import key_list
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.study.toml_text import format_toml, read_toml
 from tests.studies.fe_models.decks import SECTOR
@@ -56,9 +56,9 @@ def test_every_example_is_a_study(text, files, capsys):
         assert "points" in capsys.readouterr().out
 
 
-def test_the_table_of_keys_is_that_of_the_program():
+def test_the_list_of_keys_is_that_of_the_program():
     page = (ROOT / "studyrunner" / "STUDY_FILE.md").read_text("utf-8")
-    assert key_table() in page, "python -m studyrunner.study.keys"
+    assert key_list() in page, "python -m studyrunner.study.keys"
 
 
 def test_a_new_study_is_planned_and_its_comments_are_its_defaults(folder, capsys):
@@ -75,6 +75,12 @@ def test_a_new_study_is_planned_and_its_comments_are_its_defaults(folder, capsys
     assert format_study(read_study("shown.toml")) == format_study(study)
     Path("scatter.toml").write_text(body + ("[scatter]" + scatter).replace("\n# ", "\n"), encoding="utf-8")
     assert read_study("scatter.toml").dimensions["sample"] == tuple(range(16))
+    shutil.copy(SECTOR, "sector.inp")
+    assert main(["--new", "root", "--from", "sector.inp"]) == 0
+    assert read_study("root.toml").axes.frequency_ratio == (0.99, 1.0)
+    assert main(["root.toml", "--plan"]) == 0
+    assert main(["--new", "none", "--from", "none.inp"]) == 2
+    assert "none.inp: model: none.inp: there is no such file" in capsys.readouterr().err
     for name, words in (("wear", "there is such a file"), ("a/b", "without a slash")):
         assert main(["--new", name]) == 2
         assert re.fullmatch(f'run-study: command line: --new = "{name}": .*{words}.*\n', capsys.readouterr().err)

@@ -6,10 +6,10 @@ from collections import Counter
 import pytest
 
 from studyrunner.cli import main
-from studyrunner.plan.planning import build_tasks
-from studyrunner.plan.results import StartResult
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.task import StartResult
 from studyrunner.study.study_file import read_study
-from studyrunner.task_progress import start_marches
+from tests.studyrunner.fakes import points_of
 
 SHARED = ("axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.scheme=['adaptive', 'implicit', 'explicit']")
 GRID = (
@@ -29,64 +29,62 @@ def plan_of(*overrides):
 
 
 def assert_every_point_once(study, plan):
-    points = Counter(point for line in plan.marches for task in line for point in task.points)
+    points = Counter(point for task in plan.results for point in points_of(task))
     sizes = [len(values) for values in study.dimensions.values()]
     assert points == Counter(itertools.product(*(range(size) for size in sizes)))
     assert plan.n_points == len(points)
 
 
-def test_one_branch_a_line_of_frequencies():
+def test_one_sweep_along_a_line_of_frequencies():
     study, plan = plan_of(*GRID)
-    assert len(plan.branches) == 2 * 2 * 2
-    assert {branch.frequencies for branch in plan.branches} == {(150.0, 155.0, 160.0)}
-    lines = {(task.excitation_amplitude, task.sweep, task.settings.harmonics) for task in plan.branches}
+    assert len(plan.sweeps) == 2 * 2 * 2
+    assert {branch.frequencies for branch in plan.sweeps} == {(150.0, 155.0, 160.0)}
+    lines = {(task.excitation_amplitude, task.direction, task.settings.harmonics) for task in plan.sweeps}
     assert lines == set(itertools.product((1.0, 2.0), ("up", "down"), (1, 5)))
     assert_every_point_once(study, plan)
 
 
 def test_a_ramp_is_a_task_at_each_frequency():
-    """Nothing is serial in it: as many branches as points, and the marches of each from its only state."""
+    """Nothing is serial in it: as many ramps as points, and the histories of each from its only state."""
     study, plan = plan_of("axes.frequency=[160, 150, 155]", "axes.sweep=['ramp', 'up']", *SHARED)
-    ramps = [branch for branch in plan.branches if branch.sweep == "ramp"]
-    assert [branch.frequencies for branch in ramps] == [(150.0,), (155.0,), (160.0,)]
-    assert [branch.frequencies for branch in plan.branches if branch.sweep == "up"] == [(150.0, 155.0, 160.0)]
-    assert [branch.number for branch in plan.branches] == list(range(4))
-    assert all(0.0 < branch.cost < plan.branches[-1].cost for branch in ramps)
-    for branch in ramps:
-        assert branch.order == branch.order_left == (0,)
-        assert plan.marches[branch.number] == plan.marches_from(branch.number, 0) != ()
-    assert sum(item.n_points for item in plan.left_out) == plan.n_points - sum(len(line) for line in plan.marches)
+    ramps = [sweep for sweep in plan.sweeps if sweep.direction == "ramp"]
+    assert [sweep.frequencies for sweep in ramps] == [(150.0,), (155.0,), (160.0,)]
+    assert [sweep.frequencies for sweep in plan.sweeps if sweep.direction == "up"] == [(150.0, 155.0, 160.0)]
+    assert [sweep.number for sweep in plan.sweeps] == list(range(4))
+    assert all(0.0 < sweep.cost < plan.sweeps[-1].cost for sweep in ramps)
+    for sweep in ramps:
+        assert sweep.order == sweep.places == (0,)
+        assert {task.sweep for task in plan.waiting[sweep.number, 0]} == {sweep.number}
+    assert sum(item.n_points for item in plan.left_out) == plan.n_points - len(plan.results)
     assert_every_point_once(study, plan)
 
 
 def test_points_know_their_task():
     """The values at a point's index are those of its task and its branch, whatever the order on the axes."""
     study, plan = plan_of(*GRID, *SHARED, "axes.sweep=['up', 'ramp']")
-    assert any(len(task.histories) > 1 for task in plan.marches[0])
-    for branch, line in zip(plan.branches, plan.marches, strict=True):
-        for task in line:
-            assert task.branch == branch.number
-            for point in task.points:
-                values = {
-                    name: axis[place] for place, (name, axis) in zip(point, study.dimensions.items(), strict=True)
-                }
-                assert values["frequency"] == branch.frequencies[task.position]
-                assert values["excitation_amplitude"] == branch.excitation_amplitude
-                assert values["sweep"] == branch.sweep
-                assert values["harmonics"] == task.settings.harmonics == branch.settings.harmonics
-                (scaled,) = (scaled for scaled in task.histories if point in scaled.points)
-                assert values["wear_coefficient"] == scaled.wear_coefficient
-                if not task.held:
-                    assert values["scheme"] == task.scheme
-                    assert values["step"] == scaled.step or task.scheme == "adaptive"
+    assert any(len(task.histories) > 1 for task in plan.results)
+    for task in plan.results:
+        sweep = plan.sweeps[task.sweep]
+        for point in points_of(task):
+            values = {name: axis[place] for place, (name, axis) in zip(point, study.dimensions.items(), strict=True)}
+            assert values["frequency"] == sweep.frequencies[task.position] == task.frequency
+            assert values["excitation_amplitude"] == sweep.excitation_amplitude
+            assert values["sweep"] == sweep.direction
+            assert values["harmonics"] == task.settings.harmonics == sweep.settings.harmonics
+            (scaled,) = (scaled for scaled in task.histories if point in scaled.points)
+            assert values["wear_coefficient"] == scaled.wear_coefficient
+            if not task.unworn:
+                assert values["scheme"] == task.scheme
+                assert values["step"] == scaled.step or task.scheme == "adaptive"
 
 
-def test_marches_cost_little_and_go_last_where_nothing_moves():
+def test_histories_cost_little_and_go_last_where_nothing_moves():
     _, plan = plan_of("axes.frequency=[1, 2]", "axes.step=[100, 1000]", "axes.scheme=implicit")
-    planned = plan.marches_from(0, 0)
-    moving = start_marches(planned, StartResult(0, "state", moves=True, n_unknowns=planned[0].n_unknowns))
+    planned = plan.waiting[0, 0]
+    n_unknowns = planned[0].n_unknowns
+    moving = [task.from_start(StartResult(0, "state", moves=True, n_unknowns=n_unknowns)) for task in planned]
     short, long = sorted(moving, key=lambda task: task.cost)
-    resting = start_marches(planned, StartResult(0, "state", moves=False, n_unknowns=planned[0].n_unknowns))
+    resting = [task.from_start(StartResult(0, "state", moves=False, n_unknowns=n_unknowns)) for task in planned]
     assert (long.start, long.step, short.step) == ("state", 100.0, 1000.0)
     assert all(0.0 < task.cost < short.cost for task in resting)
     assert [task.cost for task in planned] == [long.cost, short.cost]
@@ -106,23 +104,14 @@ def printed_plan(overrides, capsys, study="sdof_slider"):
 def test_plan_is_printed(capsys):
     lines = printed_plan(GRID, capsys)
     assert lines["points"].startswith("192 = 3 frequency x 2 wear_coefficient")
-    assert lines["tasks"].startswith("128: 8 branches")
+    assert lines["tasks"] == "128: 24 start states by 8 sweeps, and 120 wear histories"
     assert lines["unknowns"].startswith("22 ")
     assert lines["left out"].startswith("72 points: wear_coefficient = 0")
-    assert lines["time"].endswith("on two, to a factor of two, if every point wears;")
-    assert lines["ranks"].startswith("up to about 4 ranks are efficient, with 32 tasks each; at least")
-    assert "ms or less a step" in lines["assumed"]
+    assert "on two" in lines["time"]
     assert "GB a rank" in lines["memory"]
-
-
-def test_the_plan_of_missions_says_what_is_serial(capsys):
-    lines = printed_plan([], capsys, "mission")
-    assert lines["tasks"] == "1: 1 mission history"
-    assert lines["serial"].startswith("one rank computes all of a history, one part after the other: its missions")
-    assert lines["ranks"].startswith("1 rank has work at most, one for each history; at least")
-    lines = printed_plan(["axes.wear_coefficient=[1e-14, 2e-14]"], capsys, "mission")
-    assert lines["tasks"] == "2: 2 mission histories, side by side on the ranks"
-    assert lines["ranks"].startswith("2 ranks have work at most")
+    missions = printed_plan(["axes.wear_coefficient=[1e-14, 2e-14]"], capsys, "mission")
+    assert missions["tasks"] == "2: 2 mission histories, each computed by one rank"
+    assert printed_plan([], capsys, "modes")["tasks"].endswith("points")
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ import pytest
 
 from solver.settings import WearTarget
 from studyrunner import run_study
-from studyrunner.plan.identity import Identities
-from studyrunner.plan.planning import build_tasks
+from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.task import Identity
 from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.fakes import FACTS
 
@@ -27,8 +27,8 @@ def test_a_history_is_known_by_its_law_and_a_start_state_is_not():
         ("slow_time.until={wear_depth = 1}",),
     ):
         study = study_with(*overrides)
-        plan, of = build_tasks(study, FACTS.n_displacements), Identities(FACTS.digest, "kind")
-        found.append((of.of_starts(plan.branches[0]), of.of_histories(plan.branches[0], plan.marches[0][0])))
+        plan, of = build_tasks(study, FACTS.n_displacements), Identity((FACTS.digest,), "kind")
+        found.append((plan.sweeps[0].names(of), plan.results[0].names(of)))
     assert len({starts for starts, _ in found}) == 1
     assert len({histories for _, histories in found}) == 4
 

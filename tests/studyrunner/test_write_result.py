@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from studyrunner.accessor import FretwearAccessor
-from studyrunner.plan.planning import build_tasks
+from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
 from studyrunner.result.arrays import coordinates, scene_arrays
 from studyrunner.result.paths import progress_file
@@ -19,7 +19,7 @@ from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
 from studyrunner.system import files
 from studyrunner.user_error import StorageError
-from tests.studyrunner.fakes import FACTS, fake_completion, fake_histories, fake_march, fake_starts, without_values
+from tests.studyrunner.fakes import FACTS, fake_completion, fake_histories, fake_history, started, without_values
 from tests.studyrunner.results import build_dataset, write_dataset
 
 OVERRIDES = (
@@ -158,7 +158,7 @@ def test_the_examples_of_readme_and_pages_run(tmp_path, monkeypatch):
     assert all(hasattr(FretwearAccessor, name) for name in re.findall(r"\.fretwear\.(\w+)", of_accessor))
     study = read_study("dovetail", ["axes.frequency=[1, 2, 3]", "outputs.loops=[]"])
     plan = build_tasks(study, FACTS.n_displacements)
-    write_study(study, [fake_march(task) for task in fake_starts(plan, 0)], tmp_path / "dovetail.nc")
+    write_study(study, [fake_history(task) for task in started(plan)], tmp_path / "dovetail.nc")
     monkeypatch.chdir(tmp_path)
     for page, code in zip(pages, (short, example), strict=False):
         exec(compile(code, page, "exec"), {})

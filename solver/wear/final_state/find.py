@@ -33,10 +33,9 @@ from solver.results.history import StartState, WearHistory
 from solver.results.verdict import judge
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
-from solver.wear.check import Checked, FullCheck, unstable_at_end, with_harmonics
-from solver.wear.final_state.active_set import NoActiveSetError, WornOff, wear_off
-from solver.wear.final_state.cooperation import failure
-from solver.wear.history import integrate_wear
+from solver.wear.check import FullCheck, unstable_at_end, with_harmonics
+from solver.wear.final_state.active_set import NoActiveSetError, WornOff, not_cooperative, wear_off
+from solver.wear.history import integrate_wear, of_state, reported
 from solver.wear.output import DenseOutput
 from solver.wear.solutions import SlowTime, begin_reference
 from solver.wear.state import WearState
@@ -56,17 +55,13 @@ def find_final_state(
 
     asked: `cycles` is a `ToTheEnd`; the scheme is used where the active set does not apply.
 
-    Returns
-    -------
-    WearHistory
-        `final_method` is the method. "active_set": the first output is the unworn state, the last output is the final
-        state with the count inf, and the outputs between are NaN. "march": the history of the scheme; the message gives
-        the reason and the result of the active set.
+    `final_method` of the history is the method. "active_set": the first output is the unworn state, the last output is
+    the final state with the count inf, and the outputs between are NaN. "march": the history of the scheme; the message
+    gives the reason and the result of the active set.
     """
     direct: WearHistory | None = None
-    reason, spent = "", 0.0
+    reason, began = "", computing_time()
     if start.state is not None:
-        began = computing_time()
         try:
             case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
             direct, reason = _directly(case, start, asked)
@@ -77,9 +72,9 @@ def find_final_state(
         except Exception as error:
             # the history is integrated instead
             reason = describe_error(error)
-        spent = computing_time() - began
     if direct is not None and not reason:
         return direct
+    spent = computing_time() - began
     integrated = integrate_wear(model, friction_coefficient, settings, start, asked, keep, resume)
     remark = f"no active set: {reason}" if reason else ""
     if direct is not None and direct.worn_volume[-1] > 0.0 and np.isfinite(integrated.worn_volume[-1]):
@@ -113,13 +108,10 @@ def _directly(case: Case, start: StartState, asked: SlowTime) -> tuple[WearHisto
     depth = found.final.state.depth
     # no depth is more accurate than the solution of the states
     error = np.abs(_reference_depth(work, start, found, share) - depth) + case.settings.tolerance * depth
-    history = _assembled(work, start, asked, found, error)
-    spent = replace(
-        history,
-        newton_iterations=start.newton_iterations + work.run.budget.iterations,
-        run_time=start.run_time + computing_time() - began,
-    )
-    return spent, found.reason
+    history = _assembled(work, start, asked.cycles.n_outputs, found, error)
+    iterations = start.newton_iterations + work.run.budget.iterations
+    run_time = start.run_time + computing_time() - began
+    return replace(history, newton_iterations=iterations, run_time=run_time), found.reason
 
 
 def _solved(work: WearingJoint, state: WearState, check: FullCheck, share: float) -> _Found:
@@ -127,25 +119,26 @@ def _solved(work: WearingJoint, state: WearState, check: FullCheck, share: float
     first = check(work, state)
     if isinstance(first, Failure):
         raise NoActiveSetError(f"{first.outcome.meaning} at the unworn state")
-    unworn, output = first.state, DenseOutput(work.area, None, smooth=False)
-    output.add(0.0, first.report, work.rate(unworn.point.evaluation), 0.0)
+    (unworn, report), output = first, DenseOutput(work.area, smooth=False)
+    output.add(0.0, report, work.rate(unworn.point.evaluation), 0.0)
     # the wear rate of the final state is round-off: its error is relative to the unworn state
     work.usual_work = float(unworn.point.evaluation.slip_work.sum())
     final = wear_off(work, unworn, unworn.depth, np.zeros(unworn.depth.size, bool), share)
-    reason = failure(work, unworn, final, share)
-    last: Checked | Failure = check(work, final.state)
+    reason = not_cooperative(work, unworn, final, share)
+    last = check(work, final.state)
     for _ in range(CONTINUATION.attempts):
-        if isinstance(last, Failure) or last.state.resolution == final.state.resolution:
+        if isinstance(last, Failure) or last[0].resolution == final.state.resolution:
             break
         # with other harmonics the pairs graze at other depths
-        final = wear_off(work, last.state, unworn.depth, final.off, share)
+        final = wear_off(work, last[0], unworn.depth, final.off, share)
         last = check(work, final.state)
     if isinstance(last, Failure):
         raise NoActiveSetError(f"its final state is {last.outcome.meaning}")
-    if (unstable := unstable_at_end(work, last.state)) is not None:
+    state, report = last
+    if (unstable := unstable_at_end(work, state)) is not None:
         reason = reason or f"its final state is {unstable.outcome.meaning}"
-    output.add(1.0, last.report, work.rate(last.state.point.evaluation), 0.0)
-    return _Found(unworn, replace(final, state=last.state), output, reason)
+    output.add(1.0, report, work.rate(state.point.evaluation), 0.0)
+    return _Found(unworn, replace(final, state=state), output, reason)
 
 
 def _reference_depth(work: WearingJoint, start: StartState, found: _Found, share: float) -> FloatArray:
@@ -164,42 +157,40 @@ def _reference_depth(work: WearingJoint, start: StartState, found: _Found, share
         return np.full(first.depth.size, np.nan)
 
 
-def _assembled(work: WearingJoint, start: StartState, asked: SlowTime, found: _Found, error: FloatArray) -> WearHistory:
-    """The history of the unworn and the final state. error (n_contact,): error of the final depths, m."""
-    assert isinstance(asked.cycles, ToTheEnd)
-    counts = np.full(asked.cycles.n_outputs, np.nan)
+def _assembled(
+    work: WearingJoint, start: StartState, n_outputs: int, found: _Found, depth_error: FloatArray
+) -> WearHistory:
+    """The history of the unworn and the final state. depth_error (n_contact,): error of the final depths, m."""
+    counts = np.full(n_outputs, np.nan)
     # count 1 of the output is the final state
     counts[0], counts[-1] = 0.0, 1.0
     own, state, area = found.output.read(counts), found.final.state, work.area
     cut_off = first_cut_off(work.case.model.contact, counts, own["mean_pressure"], own["wear_depth"])
     counts[-1] = math.inf
     volume = own["wear_depth"] @ area
-    relative = float(error @ area) / float(volume[-1]) if volume[-1] > 0.0 else 0.0
-    relative = math.inf if math.isnan(relative) else relative
-    errors, depths = np.full(counts.size, np.nan), np.full(own["wear_depth"].shape, np.nan)
-    errors[0], errors[-1], depths[0], depths[-1] = 0.0, relative, 0.0, error
+    error = float(depth_error @ area) / float(volume[-1]) if volume[-1] > 0.0 else 0.0
+    error = math.inf if math.isnan(error) else error
+    errors, depth_errors = np.full(counts.size, np.nan), np.full(own["wear_depth"].shape, np.nan)
+    errors[0], errors[-1], depth_errors[0], depth_errors[-1] = 0.0, error, 0.0, depth_error
     history = WearHistory(
-        **{name: own[name] for name in own if name not in ("local", "depth_rate")},
+        **reported(own),
+        # the error of a wear rate that is round-off counts for nothing
+        **of_state(state) | {"inaccurate_in": "response", "inaccurate_error": state.worst.response},
         outcome=Outcome.CONVERGED,
         cycles=counts,
         worn_volume=volume,
         worn_volume_error=errors,
-        wear_depth_error=depths,
+        wear_depth_error=depth_errors,
         reference_volume=np.where(np.isfinite(errors), volume + errors * volume, np.nan),
-        error_estimate=relative,
+        error_estimate=error,
         newton_iterations=0,
         run_time=0.0,
         last_cycle=math.inf,
         jump_cycle=math.nan,
         branch=start.branch,
         fold_frequency=start.fold_frequency,
-        step_limit=state.step_limit if state.step_limit > 0.0 else math.inf,
         final_method="active_set",
         cut_off_cycle=math.inf if cut_off == 1.0 else cut_off,
-        inaccurate_from=state.inaccurate_from,
-        inaccurate_in="response",
-        inaccurate_error=state.worst.response,
     )
-    rows = np.flatnonzero(np.isfinite(volume))
-    outcome, message = judge(history, rows, work.case.settings.rtol)
+    outcome, message = judge(history, np.flatnonzero(np.isfinite(volume)), work.case.settings.rtol)
     return replace(history, outcome=outcome, message=message)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from studyrunner.report.drawing import FloatArray, line_style, set_log
-from studyrunner.result.units import scale_for, units_of
+from studyrunner.result.units import Scale, scale_for, units_of
 from studyrunner.result.view import Result
 
 _DECADES = 30.0
@@ -90,6 +90,6 @@ def cell_edges(positions: FloatArray) -> FloatArray:
     return np.concatenate([[first], middle, [last]])
 
 
-def slow_time(result: Result) -> str:
-    """Label of an axis of slow time, without its unit."""
-    return "vibration cycles" if result.blocks is None else "flown missions"
+def slow_time(result: Result, scale: Scale) -> str:
+    """Label of an axis of slow time."""
+    return scale.label("vibration cycles") if result.blocks is None else "missions"

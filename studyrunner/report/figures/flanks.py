@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +11,13 @@ from numpy.typing import NDArray
 from studyrunner.result.grid import Grid, find_grid
 from studyrunner.result.view import Result
 
+FloatArray = NDArray[np.float64]
+
 JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
 """The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""
 
 _ORIGIN = "Axial 0 is the leading edge, up the flank 0 the inner end"
-
-_LONE, _SLIM = 1e-3, 0.2
-"""Width that a single row of pairs is drawn with, m; that of its length where this is less, as under a cylinder."""
+_LONE, _SLIM = 1e-3, 0.2  # m; width of a single row of pairs, or this part of its length where that is less
 _STRAIGHT = 0.999
 
 
@@ -26,11 +27,11 @@ class Cells:
     n_x): index along the pairs of the flank. x_edges (n_x + 1,), y_edges (n_y + 1,): of the cells, m.
     """
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: FloatArray
+    y: FloatArray
     pair: NDArray[np.intp]
-    x_edges: NDArray[np.float64]
-    y_edges: NDArray[np.float64]
+    x_edges: FloatArray
+    y_edges: FloatArray
 
 
 @dataclass(frozen=True)
@@ -43,9 +44,9 @@ class Flank:
 
     surface: str
     pairs: NDArray[np.intp]
-    area: NDArray[np.float64]
+    area: FloatArray
     cells: Cells | None
-    seen: NDArray[np.float64] | None
+    seen: FloatArray | None
     directions: tuple[str, str]
 
     @property
@@ -56,103 +57,78 @@ class Flank:
     @property
     def height_over_width(self) -> float:
         """Of the surface as it is drawn."""
-        if self.cells is not None:
-            return float(np.ptp(self.cells.y_edges) / np.ptp(self.cells.x_edges))
-        return 0.75
+        return 0.75 if self.cells is None else float(np.ptp(self.cells.y_edges) / np.ptp(self.cells.x_edges))
 
 
 def find_flanks(result: Result) -> tuple[Flank, ...]:
     """The contact surfaces of a file, in order of first appearance; a single one where the file has no labels."""
-    coordinates = result.dataset.coords
-    n_pairs = result.dataset.sizes["contact"]
-    labels = np.full(n_pairs, "contact")
+    coordinates, n_pairs = result.dataset.coords, result.dataset.sizes["contact"]
+    labels, area, positions = np.full(n_pairs, "contact"), np.ones(n_pairs), np.full((n_pairs, 3), np.nan)
     if "contact_surface" in coordinates:
         labels = coordinates["contact_surface"].values.astype(str)
-    area = np.ones(n_pairs)
     if "contact_area" in coordinates:
         area = np.asarray(coordinates["contact_area"].values, dtype=float)
-    positions = np.full((n_pairs, 3), np.nan)
     if all(f"contact_{axis}" in coordinates for axis in "xyz"):
         positions = np.stack([coordinates[f"contact_{axis}"].values for axis in "xyz"], axis=1)
     words = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model")))
-    return tuple(
-        _build_flank(surface or "contact", np.flatnonzero(labels == surface), area, positions, words)
-        for surface in dict.fromkeys(labels.tolist())
-    )
+    surfaces = [(surface, np.flatnonzero(labels == surface)) for surface in dict.fromkeys(labels.tolist())]
+    return tuple(_build_flank(name or "contact", own, area[own], positions[own], words) for name, own in surfaces)
 
 
 def _build_flank(
-    surface: str,
-    pairs: NDArray[np.intp],
-    area: NDArray[np.float64],
-    positions: NDArray[np.float64],
-    words: tuple[str, str] | None,
+    surface: str, pairs: NDArray[np.intp], area: FloatArray, own: FloatArray, words: tuple[str, str] | None
 ) -> Flank:
-    own = positions[pairs]
+    """Own (n, 3): positions of its pairs, m. words: of its directions, where the scene has some."""
     if not np.isfinite(own).all():
-        return Flank(surface, pairs, area[pairs], None, None, ("", ""))
+        return Flank(surface, pairs, area, None, None, ("", ""))
     centred = own - own.mean(axis=0)
     _, _, plane = np.linalg.svd(np.vstack([centred, np.zeros((3, 3))]), full_matrices=False)
     largest = np.argmax(np.abs(np.round(plane, 6)), axis=1)[:, None]
     plane = plane * np.sign(np.take_along_axis(plane, largest, axis=1))
     seen, cells = centred @ plane[:2].T, None
-    try:
-        grid = find_grid(own) if len(own) > 1 else None
-    except ValueError:
-        grid = None
-    if grid is not None:
-        cells = _build_cells(grid, area[pairs])
+    with contextlib.suppress(ValueError):
+        cells = _build_cells(find_grid(own), area) if len(own) > 1 else None
+    if cells is not None:
         across = own[cells.pair[:, 0]]
         plane = np.stack([own[cells.pair[0, -1]] - own[cells.pair[0, 0]], across[-1] - across[0]])
-        if len(cells.x) == 1:
-            words = None
-    return Flank(surface, pairs, area[pairs], cells, seen, words or (_name(plane[0]), _name(plane[1])))
+        words = None if len(cells.x) == 1 else words
+    return Flank(surface, pairs, area, cells, seen, words or (_name(plane[0]), _name(plane[1])))
 
 
-def _name(direction: NDArray[np.float64]) -> str:
+def _name(direction: FloatArray) -> str:
     """An axis of the mesh, or the components of a direction."""
     size = float(np.linalg.norm(direction))
     if size == 0.0:
         return "across"
     unit = direction / size
     axis = int(np.argmax(np.abs(unit)))
-    if unit[axis] > _STRAIGHT:
-        return "xyz"[axis]
-    return f"along ({', '.join(f'{each:.2g}' for each in np.round(unit, 2) + 0.0)})"
+    return "xyz"[axis] if unit[axis] > _STRAIGHT else f"along ({', '.join(f'{each + 0.0:.2g}' for each in unit)})"
 
 
-def _build_cells(grid: Grid, area: NDArray[np.float64]) -> Cells:
-    """Cells whose edges are halfway between the pairs; those at the border are as wide as their areas say."""
+def _build_cells(grid: Grid, area: FloatArray) -> Cells:
+    """Cells about halfway between the pairs, as wide as the areas of their lines say."""
     x, y, pair = grid.along, grid.across[-1] - grid.across[::-1], grid.pair[::-1]
-    sums, total = (area[pair].sum(axis=0), area[pair].sum(axis=1)), float(area.sum())
-    x_edges, y_edges = (_edges(at, own) for at, own in zip((x, y), sums, strict=True))
-    # of two lines the areas say how far they reach where the length across them is known
-    if len(y) == 2 and len(x) > 2:
-        y_edges = _stretch(y, total / float(np.ptp(x_edges)))
-    elif len(x) == 2 and len(y) > 2:
-        x_edges = _stretch(x, total / float(np.ptp(y_edges)))
-    elif len(x) == len(y) == 2:
-        stretch = np.sqrt(total / (x[1] * y[1]))
-        x_edges, y_edges = _stretch(x, stretch * x[1]), _stretch(y, stretch * y[1])
-    lone = max(min(_LONE, _SLIM * float(max(np.ptp(x), np.ptp(y)))), 1e-9)
-    x_edges, y_edges = (
-        np.array([-0.5 * lone, 0.5 * lone]) if len(edges) == 2 else edges for edges in (x_edges, y_edges)
-    )
-    return Cells(x, y, pair, x_edges, y_edges)
+    total, lone = float(area.sum()), min(_LONE, _SLIM * float(max(x[-1], y[-1])))
+    x_share, y_share = (np.r_[0.0, np.cumsum(area[pair].sum(axis=axis))] / total for axis in (0, 1))
+    x_length, y_length = _length(x, x_share), _length(y, y_share)
+    if len(x) == len(y) == 2:
+        x_length, y_length = np.sqrt(total / (x[1] * y[1])) * np.array([x[1], y[1]])
+    elif 2 in (len(x), len(y)):
+        x_length, y_length = np.fmin([x_length, y_length], [total / y_length, total / x_length])
+    return Cells(x, y, pair, _edges(x, x_share, x_length, lone), _edges(y, y_share, y_length, lone))
 
 
-def _edges(at: NDArray[np.float64], sums: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Edges (n + 1,) of cells at rising positions (n,), by the areas (n,) of the lines of cells."""
-    middle = 0.5 * (at[1:] + at[:-1])
-    beyond = np.zeros(2)
-    if len(at) > 2:
-        gaps = np.array([at[1] - at[0], at[-1] - at[-2]])
-        per_length = sums[1:-1].sum() / (middle[-1] - middle[0])
-        beyond = np.clip(sums[[0, -1]] / per_length - 0.5 * gaps, 0.0, 0.5 * gaps)
-    return np.concatenate([[at[0] - beyond[0]], middle, [at[-1] + beyond[1]]])
+def _length(at: FloatArray, share: FloatArray) -> float:
+    """Length, m, of lines at rising positions (n,) whose cells have shares (n + 1,) of the area up to them; or NaN."""
+    return float(np.polyfit(share[1:-1], 0.5 * (at[1:] + at[:-1]), 1)[0]) if len(at) > 2 else np.nan
 
 
-def _stretch(at: NDArray[np.float64], length: float) -> NDArray[np.float64]:
-    """Edges (3,) of two cells that are so long together, m; at most as if a third one stood on each side."""
-    beyond = 0.5 * float(np.clip(length - at[1], 0.0, at[1]))
-    return np.array([at[0] - beyond, 0.5 * (at[0] + at[1]), at[1] + beyond])
+def _edges(at: FloatArray, share: FloatArray, length: float, lone: float) -> FloatArray:
+    """Edges (n + 1,) of cells. lone: width of a single one, m."""
+    if len(at) == 1:
+        return lone * np.array([-0.5, 0.5])
+    if len(at) == 2:
+        # at most as if a third line stood on each side
+        length = float(np.clip(np.nan_to_num(length, nan=np.inf), at[1], 2.0 * at[1]))
+    start = float(np.mean(0.5 * (at[1:] + at[:-1]) - length * share[1:-1]))
+    return np.asarray(start + length * share)

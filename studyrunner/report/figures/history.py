@@ -53,7 +53,7 @@ def draw_history(result: Result) -> Drawing | Missing:
             where = f" ({label})" if label else ""
             ends.append(f"{scale.show(float(worn[-1]), 4)}{_tell_error(result, full)}{where}")
         _mark_events(result, panel, full, cycles, scale, style["color"])
-    panel.set_xlabel(cycles.label(slow_time(result)))
+    panel.set_xlabel(slow_time(result, cycles))
     panel.set_ylabel(scale.label("worn volume"))
     panel.set_xlim(0.0, cycles(latest or result.cycles[-1]).item())
     set_from_zero(panel, highest if largest > NO_VOLUME else 0.0)
@@ -129,7 +129,7 @@ def draw_excitation(result: Result) -> Drawing | None:
             add_line(panel, cycles(counts[known]), found[known], error, band=True, **style)
             ends = " to ".join(show_number(float(found[place])) for place in known[[0, -1]])
             said.append(f"from {ends} Hz" + (f" ({label})" if label else ""))
-    panel.set_xlabel(cycles.label(slow_time(result)))
+    panel.set_xlabel(slow_time(result, cycles))
     panel.set_ylabel("frequency (Hz)")
     add_legend(figure)
     text = as_sentences(

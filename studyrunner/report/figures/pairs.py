@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from studyrunner.report.drawing import (
     Drawing,
+    FloatArray,
     Missing,
     add_colour_bar,
     add_legend,
@@ -34,117 +35,64 @@ from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import Result, as_sentences
 from studyrunner.system.progress import count
 
-FloatArray = NDArray[np.float64]
-
 _MOST_SERIES, _MOST_PROFILES, _MOST_FLANKS = 4, 5, 3
-_MANY_PAIRS = 150
-_SLENDER = 0.12
-_LABEL_WIDTH = 14
-_MOST_NUMBERED, _MOST_NUMBERS = 4, 120
-_PLAIN = ListedColormap(["#ffffff00"])
+_MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS = 150, 4, 120
+_SLENDER, _LABEL_WIDTH = 0.12, 14
 _DOTS: dict[str, Any] = {"edgecolors": "0.3", "linewidths": 0.4}
-_NO_DEPTH = 1e-15
-"""m. A depth below this is round-off: it is far less than an atom."""
+_NO_DEPTH = 1e-15  # m; a depth below this is round-off: it is far less than an atom
 
 
-def draw_pairs(result: Result) -> Iterator[Drawing | Missing]:
-    """Figures of the pairs at the shown point; sentences where the file does not hold what they need."""
-    yield from draw_wear(result)
-    scar = find_scar(result)
-    if not result.has("mean_pressure"):
-        yield Missing("mean_pressure", "Mean pressure", result.lacks("mean_pressure"))
-    elif scar is not None:
-        yield draw_scar_pressure(result, scar)
-    elif result.dataset.sizes["contact"] > 1:
-        yield draw_pressure(result)
+def _worn_depth(result: Result) -> FloatArray | None:
+    """Wear depths (n_contact,), m, of the shown point at its last count; None where nothing is worn."""
+    depth = last_depth(result, result.shown_point())
+    return depth if len(result.cycles) > 1 and float(depth.max()) > _NO_DEPTH else None
 
 
-def draw_wear(result: Result) -> Iterator[Drawing | Missing]:
-    """Figures of the wear depth at the shown point; a sentence where the file does not hold what they need."""
+def draw_depths(result: Result) -> Drawing | Missing | None:
+    """Wear depth per pair at the last cycle count, one series a scheme (Fig. 5)."""
     if not tells_depth(result):
-        yield Missing("wear_depth", "Wear depth of the pairs", result.lacks("wear_depth"))
-        return
-    if len(result.cycles) == 1 or float(last_depth(result, result.shown_point()).max()) <= _NO_DEPTH:
-        return
-    if result.dataset.sizes["contact"] > 1:
-        yield draw_depths(result)
-    scar = find_scar(result)
-    # Without positions there is nothing that the wear depth per pair does not show.
-    if scar is not None:
-        yield draw_scar_depth(result, scar)
-    elif all(flank.seen is not None for flank in find_flanks(result)):
-        yield draw_profile(result)
+        return Missing("wear_depth", "Wear depth of the pairs", result.lacks("wear_depth"))
+    if _worn_depth(result) is None or result.dataset.sizes["contact"] == 1:
+        return None
+    shown, course = result.shown_point(), result.course_axis
+    choice = choose(result, [course] if course else [], _MOST_SERIES)
+    series = {label: last_depth(result, {**shown, **point}) for point, label in choice}
+    series = {label: depth for label, depth in series.items() if not np.isnan(depth).all()}
+    scale, (figure, panel) = scale_for("m", *series.values()), new_panel(3.4)
+    _draw_stems(panel, result, {label: scale(depth) for label, depth in series.items()})
+    panel.set_ylabel(scale.label(f"wear depth {result.when(result.last_kept(shown))}"))
+    _name_surfaces(panel, result)
+    add_legend(figure)
+    deepest = [f"{_largest(result, depth, scale)}{f' ({label})' if label else ''}" for label, depth in series.items()]
+    text = as_sentences(f"Deepest: {', '.join(deepest)}", choice.sentence)
+    return Drawing("wear_depth", title_at(result, "Wear depth of each pair"), text, figure)
 
 
 def _largest(result: Result, values: FloatArray, scale: Scale) -> str:
     return f"{scale.show(float(np.nanmax(values)))} at pair {result.dataset['contact'].values[np.nanargmax(values)]}"
 
 
-def draw_depths(result: Result) -> Drawing:
-    """Wear depth per pair at the last cycle count, one series a scheme (Fig. 5)."""
-    shown, course = result.shown_point(), result.course_axis
-    choice = choose(result, [course] if course else [], _MOST_SERIES)
-    last = result.last_kept(shown)
-    series = [(last_depth(result, {**shown, **point}), label) for point, label in choice]
-    series = [(depth, label) for depth, label in series if not np.isnan(depth).all()]
-    scale = scale_for("m", *(depth for depth, _ in series))
-    figure, panel = new_panel(3.4)
-    pairs = result.dataset["contact"].values
-    _draw_stems(panel, pairs, [scale(depth) for depth, _ in series], [label for _, label in series])
-    panel.set_ylabel(scale.label(f"wear depth {result.when(last)}"))
-    _shade_surfaces(panel, result, pairs)
-    if len(series) > 1:
-        add_legend(figure)
-    deepest = [f"{_largest(result, depth, scale)}{f' ({label})' if label else ''}" for depth, label in series]
-    text = as_sentences(f"Deepest: {', '.join(deepest)}", choice.sentence)
-    return Drawing("wear_depth", title_at(result, "Wear depth of each pair"), text, figure)
-
-
-def _draw_stems(panel: Axes, pairs: NDArray[np.int_], series: Sequence[FloatArray], labels: Sequence[str]) -> None:
+def _draw_stems(panel: Axes, result: Result, series: dict[str, FloatArray]) -> None:
     """Values by the number of the pair, one series beside the other."""
+    pairs = result.dataset["contact"].values
     apart = 0.8 / len(series) if len(pairs) <= _MANY_PAIRS else 0.0
-    for number, (values, label) in enumerate(zip(series, labels, strict=True)):
+    for number, (label, values) in enumerate(series.items()):
         at = pairs + (number - 0.5 * (len(series) - 1)) * apart
         style = line_style(number) | {"linestyle": "none", "markevery": 1}
         panel.vlines(at, 0.0, values, color=style["color"], linewidth=1.2)
-        panel.plot(at, values, label=label or None, **style)
-    set_from_zero(panel, max(float(np.nanmax(values, initial=0.0)) for values in series))
+        panel.plot(at, values, label=label or "computed", **style)
+    set_from_zero(panel, max(float(np.nanmax(values, initial=0.0)) for values in series.values()))
     panel.set_xlim(pairs[0] - 0.8, pairs[-1] + 0.8)
     panel.set_xlabel("contact pair")
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.grid(visible=False, axis="x")
 
 
-def draw_numbers(result: Result) -> Iterator[Drawing]:
-    """The number of each pair where it lies on its surface (Fig. 3b); nothing without positions, or with many pairs."""
-    flanks, names = find_flanks(result), result.dataset["contact"].values
-    placed = all(flank.cells is not None or flank.seen is not None for flank in flanks)
-    if not placed or len(names) == 1 or len(flanks) > _MOST_NUMBERED or len(names) > _MOST_NUMBERS * len(flanks):
-        return
-    height = 0.6 + 6.0 * min(1.2, max(_SLENDER, max(flank.height_over_width for flank in flanks)))
-    figure, panels = new_panels(len(flanks), 1, min(height * len(flanks), 8.0))
-    for panel, flank in zip(panels[:, 0], flanks, strict=True):
-        _draw_field(panel, flank, np.ones(len(flank.pairs)), Normalize(0.0, 1.0), cmap=_PLAIN, edgecolors="0.6")
-        places = flank.seen
-        if flank.cells is not None:
-            middles = [0.5 * (edges[1:] + edges[:-1]) for edges in (flank.cells.x_edges, flank.cells.y_edges)]
-            x, y = np.meshgrid(*middles)
-            places = np.empty((len(flank.pairs), 2))
-            places[flank.cells.pair] = np.stack([x, y], axis=-1)
-        assert places is not None
-        for pair, (x, y) in zip(flank.pairs, 1e3 * places, strict=True):
-            panel.text(x, y, str(names[pair]), ha="center", va="center", fontsize=8, clip_on=False)
-        panel.set_title(flank.surface)
-    label_outer(panels)
-    text = as_sentences(f"As along the dimension contact: {len(names)} pairs", flanks[0].origin)
-    yield Drawing("pair_numbers", "Numbers of the contact pairs", text, figure)
-
-
-def _shade_surfaces(panel: Axes, result: Result, pairs: NDArray[np.int_]) -> None:
+def _name_surfaces(panel: Axes, result: Result) -> None:
     """Name the surfaces above their pairs and shade every other one; nothing where pairs of one are not in a row."""
     if "contact_surface" not in result.dataset.coords:
         return
-    labels = result.dataset["contact_surface"].values.astype(str)
+    pairs, labels = result.dataset["contact"].values, result.dataset["contact_surface"].values.astype(str)
     starts = np.flatnonzero(np.r_[True, labels[1:] != labels[:-1]])
     if len(starts) != len(np.unique(labels)) or len(starts) < 2:
         return
@@ -156,37 +104,48 @@ def _shade_surfaces(panel: Axes, result: Result, pairs: NDArray[np.int_]) -> Non
         panel.text(0.5 * (left + right), 1.01, labels[start], transform=over, ha="center", va="bottom")
 
 
-def draw_pressure(result: Result) -> Drawing:
+def draw_pressure(result: Result) -> Drawing | None:
     """Mean pressure on each flank at the first and the last cycle count (Figs. 10, 11)."""
+    scar = find_scar(result)
+    if scar is not None:
+        return draw_scar_pressure(result, scar)
+    if result.dataset.sizes["contact"] == 1:
+        return None
     shown = result.shown_point()
     kept = sorted({0, result.last_kept(shown)})
-    values = [np.asarray(result.at("mean_pressure", shown, cycle).values, dtype=float) for cycle in kept]
-    scale = scale_for("Pa", *values)
-    labels = [result.cycle_label(cycle) for cycle in kept]
-    flanks, left_out = _choose_flanks(result, values)
+    fields = {result.cycle_label(cycle): result.at("mean_pressure", shown, cycle).values for cycle in kept}
+    scale = scale_for("Pa", *fields.values())
+    flanks, left_out = _choose_flanks(result, list(fields.values()))
     if all(flank.seen is None for flank in flanks):
         figure, panel = new_panel(3.2)
-        _draw_stems(panel, result.dataset["contact"].values, [scale(value) for value in values], labels)
+        _draw_stems(panel, result, {label: scale(values) for label, values in fields.items()})
         panel.set_ylabel(scale.label("mean pressure"))
         add_legend(figure)
     else:
-        figure = _draw_fields(flanks, values, labels, scale, "mean pressure")
-    largest = [f"{_largest(result, value, scale)} ({label})" for value, label in zip(values, labels, strict=True)]
+        figure = _draw_fields(flanks, fields, scale, "mean pressure")
+    largest = [f"{_largest(result, values, scale)} ({label})" for label, values in fields.items()]
     text = as_sentences(f"Mean over a period. Largest: {', '.join(largest)}", _how_drawn(flanks), left_out)
     return Drawing("mean_pressure", title_at(result, "Mean pressure"), text, figure)
 
 
-def draw_profile(result: Result) -> Drawing:
-    """Wear depth on each flank at the last cycle count: map, and lines along it (Fig. 12)."""
-    shown = result.shown_point()
-    last, depth = result.last_kept(shown), last_depth(result, shown)
-    scale = scale_for("m", depth)
+def draw_profile(result: Result) -> Drawing | None:
+    """Wear depth on each flank at the last cycle count: map, and lines along it (Fig. 12); or the scar."""
+    depth = _worn_depth(result) if tells_depth(result) else None
+    if depth is None:
+        return None
+    scar = find_scar(result)
+    if scar is not None:
+        return draw_scar_depth(result, scar)
+    # without positions there is nothing that the wear depth per pair does not show
+    if any(flank.seen is None for flank in find_flanks(result)):
+        return None
+    last, scale = result.last_kept(result.shown_point()), scale_for("m", depth)
     flanks, left_out = _choose_flanks(result, [depth])
     on_grid = all(flank.cells is not None for flank in flanks)
     if on_grid:
         figure = _draw_profiles(flanks, depth, scale)
     else:
-        figure = _draw_fields(flanks, [depth], [result.cycle_label(last)], scale, "wear depth")
+        figure = _draw_fields(flanks, {result.cycle_label(last): depth}, scale, "wear depth")
     mean = [
         f"{flank.surface} {scale.show(float(np.average(depth[flank.pairs], weights=flank.area)))}" for flank in flanks
     ]
@@ -198,6 +157,30 @@ def draw_profile(result: Result) -> Drawing:
         left_out,
     )
     return Drawing("worn_profile", title_at(result, "Worn profile"), text, figure)
+
+
+def draw_numbers(result: Result) -> Drawing | None:
+    """The number of each pair where it lies on its surface (Fig. 3b); nothing without positions, or with many pairs."""
+    flanks, names = find_flanks(result), result.dataset["contact"].values
+    placed = all(flank.seen is not None for flank in flanks)
+    if not placed or len(names) == 1 or len(flanks) > _MOST_NUMBERED or len(names) > _MOST_NUMBERS * len(flanks):
+        return None
+    height = 0.6 + 6.0 * min(1.2, max(_SLENDER, max(flank.height_over_width for flank in flanks)))
+    figure, panels = new_panels(len(flanks), 1, min(height * len(flanks), 8.0))
+    for panel, flank in zip(panels[:, 0], flanks, strict=True):
+        # the colour says nothing: cells without one
+        plain, own = ListedColormap(["#ffffff00"]), names[flank.pairs]
+        _draw_field(panel, flank, own, Normalize(0.0, max(own.max(), 1.0)), cmap=plain, edgecolors="0.6")
+        places = np.asarray(flank.seen)
+        if flank.cells is not None:
+            middles = [0.5 * (edges[1:] + edges[:-1]) for edges in (flank.cells.x_edges, flank.cells.y_edges)]
+            places[flank.cells.pair] = np.stack(np.meshgrid(*middles), axis=-1)
+        for name, (x, y) in zip(own, 1e3 * places, strict=True):
+            panel.text(x, y, str(name), ha="center", va="center", fontsize=8, clip_on=False)
+        panel.set_title(flank.surface)
+    label_outer(panels)
+    text = as_sentences(f"As along the dimension contact: {len(names)} pairs", flanks[0].origin)
+    return Drawing("pair_numbers", "Numbers of the contact pairs", text, figure)
 
 
 def _choose_flanks(result: Result, values: Sequence[FloatArray]) -> tuple[tuple[Flank, ...], str]:
@@ -223,33 +206,31 @@ def _inches(flanks: Sequence[Flank]) -> float:
     return 6.0 / len(flanks) * min(1.2, max(0.28, max(flank.height_over_width for flank in flanks)))
 
 
-def _draw_fields(
-    flanks: Sequence[Flank], values: Sequence[FloatArray], labels: Sequence[str], scale: Scale, text: str
-) -> Figure:
+def _draw_fields(flanks: Sequence[Flank], fields: dict[str, FloatArray], scale: Scale, text: str) -> Figure:
     """One row of panels a field, one column a flank, all in one colour scale."""
-    figure, panels = new_panels(len(values), len(flanks), len(values) * (_inches(flanks) + 0.62))
-    largest = max(float(np.nanmax(value, initial=0.0)) for value in values)
+    figure, panels = new_panels(len(fields), len(flanks), len(fields) * (_inches(flanks) + 0.62))
+    largest = max(float(np.nanmax(values, initial=0.0)) for values in fields.values())
     norm = Normalize(0.0, scale(largest).item() or 1.0)
-    for row, value, label in zip(panels, values, labels, strict=True):
+    for row, (label, values) in zip(panels, fields.items(), strict=True):
         for panel, flank in zip(row, flanks, strict=True):
-            _draw_field(panel, flank, scale(value[flank.pairs]), norm)
+            _draw_field(panel, flank, scale(values[flank.pairs]), norm)
             panel.set_title(f"{flank.surface}, {label}")
     label_outer(panels)
     add_colour_bar(figure, panels, norm, scale.label(text), fraction=0.05)
     return figure
 
 
-def _draw_field(panel: Axes, flank: Flank, values: FloatArray, norm: Normalize, **look: Any) -> None:
+def _draw_field(panel: Axes, flank: Flank, values: NDArray[Any], norm: Normalize, **look: Any) -> None:
     """One field of a flank: cells of its grid, or dots at its pairs."""
     panel.grid(visible=False)
     if flank.cells is not None:
         cells = flank.cells
         panel.pcolormesh(1e3 * cells.x_edges, 1e3 * cells.y_edges, values[cells.pair], norm=norm, **look)
-        # Cells as they are in the flank, unless it is so slender that nothing would be seen.
+        # cells as they are in the flank, unless it is so slender that nothing would be seen
         panel.set_aspect("equal" if flank.height_over_width > _SLENDER else "auto")
     elif flank.seen is not None:
         x, y = 1e3 * flank.seen.T
-        panel.scatter(x, y, 160 if look else 60, values, norm=norm, **(_DOTS | look))
+        panel.scatter(x, y, 160 if look else 60, values, norm=norm, label="pairs", **(_DOTS | look))
         panel.margins(0.12)
         panel.set_aspect("equal", adjustable="datalim")
     panel.set_xlabel(f"{flank.directions[0]} (mm)")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,39 +16,23 @@ from studyrunner.report.figures.settings import KEYS, QUANTITIES, RESOLVED, Comp
 from studyrunner.result.view import Result, as_sentences
 from studyrunner.system.progress import count
 
-_MOST_POINTS = 3
-_TITLE = "Error against run time"
+_MOST_POINTS, _TITLE, _DASH = 3, "Error against run time", "\N{EN DASH}"
 _SHAPES, _SIZE = "os^DvPX<>p", 5.5
 _RING: dict[str, Any] = {"marker": "o", "markerfacecolor": "none", "markeredgecolor": "black", "linestyle": "none"}
-_DASH = "\N{EN DASH}"
 
 
-def draw_precision(result: Result) -> Iterator[Drawing | Missing | Table]:
-    """The figure, and a table for each point that is drawn, those that wear most.
-
-    Nothing where no settings are compared; a sentence where no error tells one from another.
-    """
+def draw_precision(result: Result) -> Drawing | Missing | None:
+    """One row a point, one column a quantity; nothing where no settings are compared."""
     points = compare_settings(result)
-    if not points:
-        return
-    clear = [point for point in points if any(point.is_clear(name).any() for name in QUANTITIES)]
-    worn = [float(np.nanmax(np.where(point.computed, point.worn, 0.0))) for point in clear]
-    chosen = sorted(np.argsort(np.negative(worn), kind="stable")[:_MOST_POINTS].tolist())
-    shown = [clear[number] for number in chosen]
-    if not shown:
+    shown = _choose(points)
+    if points and not shown:
         said = "No error is clearly larger than the uncertainty of the reference: give finer values of a key."
-        yield Missing("precision", _TITLE, said)
-        return
-    yield _draw(points, shown, [key for key in KEYS if key in result.varying])
-    for number, point in enumerate(shown, start=1):
-        yield _list_settings(point, number, [key for key in KEYS if key in result.varying])
-
-
-def _draw(points: Sequence[ComparedPoint], shown: Sequence[ComparedPoint], keys: Sequence[str]) -> Drawing:
-    """One row a point, one column a quantity."""
+        return Missing("precision", _TITLE, said)
+    if not shown:
+        return None
     quantities = [name for name in QUANTITIES if any(point.is_clear(name).any() for point in shown)]
     figure, panels = new_panels(len(shown), len(quantities), 0.3 + 2.4 * len(shown))
-    marks = _Marks(points[0].settings, keys)
+    marks = _Marks(points[0].settings, [key for key in KEYS if key in result.varying])
     for row, point in zip(panels, shown, strict=True):
         for panel, quantity in zip(row, quantities, strict=True):
             _draw_panel(panel, point, quantity, marks)
@@ -70,14 +54,21 @@ def _draw(points: Sequence[ComparedPoint], shown: Sequence[ComparedPoint], keys:
     return Drawing("precision", _TITLE, caption, figure)
 
 
+def _choose(points: Sequence[ComparedPoint]) -> list[ComparedPoint]:
+    """Of the points at which an error is clear those that wear most."""
+    clear = [point for point in points if any(point.is_clear(name).any() for name in QUANTITIES)]
+    worn = [float(np.nanmax(np.where(point.computed, point.worn, 0.0))) for point in clear]
+    chosen = sorted(np.argsort(np.negative(worn), kind="stable")[:_MOST_POINTS].tolist())
+    return [clear[number] for number in chosen]
+
+
 def _tell_reference(point: ComparedPoint) -> str:
     """What the errors at a point are measured against, and how well this is known."""
     if point.reference is None:
         return "errors are those against the exact answer"
     known = " and ".join(f"{show_percent(point.uncertainty[name])} ({words})" for name, words in QUANTITIES.items())
-    return (
-        f"errors are those against the finest setting ({point.settings[point.reference].describe()}), known to {known}"
-    )
+    finest = point.settings[point.reference].describe()
+    return f"errors are those against the finest setting ({finest}), known to {known}"
 
 
 class _Marks:
@@ -123,17 +114,18 @@ def _draw_panel(panel: Axes, point: ComparedPoint, quantity: str, marks: _Marks)
         return
     least = RESOLVED * point.uncertainty[quantity]
     bottom = 0.5 * min(float(errors[clear].min()), *errors[(errors > 1e-12) & np.isfinite(errors)])
-    drawn = np.maximum(errors, bottom)
+    drawn, known = np.maximum(errors, bottom), np.isfinite(errors)
     for scheme, style in marks.lines.items():
         rows = point.front(quantity, scheme)
         panel.plot(time[rows], drawn[rows], linewidth=2.0, zorder=3, **style)
-    for row in np.flatnonzero(np.isfinite(errors)):
-        colour = marks.lines[point.settings[row].scheme]["color"]
+    for row in np.flatnonzero(known):
+        setting = point.settings[row]
+        colour = marks.lines[setting.scheme]["color"]
         style = {"markerfacecolor": colour if clear[row] else "white", "markeredgecolor": colour}
-        panel.plot(time[row], drawn[row], alpha=0.85, zorder=4, **style, **marks.marker(point.settings[row]))
+        label = setting.describe()
+        panel.plot(time[row], drawn[row], alpha=0.85, zorder=4, label=label, **style, **marks.marker(setting))
     rows = point.front(quantity)
     panel.plot(time[rows], drawn[rows], markersize=11, zorder=5, **_RING)
-    known = np.isfinite(errors)
     set_log(panel.xaxis, float(time[known].min()), float(time[known].max()))
     set_log(panel.yaxis, bottom, float(errors[known].max()), percent=True)
     if 0.8 * bottom < least < math.inf:
@@ -141,26 +133,22 @@ def _draw_panel(panel: Axes, point: ComparedPoint, quantity: str, marks: _Marks)
     panel.set_ylim(bottom=0.8 * bottom)
 
 
-def _list_settings(point: ComparedPoint, number: int, keys: Sequence[str]) -> Table:
-    """All settings, the quickest first, with their errors."""
-    fronts = {name: point.front(name) for name in QUANTITIES}
-    rows = []
-    for row in np.argsort(np.where(point.computed, point.values["run_time"], math.inf), kind="stable").tolist():
-        values = map(point.settings[row].words, keys)
-        if not point.computed[row]:
-            rows.append((*values, *[_DASH] * 3, f"failed: {point.endings[row].replace('_', ' ')}"))
-            continue
-        remarks = ["reference"] if row == point.reference else []
-        remarks += [f"cheapest for its {QUANTITIES[name]}" for name, front in fronts.items() if row in front]
-        errors = [point.errors[name][row] for name in QUANTITIES]
-        remarks += [
-            f"{words} not resolved"
-            for (name, words), error in zip(QUANTITIES.items(), errors, strict=True)
-            if np.isfinite(error) and not point.is_clear(name)[row]
-        ]
-        shown = [show_percent(error) if np.isfinite(error) else _DASH for error in errors]
-        rows.append((*values, f"{point.values['run_time'][row]:.3g}", *shown, ", ".join(remarks)))
-    title = "All settings" + (f" at {point.label}" if point.label else "")
-    columns = (*keys, "CPU time (s)", "worn volume", "response", "remark")
-    note = f"Relative {_tell_reference(point)}."
-    return Table(f"precision_settings_{number}", title, columns, tuple(rows), note)
+def list_settings(result: Result) -> Table | None:
+    """All settings at each point that is drawn, the quickest first, with their errors."""
+    shown, keys = _choose(compare_settings(result)), [key for key in KEYS if key in result.varying]
+    rows: list[tuple[str, ...]] = []
+    for point in shown:
+        fronts = {name: point.front(name) for name in QUANTITIES}
+        for row in np.argsort(np.where(point.computed, point.values["run_time"], math.inf), kind="stable").tolist():
+            values = (point.label, *map(point.settings[row].words, keys))
+            if not point.computed[row]:
+                rows.append((*values, *[_DASH] * 3, f"failed: {point.endings[row].replace('_', ' ')}"))
+                continue
+            remarks = ["reference"] if row == point.reference else []
+            remarks += [f"cheapest for its {QUANTITIES[name]}" for name, front in fronts.items() if row in front]
+            errors = [point.errors[name][row] for name in QUANTITIES]
+            told = [show_percent(error) if np.isfinite(error) else _DASH for error in errors]
+            rows.append((*values, f"{point.values['run_time'][row]:.3g}", *told, ", ".join(remarks)))
+    columns = ("point", *keys, "CPU time (s)", "worn volume", "response", "remark")
+    note = as_sentences(*(f"{point.label or 'Reference'}: {_tell_reference(point)}" for point in shown))
+    return Table("precision_settings", "All settings", columns, tuple(rows), note) if rows else None

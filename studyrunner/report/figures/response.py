@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 
 from studyrunner.report.drawing import (
@@ -14,6 +15,7 @@ from studyrunner.report.drawing import (
     Missing,
     add_legend,
     add_line,
+    line_style,
     mark_failed,
     new_panel,
     new_panels,
@@ -34,60 +36,78 @@ _WORN: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (5, 1.5)), "marke
 def draw_responses(result: Result) -> Drawing | Missing:
     """Amplitude of the first harmonic over frequency, one panel a response.
 
-    Lines are of the new joint, or of joints that were worn before; with `result.again["worn_response"]` also of the
-    joint that is worn as the shown point is.
+    Lines are of the new joint, or of joints that were worn before; with `result.again["response"]` also of the joint
+    that is worn as the shown point is.
     """
     name, title, course = "frequency_response", "Frequency response of the new joint", find_course(result, "frequency")
-    if course is None:
-        return Missing(name, title, "The study has one frequency: give several under [axes] frequency.")
-    if result.cycles[0] != 0.0:
+    again = result.again.get("response")
+    if course is None and again is None:
+        said = "The study has one frequency: give several under [axes] frequency"
+        followed = ", or use study-report --worn-response" if result.followed else ""
+        return Missing(name, title, f"{said}{followed}.")
+    if course is not None and result.cycles[0] != 0.0:
         return Missing(name, title, "The file holds no new joint: add 0 to slow_time.outputs.")
-    worn = result.again.get("worn_response")
-    # how a joint wears makes no difference to the new one: NaN where a scheme has found no state
-    alike = [axis for axis in _OF_WEAR if axis in result.axes]
-    choice = choose(result, ["frequency", *alike], _MOST_LINES, first=(_BEFORE, "sweep", "excitation_amplitude"))
     n_panels = min(len(result.responses), _MOST_RESPONSES)
     figure, panels = new_panels(n_panels, 1, 0.5 + 3.1 * n_panels, sharex=True)
-    amplitude = result.read("response_amplitude").isel(cycle=0).max(alike)
-    unit, peaks, crosses = str(result.dataset["response_amplitude"].attrs.get("units", "m")), [], ""
+    unit, told = str(result.dataset["response_amplitude"].attrs.get("units", "m")), ("", "")
+    sizes = [each["response_amplitude"].isel(cycle=0).values for each in (result.dataset, again) if each is not None]
+    scale, peaks = scale_for(unit, *sizes), []
     for number, panel in enumerate(panels[:, 0]):
-        own = amplitude.isel(response=number)
-        lines = [
-            own.isel({axis: place for axis, place in point.items() if axis in own.dims}) for point in choice.points
-        ]
-        values = np.array([line.values[course.index] for line in lines])
-        scale = scale_for(unit, values, *([] if worn is None else [worn["response_amplitude"].values]))
-        for line, (point, label) in enumerate(choice):
-            text = label if _BEFORE in result.varying else ", ".join(filter(None, (label, "new joint")))
-            _draw_branch(result, panel, course, {**result.shown_point(), **point}, scale(values[line]), line, text)
-            peaks += [_tell_peak(scale, values[line], course.values, text)] if number == 0 else []
-        if worn is not None:
-            after = worn["response_amplitude"].isel(response=number).values[course.index]
-            error = worn["response_error"].values[course.index] * after
-            add_line(panel, course.values, scale(after), scale(error), label=str(worn.attrs["title"]), **_WORN)
-            peaks += [_tell_peak(scale, after, course.values, worn.attrs["title"])] if number == 0 else []
-        if result.has("exact_response_amplitude"):
-            _draw_exact(result, panel, course, scale, number)
+        if course is not None:
+            new, told = _draw_new(result, panel, course, scale, number)
+            peaks += new if number == 0 else []
+        if again is not None:
+            worn = _draw_again(panel, again, scale, number)
+            peaks += worn if number == 0 else []
         set_from_zero(panel, panel.dataLim.ymax)
         panel.set_ylabel(scale.label(f"amplitude of {result.responses[number]}"))
-        _mark_folds(result, panel)
-        crosses = mark_failed(panel, course.values, np.isnan(values))
-    course.set_axis(panels[-1, 0])
+    panels[-1, 0].set_xlabel("excitation frequency (Hz)")
     add_legend(figure)
     text = as_sentences(
         f"Largest amplitude of the first harmonic of {result.responses[0]}: {'; '.join(filter(None, peaks))}",
-        f"One joint, {worn.attrs['title']}: its response curve at that wear, without further wear"
-        if worn is not None
-        else "",
-        crosses,
+        f"One joint, {again.attrs['title']}: its response curve at that wear, without further wear" if again else "",
+        f"{again.attrs['how']}" if again else "study-report --worn-response adds the curve of one worn joint",
         "More responses are in the file" if len(result.responses) > n_panels else "",
-        choice.sentence,
+        *told,
     )
     if _BEFORE in result.axes:
         title = "Frequency response of one joint, worn before"
-    elif worn is not None:
-        title = f"Frequency response, new and {worn.attrs['title']}"
+    elif again is not None:
+        title = f"Frequency response, new and {again.attrs['title']}"
     return Drawing(name, title, text, figure)
+
+
+def _draw_new(
+    result: Result, panel: Axes, course: Course, scale: Scale, number: int
+) -> tuple[list[str], tuple[str, str]]:
+    """Lines of a response of the new joint; their peaks in words, and sentences about what failed or is left out."""
+    # how a joint wears makes no difference to the new one: NaN where a scheme has found no state
+    alike = [axis for axis in _OF_WEAR if axis in result.axes]
+    choice = choose(result, ["frequency", *alike], _MOST_LINES, first=(_BEFORE, "sweep", "excitation_amplitude"))
+    own = result.read("response_amplitude").isel(cycle=0, response=number).max(alike)
+    lines = [own.isel(point, missing_dims="ignore").values[course.index] for point in choice.points]
+    peaks = []
+    for place, (line, (point, label)) in enumerate(zip(lines, choice, strict=True)):
+        text = label if _BEFORE in result.varying else ", ".join(filter(None, (label, "new joint")))
+        _draw_branch(result, panel, course, {**result.shown_point(), **point}, scale(line), place, text)
+        peaks.append(_tell_peak(scale, line, course.values, text))
+    if result.has("exact_response_amplitude"):
+        _draw_exact(result, panel, course, scale, number)
+    _mark_folds(result, panel)
+    return peaks, (mark_failed(panel, course.values, np.isnan(lines)), choice.sentence)
+
+
+def _draw_again(panel: Axes, again: xr.Dataset, scale: Scale, number: int) -> list[str]:
+    """Lines of a response computed again, of the worn joint and where it is there of the new one; their peaks."""
+    frequency, peaks = again["frequency"].values, []
+    for cycle in range(again.sizes["cycle"]):
+        is_new = again.sizes["cycle"] > 1 and cycle == 0
+        values = again["response_amplitude"].isel(cycle=cycle, response=number).values
+        label, look = ("new joint", line_style(0)) if is_new else (str(again.attrs["title"]), _WORN)
+        error = again["response_error"].isel(cycle=cycle).values * values
+        add_line(panel, frequency, scale(values), scale(error), label=label, **look)
+        peaks.append(_tell_peak(scale, values, frequency, label))
+    return peaks
 
 
 def _tell_peak(scale: Scale, values: FloatArray, frequency: FloatArray, text: str) -> str:
@@ -110,6 +130,7 @@ def _draw_branch(
     if result.has("branch"):
         jumps = np.flatnonzero(np.diff(course.read(result, "branch", point)) != 0) + 1
         at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan)
+    # the second colour is that of the worn joint
     panel.plot(at, values, **course.line_style(number + (number > 0)), label=label)
 
 
@@ -159,9 +180,7 @@ def draw_after_wear(result: Result) -> Drawing | None:
     text = as_sentences(
         "Each mark is another joint, which wore at its own frequency: the marks are no response curve",
         "That they are low where the new joint resonates does not mean that wear protects",
-        "study-report --worn-response computes the curve of one worn joint"
-        if "worn_response" not in result.again
-        else "",
+        "The response curves of one new and one worn joint are above",
         choice.sentence,
     )
     title = "Response of different joints, each after wear at its own frequency"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection
+from functools import wraps
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,14 @@ from numpy.typing import NDArray
 from studyrunner.report.drawing import (
     COLOURS,
     Drawing,
+    FloatArray,
     Missing,
     add_legend,
     line_style,
     new_panels,
     set_from_zero,
 )
-from studyrunner.report.figures.courses import Course, find_course, slow_time
+from studyrunner.report.figures.courses import find_course, slow_time
 from studyrunner.result.choice import choose
 from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import NO_VOLUME, Point, Result, as_sentences
@@ -29,62 +31,46 @@ from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.statistics.sentence import deciding_input, describe_ranking, leading_input, measure_of
 from studyrunner.system.progress import count
 
-FloatArray = NDArray[np.float64]
-Shown = list[tuple[Point, str, xr.Dataset]]
+_Shown = list[tuple[Point, str, xr.Dataset]]
 """Combinations of the axes beside the samples with their labels and statistics."""
+_Draw = Callable[[Result, xr.Dataset], Drawing | Missing | None]
 
 _MOST_PANELS, _MOST_LINES = 4, 3
-_LOWEST, _HIGHEST = 0, 1
-"""Places along the dimension `bound`."""
+_LOWEST, _HIGHEST = 0, 1  # places along the dimension `bound`
+# quantiles between which a band lies, how dark it is, and what it is called
 _BANDS: tuple[tuple[int, int, float, str], ...] = ((0, 4, 0.18, "5 to 95 %"), (1, 3, 0.32, "25 to 75 %"))
-"""Quantiles between which a band lies, how dark it is, and what it is called."""
 _MIDDLE = 2
 _NOT_NEGLIGIBLE = 1e-3
-_CHARACTERS = 80
-"""Of titles over panels side by side."""
+_CHARACTERS = 80  # of titles over panels side by side
 _EXCEEDED = (
     ("worn_volume_exceedance", "exceeded_volume", "m3", "worn volume"),
     ("wear_depth_exceedance", "exceeded_depth", "m", "largest wear depth"),
 )
+# name, marker and number of the colour of samples, by what `groups_of` says
 _GROUPS = (("samples", "o", 0), ("lower group", "o", 0), ("upper group", "s", 1), ("between", "D", 3))
-"""Name, marker and number of the colour of samples, by what `groups_of` says."""
 
 
-def draw_scatter(result: Result) -> Iterator[Drawing | Missing]:
-    """Bands, exceedance, indices and deciding input; a sentence where the samples cannot be told of."""
-    if SAMPLE not in result.varying:
-        return
-    statistics, title = result.statistics, "Scatter of the worn volume"
-    if statistics is None:
-        lacks = result.lacks("worn_volume")
-        yield Missing(
-            "scatter", title, lacks or "The file holds more samples than the report takes: read it in Python."
+def _of_samples(draw: _Draw) -> Callable[[Result], Drawing | Missing | None]:
+    """A figure of the statistics of a result; nothing where it has no samples, or nothing is worn."""
+
+    @wraps(draw)
+    def drawn(result: Result) -> Drawing | Missing | None:
+        worn = (
+            SAMPLE in result.varying
+            and result.has("worn_volume")
+            and float(result.read("worn_volume").max()) > NO_VOLUME
         )
-        return
-    if not float(result.read("worn_volume").max()) > NO_VOLUME:
-        yield Missing("scatter", title, "Nothing is worn at the counts kept.")
-        return
-    last = statistics.isel(cycle=-1)
-    if statistics.sizes["cycle"] > 1:
-        yield _draw_bands(result, statistics, None)
-    course = find_course(result)
-    if course is not None:
-        yield _draw_bands(result, last.isel({course.axis: course.index}), course)
-    yield _draw_exceedance(result, last)
-    if "input" in statistics.dims:
-        yield _draw_indices(result, last)
-        yield _draw_samples(result, last)
+        return draw(result, result.statistics) if worn and result.statistics is not None else None
+
+    return drawn
 
 
 def _choose(
     result: Result, statistics: xr.Dataset, free: Collection[str] = (), limit: int = _MOST_PANELS
-) -> tuple[Shown, str]:
+) -> tuple[_Shown, str]:
     """Combinations of the axes beside samples and `free`, at most `limit`, and a sentence on those left out."""
     choice = choose(result, [SAMPLE, *free], limit)
-    return [
-        (point, label, statistics.isel({name: index for name, index in point.items() if name in statistics.dims}))
-        for point, label in choice
-    ], choice.sentence
+    return [(point, label, statistics.isel(point, missing_dims="ignore")) for point, label in choice], choice.sentence
 
 
 def _ends(statistics: xr.Dataset, name: str, *dims: str) -> FloatArray:
@@ -96,7 +82,7 @@ def _largest(*values: FloatArray) -> float:
     return max((float(each[np.isfinite(each)].max(initial=0.0)) for each in values), default=0.0)
 
 
-def _panel_grid(shown: Shown, height: float, **options: Any) -> tuple[Figure, NDArray[Any]]:
+def _panel_grid(shown: _Shown, height: float, **options: Any) -> tuple[Figure, NDArray[Any]]:
     """A figure and its panels (rows, columns) with the labels, two by two where there are four, else side by side."""
     n_columns = 2 if len(shown) == _MOST_PANELS else len(shown)
     n_rows = -(-len(shown) // n_columns)
@@ -106,12 +92,27 @@ def _panel_grid(shown: Shown, height: float, **options: Any) -> tuple[Figure, ND
     return figure, panels
 
 
-def _draw_bands(result: Result, statistics: xr.Dataset, course: Course | None) -> Drawing:
-    """5, 25, 50, 75 and 95 % of the samples over the cycles, or at the last count over a course."""
-    name, axis = "worn_volume_quantile", course.axis if course else "cycle"
-    shown, left_out = _choose(result, statistics, [course.axis] if course else [])
+@_of_samples
+def draw_bands(result: Result, statistics: xr.Dataset) -> Drawing | None:
+    """5, 25, 50, 75 and 95 % of the samples over the cycles."""
+    return _draw_bands(result, statistics, "") if statistics.sizes["cycle"] > 1 else None
+
+
+@_of_samples
+def draw_bands_over_course(result: Result, statistics: xr.Dataset) -> Drawing | None:
+    """5, 25, 50, 75 and 95 % of the samples at the last count over the course."""
+    course = find_course(result)
+    if course is None:
+        return None
+    return _draw_bands(result, statistics.isel(cycle=-1).isel({course.axis: course.index}), course.axis)
+
+
+def _draw_bands(result: Result, statistics: xr.Dataset, over: str) -> Drawing:
+    """over: axis of the study, empty for slow time."""
+    name, course = "worn_volume_quantile", find_course(result, over) if over else None
+    shown, left_out = _choose(result, statistics, [over] if over else [])
     counts = statistics["cycle"].values.astype(float)
-    cycles = scale_for(result.counted, counts)
+    cycles, axis = scale_for(result.counted, counts), over or "cycle"
     at = course.values if course else cycles(counts)
     volumes = [_ends(point, name, axis, "quantile") for _, _, point in shown]
     wrong = [_ends(point, f"{name}_error", axis, "quantile") for _, _, point in shown]
@@ -124,7 +125,7 @@ def _draw_bands(result: Result, statistics: xr.Dataset, course: Course | None) -
         if course:
             course.set_axis(panel)
         else:
-            panel.set_xlabel(cycles.label(slow_time(result)))
+            panel.set_xlabel(slow_time(result, cycles))
     for panel in panels[:, 0]:
         panel.set_ylabel(scale.label("worn volume"))
     panels[0, 0].set_xlim(at.min(), at.max())
@@ -139,9 +140,8 @@ def _draw_bands(result: Result, statistics: xr.Dataset, course: Course | None) -
         f"Hatched: what {count(n_without, 'sample')} without a value to be trusted leave open" if n_without else "",
         left_out,
     )
-    over = course.name if course else result.counted
-    name = "worn_volume_bands_course" if course else "worn_volume_bands"
-    return Drawing(name, f"Worn volume of the samples over {over}", text, figure)
+    title = f"Worn volume of the samples over {course.name if course else result.counted}"
+    return Drawing("worn_volume_bands_course" if over else "worn_volume_bands", title, text, figure)
 
 
 def _draw_band(panel: Axes, at: FloatArray, volume: FloatArray, wrong: FloatArray, scale: Scale) -> None:
@@ -150,6 +150,8 @@ def _draw_band(panel: Axes, at: FloatArray, volume: FloatArray, wrong: FloatArra
     for low, high, alpha, label in _BANDS:
         style: dict[str, Any] = {"color": COLOURS[0], "alpha": alpha, "lw": 0.0, "label": label}
         panel.fill_between(at, drawn[:, low, _LOWEST], drawn[:, high, _HIGHEST], **style)
+        for place, bound in ((low, _LOWEST), (high, _HIGHEST)):
+            panel.plot(at, drawn[:, place, bound], color=COLOURS[0], lw=0.5, alpha=0.5, label=f"_{label}")
     panel.plot(at, drawn[:, _MIDDLE, _LOWEST], color=COLOURS[0], marker="o" if at.size <= 12 else "", label="median")
     for number in np.flatnonzero((volume[..., _HIGHEST] > volume[..., _LOWEST]).any(axis=0)).tolist():
         style = {"facecolor": "none", "edgecolor": "0.45", "hatch": "////", "lw": 0.0, "label": "left open"}
@@ -161,7 +163,7 @@ def _draw_band(panel: Axes, at: FloatArray, volume: FloatArray, wrong: FloatArra
         panel.plot(at, scale(np.where(np.isfinite(wrong), wrong, np.nan)[:, -1, _HIGHEST]), **style)
 
 
-def _tell_last(shown: Shown, scale: Scale) -> list[str]:
+def _tell_last(shown: _Shown, scale: Scale) -> list[str]:
     """Quantiles at the last cycle count of each panel, with their confidence intervals."""
     found = []
     for _, label, point in shown:
@@ -182,8 +184,10 @@ def _range(scale: Scale, low: float, high: float) -> str:
     return scale.show(low) if low == high else f"{scale.show(low)} to {scale.show(high)}"
 
 
-def _draw_exceedance(result: Result, last: xr.Dataset) -> Drawing:
+@_of_samples
+def draw_exceedance(result: Result, statistics: xr.Dataset) -> Drawing:
     """Probability of more than a volume, and of deeper than a depth, with its confidence band."""
+    last = statistics.isel(cycle=-1)
     shown, left_out = _choose(result, last, limit=_MOST_LINES)
     held = [one for one in _EXCEEDED if one[0] in last]
     figure, panels = new_panels(1, len(held), 3.2, sharey=True)
@@ -200,8 +204,7 @@ def _draw_exceedance(result: Result, last: xr.Dataset) -> Drawing:
         panel.set_xlim(0.0, scale(last[dimension].values[-1]).item())
         panel.set_ylim(0.0, 1.02)
     panels[0, 0].set_ylabel("probability of more")
-    if len(shown) > 1:
-        add_legend(figure)
+    add_legend(figure)
     text = as_sentences(
         f"Probability that more is worn than a volume {result.when(-1)}"
         + (", and that a pair is worn deeper than a depth until then" if len(held) > 1 else "")
@@ -213,9 +216,13 @@ def _draw_exceedance(result: Result, last: xr.Dataset) -> Drawing:
     return Drawing("exceedance", "Probability of more wear", text, figure)
 
 
-def _draw_indices(result: Result, last: xr.Dataset) -> Drawing | Missing:
+@_of_samples
+def draw_deciding_inputs(result: Result, statistics: xr.Dataset) -> Drawing | Missing | None:
     """What each input decides at the last cycle count: Sobol' indices, or rank correlations, with their intervals."""
-    title, measure = "What decides the worn volume", measure_of(last)
+    title, last = "What decides the worn volume", statistics.isel(cycle=-1)
+    measure = measure_of(last)
+    if "input" not in last.dims:
+        return None
     if measure is None or not last[measure].notnull().any():
         sentence = "The file holds too few samples to say what decides, or samples that do not differ: raise samples."
         return Missing("deciding_inputs", title, sentence)
@@ -228,7 +235,8 @@ def _draw_indices(result: Result, last: xr.Dataset) -> Drawing | Missing:
             value, interval = (_ends(point, f"{name}{each}", "input") for each in ("", "_interval"))
             width = 0.72 / len(bars)
             at, middle = np.arange(len(value)) + (place - 0.5 * (len(bars) - 1)) * 1.1 * width, value.mean(axis=1)
-            panel.bar(at, np.nan_to_num(middle), width, color=COLOURS[place], label=words)
+            panel.bar(at, np.nan_to_num(middle), width, color=COLOURS[place])
+            panel.plot(at, middle, color=COLOURS[place], marker="s", linestyle="none", label=words)
             sides = np.maximum(np.stack([middle - interval[:, _LOWEST], interval[:, _HIGHEST] - middle]), 0.0)
             panel.errorbar(at, middle, yerr=np.nan_to_num(sides), fmt="none", ecolor="0.2", elinewidth=1.0, capsize=3.0)
         names = [str(name).replace("_", "\n") for name in point["input"].values]
@@ -238,19 +246,16 @@ def _draw_indices(result: Result, last: xr.Dataset) -> Drawing | Missing:
     for panel in panels[:, 0]:
         panel.set_ylabel("share of the variance" if shares else "rank correlation")
     add_legend(figure)
-    told = _tell_rankings(shown)
     what = (
         "Share of the variance that each input decides, alone and with the others: first and total Sobol' index"
         if shares
         else "1 or -1 where the volume rises or falls with this input alone; an effect that rises and falls is not seen"
     )
-    text = as_sentences(
-        *told, what, f"Lines: {100.0 * float(last.attrs['confidence']):g} % confidence intervals", left_out
-    )
-    return Drawing("deciding_inputs", title, text, figure)
+    intervals = f"Lines: {100.0 * float(last.attrs['confidence']):g} % confidence intervals"
+    return Drawing("deciding_inputs", title, as_sentences(*_tell_rankings(shown), what, intervals, left_out), figure)
 
 
-def _tell_rankings(shown: Shown) -> list[str]:
+def _tell_rankings(shown: _Shown) -> list[str]:
     """Which input decides most, or that this is not known, of each combination."""
     told = [(label, describe_ranking(point)) for _, label, point in shown]
     return [f"{label}: {says}" if label else says[0].upper() + says[1:] for label, says in told if says]
@@ -264,16 +269,15 @@ def groups_of(point: xr.Dataset, worn: FloatArray) -> NDArray[np.int_]:
     return np.select([worn <= lower, worn >= upper], [1, 2], 3)
 
 
-def _draw_samples(result: Result, last: xr.Dataset) -> Drawing:
-    """Worn volumes at the last count over the input with the largest index; of a single panel the density beside it."""
+@_of_samples
+def draw_deciding_input(result: Result, statistics: xr.Dataset) -> Drawing | None:
+    """Worn volumes at the last count over the input with the largest index."""
+    last = statistics.isel(cycle=-1)
+    if "input" not in last.dims:
+        return None
     shown, left_out = _choose(result, last)
     scale = scale_for("m3", result.worn)
-    if len(shown) == 1:
-        figure, ((first, density),) = new_panels(1, 2, 3.6, sharey=True, width_ratios=(4.0, 1.0))
-        panels = np.array([[first]])
-        _draw_density(density, shown[0][2], scale)
-    else:
-        figure, panels = _panel_grid(shown, 3.0)
+    figure, panels = _panel_grid(shown, 3.0)
     names, highest, groups = [], 0.0, []
     for panel, (point, label, found) in zip(panels.flat, shown, strict=True):
         names.append(str(found["input"].values[leading_input(found)]))
@@ -288,7 +292,6 @@ def _draw_samples(result: Result, last: xr.Dataset) -> Drawing:
         *(unknown or ["Over the input that decides most of it alone"]),
         "Bars: numerical error of the sample" if np.isfinite(result.errors).any() else "",
         *groups,
-        "Right: density of the samples" if len(shown) == 1 else "",
         "Crosses: samples that ended early, at what was worn by then" if (result.held & ~result.computed).any() else "",
         left_out,
     )
@@ -321,28 +324,15 @@ def _draw_dots(panel: Axes, result: Result, point: Point, found: xr.Dataset, nam
     sides = scale(np.stack([np.minimum(wrong, worn)[told], wrong[told]]))
     panel.errorbar(at[told], scale(worn[told]), yerr=sides, fmt="none", ecolor="0.7", elinewidth=0.9, zorder=1)
     size = 16.0 if worn.size > 300 else 26.0
-    for number, (label, marker, colour) in enumerate(_GROUPS):
-        own = computed & (group == number)
+    kinds = [(computed & (group == number), *look) for number, look in enumerate(_GROUPS)]
+    kinds.append((~computed & np.isfinite(worn), "ended early", "X", 3))
+    for own, label, marker, colour in kinds:
         if own.any():
             style: dict[str, Any] = {"color": COLOURS[colour], "marker": marker, "edgecolors": "white", "label": label}
             panel.scatter(at[own], scale(worn[own]), size, linewidths=0.4, **style)
-    early = ~computed & np.isfinite(worn)
-    if early.any():
-        panel.scatter(at[early], scale(worn[early]), size, color="black", marker="x", label="ended early")
     panel.set_xlabel(across.label(words))
     largest = float(np.nanmax(worn, initial=0.0))
     return min(largest + float(np.max(wrong[told], initial=0.0)), 1.5 * largest)
-
-
-def _draw_density(panel: Axes, found: xr.Dataset, scale: Scale) -> None:
-    """The density of the samples, lying, beside them."""
-    grid, density = scale(found["worn_volume_grid"].values), found["worn_volume_density"].values / scale.factor
-    panel.fill_betweenx(grid, 0.0, density, color="0.8", lw=0.0)
-    panel.plot(density, grid, color="0.3", linewidth=1.0)
-    panel.set_xlim(left=0.0)
-    panel.set_xlabel(f"density\n(1/{scale.unit})")
-    panel.tick_params(labelleft=False)
-    panel.locator_params(axis="x", nbins=3)
 
 
 def _tell_groups(point: xr.Dataset, label: str, scale: Scale) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -27,7 +27,7 @@ RESOLVED = 3.0
 """An error counts from so many times the uncertainty of the reference on."""
 
 _ROUND_OFF = 1e-12
-_AUTO, _ADAPTIVE, _FINAL, _EXPLICIT = "auto", "adaptive", "final", "explicit"
+_AUTO, _OWN_STEPS, _EXPLICIT = "auto", ("adaptive", "final"), "explicit"
 _VALUES = ("run_time", "error_estimate", "response_error", "harmonics_used", "samples_used")
 
 
@@ -45,9 +45,7 @@ class Setting:
     def words(self, key: str) -> str:
         """One value as text; a dash where there is none."""
         value = getattr(self, key)
-        if value is None:
-            return "\N{EN DASH}"
-        return value if isinstance(value, str) else show_number(value, 4)
+        return "\N{EN DASH}" if value is None else value if isinstance(value, str) else show_number(value, 4)
 
     def describe(self) -> str:
         """Those values that there are, in words."""
@@ -59,10 +57,10 @@ class Setting:
 class ComparedPoint:
     """One point of the axes that are no settings: what each setting gave there.
 
-    label: the point in words, empty where nothing but settings varies. settings: in the order of the rows of all
-    arrays. computed (n_setting,): whether to the last count. values (n_setting,): `run_time` in CPU seconds and what
-    else the file says of the last count, NaN where it does not. worn (n_setting,): m3. response (n_setting,
-    n_response): m. endings: words of the outcomes. exact: worn volume and response, None where the file holds none.
+    label: the point in words, empty where nothing but settings varies. computed (n_setting,): whether to the last
+    count. values (n_setting,): `run_time` in CPU seconds and what else the file says of the last count. worn
+    (n_setting,): m3. response (n_setting, n_response): m. endings: words of the outcomes. exact: worn volume and
+    response, None where the file holds none.
     """
 
     label: str
@@ -81,19 +79,16 @@ class ComparedPoint:
         It has the most harmonics, then the most samples, then the smallest tolerances, and of those the smallest
         estimated error of the worn volume.
         """
-        rows = np.flatnonzero(self.computed)
-        if self.exact is not None or not rows.size:
-            return None
-        return int(max(rows.tolist(), key=self._rank))
+        rows = np.flatnonzero(self.computed).tolist()
+        return None if self.exact is not None or not rows else int(max(rows, key=self._rank))
 
     def _rank(self, row: int) -> tuple[float, ...]:
         """As numbers, the highest the finest; automatic ones rank by what the last state took."""
-        setting = self.settings[row]
+        setting, error = self.settings[row], self.values["error_estimate"][row]
         used = [
             np.nan_to_num(self.values[f"{key}_used"][row]) if value == _AUTO else float(value or 0.0)
             for key, value in (("harmonics", setting.harmonics), ("samples", setting.samples))
         ]
-        error = self.values["error_estimate"][row]
         error = error if math.isfinite(error) and setting.scheme != _EXPLICIT else math.inf
         return (*used, -(setting.tolerance or 0.0), -error, -(setting.rtol or 0.0), -(setting.step or 0.0))
 
@@ -117,8 +112,7 @@ class ComparedPoint:
         volume = np.where(self.worn > NO_VOLUME, np.inf, np.nan)
         if worn > NO_VOLUME:
             volume = np.abs(self.worn - worn) / worn
-        size = float(np.linalg.norm(response))
-        away = np.linalg.norm(self.response - response, axis=-1) / (size if size > 0.0 else np.nan)
+        away = np.linalg.norm(self.response - response, axis=-1) / (float(np.linalg.norm(response)) or np.nan)
         compared = self.computed & (np.arange(len(self.settings)) != self.reference)
         return {"volume": np.where(compared, volume, np.nan), "response": np.where(compared, away, np.nan)}
 
@@ -132,12 +126,10 @@ class ComparedPoint:
 
         An error that is not resolved counts as the smallest that would be.
         """
-        errors, time = self.errors[quantity], self.values["run_time"]
-        errors = np.maximum(errors, RESOLVED * self.uncertainty[quantity])
-        own = [
-            row for row, each in enumerate(self.settings) if scheme in (None, each.scheme) and np.isfinite(errors[row])
-        ]
-        own.sort(key=lambda row: (time[row], errors[row]))
+        errors = np.maximum(self.errors[quantity], RESOLVED * self.uncertainty[quantity])
+        own = [row for row, each in enumerate(self.settings) if scheme in (None, each.scheme)]
+        own = [row for row in own if np.isfinite(errors[row])]
+        own.sort(key=lambda row: (self.values["run_time"][row], errors[row]))
         least = np.minimum.accumulate([math.inf, *(errors[row] for row in own)])
         return [row for row, before in zip(own, least, strict=False) if errors[row] < before]
 
@@ -148,71 +140,60 @@ def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
     Empty where the file does not compare at least two with a third one, or with the exact answer. Schemes alone are
     compared with the exact answer only.
     """
-    keys = [key for key in KEYS if key in result.varying]
-    alone = all(key == "scheme" for key in keys) and not result.has("exact_worn_volume")
+    varying = [key for key in KEYS if key in result.varying]
+    alone = set(varying) <= {"scheme"} and not result.has("exact_worn_volume")
     if alone or result.blocks is not None or not result.has("worn_volume", "response_amplitude"):
         return ()
-    points = tuple(_read_points(result))
-    most = max(int(np.isfinite(point.errors[name]).sum()) for point in points for name in QUANTITIES)
-    return points if most > 1 else ()
+    keys, others = ([name for name in result.axes if (name in KEYS) == each] for each in (True, False))
+    settings = _list_settings(result, keys)
+    rows, n_points = list(settings.values()), math.prod(result.dataset.sizes[name] for name in others)
 
-
-def _read_points(result: Result) -> Iterator[ComparedPoint]:
-    others = [name for name in result.axes if name not in KEYS]
-    varying = [name for name in others if name in result.varying]
-    settings = _list_settings(result)
-    rows = list(settings.values())
-
-    def read(name: str) -> xr.DataArray:
-        values = result.read(name) if result.has(name) else xr.full_like(result.dataset["outcome"], np.nan, float)
-        return values.isel(cycle=-1) if "cycle" in values.dims else values
-
-    def by_setting(values: xr.DataArray, place: Mapping[str, int]) -> FloatArray:
-        own = values.isel(place).transpose(*(name for name in result.axes if name in KEYS), ...)
-        size = math.prod(own.sizes[name] for name in own.dims if name in KEYS)
-        return np.asarray(own.values, dtype=float).reshape(
-            size, *own.shape[len(own.dims) - ("response" in own.dims) :]
-        )[rows]
+    def table(values: xr.DataArray) -> FloatArray:
+        """Values (n_points, n_setting, ...)."""
+        own = values.isel(cycle=-1, missing_dims="ignore").transpose(*others, *keys, ...)
+        return np.asarray(own.values, dtype=float).reshape(n_points, -1, *own.shape[len(result.axes) :])[:, rows]
 
     outcome = result.dataset["outcome"]
-    computed = outcome.copy(data=result.computed)
-    arrays = {name: read(name) for name in (*_VALUES, "worn_volume", "response_amplitude")}
-    exact = [read(name) for name in ("exact_worn_volume", "exact_response_amplitude")]
-    for indices in itertools.product(*(range(result.dataset.sizes[name]) for name in others)):
-        place = dict(zip(others, indices, strict=True))
-        answers = [by_setting(each, place)[0] for each in exact]
-        known = all(np.isfinite(each).all() for each in answers)
-        yield ComparedPoint(
-            label=result.describe(place, varying) if varying else "",
+    unknown = xr.full_like(outcome, np.nan, float)
+    held = (*_VALUES, "worn_volume", "response_amplitude", "exact_worn_volume", "exact_response_amplitude")
+    read = {name: table(result.read(name) if result.has(name) else unknown) for name in held}
+    computed, endings = table(outcome.copy(data=result.computed)) == 1.0, table(outcome)
+    points = []
+    for number, place in enumerate(itertools.product(*(range(result.dataset.sizes[name]) for name in others))):
+        exact = float(read[held[-2]][number, 0]), np.atleast_1d(read[held[-1]][number, 0])
+        point = ComparedPoint(
+            label=result.describe(dict(zip(others, place, strict=True)), set(result.varying) - set(KEYS)),
             settings=tuple(settings),
-            computed=by_setting(computed, place) == 1.0,
-            values={name: by_setting(arrays[name], place) for name in _VALUES},
-            worn=by_setting(arrays["worn_volume"], place),
-            response=by_setting(arrays["response_amplitude"], place),
-            endings=tuple(result.endings[int(each)].word for each in by_setting(outcome, place)),
-            exact=(float(answers[0]), np.atleast_1d(answers[1])) if known else None,
+            computed=computed[number],
+            values={name: read[name][number] for name in _VALUES},
+            worn=read["worn_volume"][number],
+            response=read["response_amplitude"][number],
+            endings=tuple(result.endings[int(each)].word for each in endings[number]),
+            exact=exact if all(np.isfinite(each).all() for each in exact) else None,
         )
+        points.append(point)
+    most = max(int(np.isfinite(point.errors[name]).sum()) for point in points for name in QUANTITIES)
+    return tuple(points) if most > 1 else ()
 
 
-def _list_settings(result: Result) -> dict[Setting, int]:
-    """All settings, each with the number of its first place among the values of `KEYS`, the last axis fastest.
+def _list_settings(result: Result, keys: list[str]) -> dict[Setting, int]:
+    """All settings, each with the number of its first place among the values of `keys`, the last axis fastest.
 
     A setting holds no value that it does not use: the file may have it at several places.
     """
-    keys = [name for name in result.axes if name in KEYS]
     by_depth = result.study.get("slow_time", {}).get("largest_depth") is not None
     solver = result.study.get("solver", {})
     found: dict[Setting, int] = {}
     axes = ([_value(key, value) for value in result.dataset[key].values] for key in keys)
     for place, given in enumerate(itertools.product(*axes)):
         setting = Setting(**dict(zip(keys, given, strict=True)))  # type: ignore[arg-type]
-        if setting.scheme in (_ADAPTIVE, _FINAL) or (setting.scheme == _EXPLICIT and by_depth):
+        if setting.scheme in _OWN_STEPS or (setting.scheme == _EXPLICIT and by_depth):
             setting = replace(setting, step=None)
         if result.cycles[-1] == 0.0:
             # only unworn states: no scheme takes a step
             setting = replace(setting, scheme=None, step=None)
         automatic = [getattr(setting, key) or solver.get(key, _AUTO) for key in ("harmonics", "samples")]
-        if setting.scheme not in (_ADAPTIVE, _FINAL) and _AUTO not in automatic:
+        if setting.scheme not in _OWN_STEPS and _AUTO not in automatic:
             setting = replace(setting, rtol=None)
         found.setdefault(setting, place)
     return found

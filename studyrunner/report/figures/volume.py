@@ -134,7 +134,7 @@ def draw_map(result: Result, name: str) -> Drawing | None:
         panel.grid(visible=False)
         panel.set_title(textwrap.fill(label, _CHARACTERS // n_columns))
     for panel in panels[:, 0]:
-        panel.set_ylabel(cycles.label(slow_time(result)))
+        panel.set_ylabel(slow_time(result, cycles))
     for panel in panels[-1]:
         course.set_axis(panel)
     add_colour_bar(figure, panels, norm, scale.label(words))

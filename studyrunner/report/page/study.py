@@ -6,21 +6,18 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 
 from studyrunner.coordinates import COORDINATES
 from studyrunner.result.certainty import advise_ended, describe_ended, tell_ends
-from studyrunner.result.endings import Ending
+from studyrunner.result.points import CONVERGED
 from studyrunner.result.units import scale_for, show_cycles, show_number, units_of
-from studyrunner.result.view import CONVERGED, Point, Result
-from studyrunner.statistics.samples import DRAWN, SAMPLE
-from studyrunner.statistics.sentence import sentence, sentences
+from studyrunner.result.view import Result
+from studyrunner.statistics.samples import DRAWN
 from studyrunner.summary.answer import summarise
 from studyrunner.summary.lines import summary_rows
 from studyrunner.system.progress import count
 
 _MOST_VALUES = 12
-_MOST_SENTENCES = 3
 
 
 @dataclass(frozen=True)
@@ -64,22 +61,21 @@ def describe_study(result: Result) -> StudyFacts:
     facts += [(label, str(attributes[name])) for name, label in named.items() if name in attributes]
     numbers = Counter(result.dataset["outcome"].values.ravel().tolist())
     endings = [
-        Ended(count(numbers[number], "point"), _with_advice(result, ending), describe_ended(result, number))
-        for number, ending in sorted(result.endings.items())
+        Ended(count(numbers[number], "point"), _with_advice(result, number), describe_ended(result, number))
+        for number in sorted(result.endings)
         if numbers[number] and number != CONVERGED
     ]
-    summary = " ".join(filter(None, (_tell_samples(result), tell_ends(result))))
     return StudyFacts(
         summary_rows(summarise(result)),
-        summary,
+        tell_ends(result),
         endings,
         facts,
         str(attributes["study"]) if "study" in attributes else None,
     )
 
 
-def _with_advice(result: Result, ending: Ending) -> str:
-    return " ".join((ending.sentence, *advise_ended(result, ending.number)))
+def _with_advice(result: Result, number: int) -> str:
+    return " ".join((result.endings[number].sentence, *advise_ended(result, number)))
 
 
 def _axis_values(result: Result, name: str) -> str:
@@ -94,23 +90,6 @@ def _axis_values(result: Result, name: str) -> str:
     if len(values) > _MOST_VALUES:
         return f"{values[0]} to {values[-1]}{after}, {len(values)} values{told}"
     return ", ".join(values) + after + told
-
-
-def _tell_samples(result: Result) -> str:
-    """What the samples say at each combination of the other axes, or at the shown one alone of many."""
-    if result.statistics is None:
-        return ""
-    told = sentences(result.statistics)
-    if len(told) > _MOST_SENTENCES:
-        shown = {name: index for name, index in result.shown_point().items() if name != SAMPLE}
-        told = [f"{result.describe(shown)}: {sentence(_last_at(result.statistics, shown))}"]
-    return " ".join(f"{line}." for line in told)
-
-
-def _last_at(statistics: xr.Dataset, point: Point) -> xr.Dataset:
-    """Statistics of a point at the last count."""
-    kept = {name: index for name, index in point.items() if name in statistics.dims}
-    return statistics.isel(kept).isel(cycle=-1, missing_dims="ignore")
 
 
 def _drawn(result: Result) -> list[tuple[str, str]]:

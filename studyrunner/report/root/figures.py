@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from studyrunner.report.drawing import MAP, Drawing, Missing, new_panel, new_panels, title_at
+from studyrunner.report.drawing import (
+    MAP,
+    Drawing,
+    FloatArray,
+    Missing,
+    add_colour_bar,
+    new_panel,
+    new_panels,
+    title_at,
+)
 from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint_edges, paint_faces, rgb
 from studyrunner.report.root.surface import RootSurface, read_root
@@ -23,124 +29,119 @@ from studyrunner.result.scene_pairs import depths, tells_depth
 from studyrunner.result.units import Scale, scale_for, show_number
 from studyrunner.result.view import Result, as_sentences
 
-_MOST_CLOSE_UPS = 2
-_MOST_NUMBERS = 120
-_MOST_PAIRS = 20_000
-_MOST_FACES, _MOST_OF_DISK = 60_000, 300_000
-_FEWEST_SECTORS = 3
-_TO_EYE = np.array([0.35, 0.25, 1.0])
-_FADED = 0.45
-_TITLES = {"slip_fraction": "Where the joint slips", "open_fraction": "Where the joint opens"}
-_NO_DEPTH = 1e-15
-"""m. A depth below this is round-off: it is far less than an atom."""
-
-
-def draw_root(result: Result) -> Iterator[Drawing | Missing]:
-    """Worn shape of the shown point, numbers of the pairs, and the whole disk.
-
-    Nothing where `_find_root` finds none.
-    """
-    surface, views = _find_root(result)
-    if surface is None:
-        return
-    state = _find_state(result)
-    # of a cylinder or a sphere on a flat the scar over x shows more
-    if state is not None and find_scar(result) is None:
-        yield draw_state(result, surface, views, state)
-    disk = _draw_disk(result, surface)
-    if disk is not None:
-        yield disk
-
-
-def _find_root(result: Result) -> tuple[RootSurface | None, tuple[View, ...]]:
-    """The surface as it is drawn, and from where; None without positions, or with too many pairs to tell."""
-    surface = read_root(result) if result.dataset.sizes["contact"] <= _MOST_PAIRS else None
-    if surface is None:
-        return None, ()
-    surface = surface.near_contact(_MOST_FACES)
-    return surface, find_views(result, surface)
+_MOST_CLOSE_UPS, _FEWEST_SECTORS = 2, 3
+_MOST_PAIRS, _MOST_FACES, _MOST_OF_DISK = 20_000, 60_000, 300_000
+_TO_EYE, _FADED = np.array([0.35, 0.25, 1.0]), 0.45  # the disk: direction to the eye, paleness of the other sectors
+_NO_DEPTH = 1e-15  # m; a depth below this is round-off: it is far less than an atom
+_PATCHES = "The file has no mesh: each pair is a patch"
 
 
 @dataclass(frozen=True)
-class State:
-    """What colours the root: the wear depth at the last cycle count, or the mean pressure where nothing is worn.
+class _Picture:
+    """What is painted on the root. depth, values (n_contact,): m; in SI. factor: by which the depth is exaggerated."""
 
-    cycle: index along `cycle`. depth, values (n_contact,): m; in the units of the result.
-    """
+    surface: RootSurface
+    views: tuple[View, ...]
+    depth: FloatArray
+    values: FloatArray
+    scale: Scale
+    label: str
+    factor: float = 1.0
 
-    name: str
-    cycle: int
-    depth: NDArray[np.float64]
-    values: NDArray[np.float64]
+    @property
+    def close_ups(self) -> list[View]:
+        """Views of contact surfaces of the outer body from close by."""
+        return [view for view in self.views if view.flank >= 0 and view.body == self.views[0].body][:_MOST_CLOSE_UPS]
+
+    @property
+    def wears(self) -> bool:
+        """Whether there is a depth to be seen."""
+        return float(self.depth.max()) > _NO_DEPTH
 
 
-def _find_state(result: Result) -> State | None:
-    """The state of the shown point that is drawn; None where the file holds no values of its pairs."""
-    shown = result.shown_point()
-    values = {"wear_depth": depths(result, shown)} if tells_depth(result) else {}
-    values |= {name: result.at(name, shown).values for name in ("mean_pressure",) if result.has(name)}
+def _read_surface(result: Result) -> RootSurface | None:
+    """The surface as it is drawn; None without positions, or with too many pairs to tell apart."""
+    surface = read_root(result) if result.dataset.sizes["contact"] <= _MOST_PAIRS else None
+    return None if surface is None else surface.near_contact(_MOST_FACES)
+
+
+def draw_root(result: Result) -> Drawing | None:
+    """The worn shape of the shown point, coloured with its wear depth; the mean pressure where nothing is worn."""
+    shown, surface = result.shown_point(), _read_surface(result)
+    fields = {"wear_depth": depths(result, shown)} if tells_depth(result) else {}
+    fields |= {name: result.at(name, shown).values for name in ("mean_pressure",) if result.has(name)}
     held = np.ones(len(result.cycles), dtype=np.bool_)
-    for each in values.values():
+    for each in fields.values():
         held &= np.isfinite(each).all(axis=1)
-    if not values or not held.any():
+    # of a cylinder or a sphere on a flat the scar over x shows more
+    if surface is None or not fields or not held.any() or find_scar(result) is not None:
         return None
     last = int(np.flatnonzero(held)[-1])
-    depth = values["wear_depth"][last] if "wear_depth" in values else np.zeros(result.dataset.sizes["contact"])
-    name = "wear_depth" if float(depth.max()) > _NO_DEPTH or "mean_pressure" not in values else "mean_pressure"
-    return State(name, last, depth, values[name][last])
-
-
-def draw_state(result: Result, surface: RootSurface, views: Sequence[View], state: State) -> Drawing:
-    """The mesh, and the contact surfaces of its outer body from close by, coloured, with the worn shape exaggerated."""
-    largest, worn = float(state.values.max()), float(state.depth.max()) > _NO_DEPTH
-    factor = surface.exaggeration(float(state.depth.max())) if worn else 1.0
-    scale = scale_for("m" if state.name == "wear_depth" else "Pa", state.values)
-    label = state.name.replace("_", " ")
-    figure = _paint_state(surface, views, state, factor, scale, label)
-    pair = result.dataset["contact"].values[int(np.argmax(state.values))]
+    depth = fields["wear_depth"][last] if "wear_depth" in fields else np.zeros(result.dataset.sizes["contact"])
+    worn = float(depth.max()) > _NO_DEPTH
+    name = "wear_depth" if worn or "mean_pressure" not in fields else "mean_pressure"
+    values, label = fields[name][last], name.replace("_", " ")
+    scale = scale_for("m" if name == "wear_depth" else "Pa", values)
+    factor = surface.exaggeration(float(depth.max())) if worn else 1.0
+    picture = _Picture(surface, find_views(result, surface), depth, values, scale, label, factor)
+    pair = result.dataset["contact"].values[int(np.argmax(values))]
     text = as_sentences(
-        f"{label.capitalize()} {result.when(state.cycle, 'after')}",
-        f"Largest: {scale.show(largest)} at pair {pair}" if largest > 0.0 else "",
+        f"{label.capitalize()} {result.when(last, 'after')}",
+        f"Largest: {scale.show(float(values.max()))} at pair {pair}" if float(values.max()) > 0.0 else "",
         f"The wear depth, of both surfaces together, is taken off each surface, {show_number(factor)} times exaggerated"
         if worn
         else "",
-        "Dashed: the edge of the contact surface before" if _close_ups(views) and worn else "",
-        "The file has no mesh: each pair is a patch" if not surface.is_mesh else "",
+        "Dashed: the edge of the contact surface before" if picture.close_ups and worn else "",
+        "" if surface.is_mesh else _PATCHES,
     )
-    return Drawing("worn_root", title_at(result, "The worn root" if worn else "The root"), text, figure)
+    return Drawing("worn_root", title_at(result, "The worn root" if worn else "The root"), text, _paint(picture))
 
 
-def _close_ups(views: Sequence[View]) -> list[View]:
-    """Views of contact surfaces of the outer body from close by."""
-    return [view for view in views if view.flank >= 0 and view.body == views[0].body][:_MOST_CLOSE_UPS]
+def draw_slip(result: Result) -> Drawing | Missing | None:
+    """Fraction of the period in which pairs slip, at the shown point: a large amplitude."""
+    return _draw_fraction(result, "slip_fraction", "Where the joint slips", "in slip")
 
 
-def _paint_state(
-    surface: RootSurface, views: Sequence[View], state: State, factor: float, scale: Scale, label: str
-) -> Figure:
-    """The root and close-ups, coloured with the values of a state. factor: by which worn depths are exaggerated."""
-    closer = _close_ups(views)
-    drawn = [views[-1], *closer]
-    figure, (panels,) = new_panels(1, len(drawn), 3.4, width_ratios=[1.0] + [2.0] * len(closer))
-    norm = Normalize(0.0, scale(float(state.values.max())).item() or 1.0)
-    for panel, view in zip(panels, drawn, strict=True):
-        _paint(panel, surface, view, state, factor, scale, norm)
+def draw_open(result: Result) -> Drawing | Missing | None:
+    """Fraction of the period in which pairs are open, at the shown point: a large amplitude."""
+    return _draw_fraction(result, "open_fraction", "Where the joint opens", "open")
+
+
+def _draw_fraction(result: Result, name: str, title: str, words: str) -> Drawing | Missing | None:
+    values, surface = np.asarray(result.at(name, result.shown_point()).values, dtype=float), _read_surface(result)
+    if surface is None:
+        return None
+    if not np.isfinite(values).all():
+        return Missing(name, title, "No point has a state.")
+    label, nothing = f"fraction of the period {words}", np.zeros(len(values))
+    picture = _Picture(surface, find_views(result, surface), nothing, values, scale_for("1", values), label)
+    pair = result.dataset["contact"].values[int(np.argmax(values))]
+    largest = f"Largest: {values.max():.3g} at pair {pair}" if values.max() > 0.0 else "No pair does"
+    caption = as_sentences(label.capitalize(), largest, "" if surface.is_mesh else _PATCHES)
+    return Drawing(name, title_at(result, title), caption, _paint(picture))
+
+
+def _paint(picture: _Picture) -> Figure:
+    """The root as a whole, and the contact surfaces of its outer body from close by."""
+    ratios = [1.0] + [2.0] * len(picture.close_ups)
+    figure, (panels,) = new_panels(1, len(ratios), 3.4, width_ratios=ratios)
+    norm = Normalize(0.0, picture.scale(float(picture.values.max())).item() or 1.0)
+    for panel, view in zip(panels, [picture.views[-1], *picture.close_ups], strict=True):
+        _paint_view(panel, picture, view, norm)
         panel.set_title(view.title)
-    figure.colorbar(ScalarMappable(norm), ax=panels, label=scale.label(label), fraction=0.05, panchor=False)
+    add_colour_bar(figure, panels, norm, picture.scale.label(picture.label), fraction=0.05, panchor=False)
     return figure
 
 
-def _paint(
-    panel: Axes, surface: RootSurface, view: View, state: State, factor: float, scale: Scale, norm: Normalize
-) -> None:
-    at_nodes = np.full(len(surface.nodes), np.nan)
-    at_nodes[surface.contact.nodes] = surface.contact.values(state.values)
-    worn = surface.worn(state.depth, factor)
-    faces, own = surface.faces[view.faces], surface.contact.flank[view.faces] >= 0
+def _paint_view(panel: Axes, picture: _Picture, view: View, norm: Normalize) -> None:
+    surface, at_nodes = picture.surface, np.full(len(picture.surface.nodes), np.nan)
+    at_nodes[surface.contact.nodes] = surface.contact.values(picture.values)
+    worn, faces = surface.worn(picture.depth, picture.factor), surface.faces[view.faces]
+    own = surface.contact.flank[view.faces] >= 0
     colours = rgb(body_colours(surface.bodies), surface.body[view.faces])
-    colours[own] = mpl.colormaps[MAP](norm(scale(at_nodes[faces[own]].mean(axis=1))))[:, :3]
+    colours[own] = mpl.colormaps[MAP](norm(picture.scale(at_nodes[faces[own]].mean(axis=1))))[:, :3]
     paint_faces(panel, worn, faces, colours, view)
-    if view.flank >= 0 and float(state.depth.max()) > _NO_DEPTH:
+    if view.flank >= 0 and picture.wears:
         looked_at = view.faces & (surface.contact.flank == view.flank)
         paint_edges(panel, surface.nodes, surface.faces[looked_at], view)
     if view.leading is not None:
@@ -148,39 +149,31 @@ def _paint(
     draw_scale_bar(panel, worn[np.unique(faces)], view)
 
 
-def _name_leading_edge(panel: Axes, nodes: NDArray[np.float64], view: View, edge: NDArray[np.float64]) -> None:
+def _name_leading_edge(panel: Axes, nodes: FloatArray, view: View, edge: FloatArray) -> None:
     """The words at the side of the picture where the leading edge (3,), m, is, with a line to it."""
-    right, up, _ = view.frame
-    at, middle = (np.array([place @ right, place @ up]) * 1e3 for place in (edge, nodes.mean(axis=0)))
-    size = float(np.ptp(nodes @ right)) * 1e3
+    at, middle, seen = (view.seen(each) for each in (edge, nodes.mean(axis=0), nodes))
+    size = float(np.ptp(seen[:, 0]))
     text = at + [np.sign(at[0] - middle[0]) * 0.02 * size, -0.28 * size]
-    panel.annotate(
-        "leading edge",
-        (at[0], at[1]),
-        (text[0], text[1]),
-        ha="center",
-        va="top",
-        arrowprops={"arrowstyle": "-", "lw": 0.8, "shrinkB": 0},
-    )
+    line = {"arrowstyle": "-", "lw": 0.8, "shrinkB": 0}
+    panel.annotate("leading edge", (at[0], at[1]), (text[0], text[1]), ha="center", va="top", arrowprops=line)
 
 
-def _draw_disk(result: Result, surface: RootSurface) -> Drawing | None:
+def draw_disk(result: Result) -> Drawing | None:
     """The disk of all sectors, that of the mesh in full colour (Fig. 2a); only faces that look to the eye are drawn.
 
     None where the study names no sectors about z, or their faces are too many.
     """
-    scene = result.study.get("scene", {})
+    scene, surface = result.study.get("scene", {}), _read_surface(result)
     number = scene.get("n_sectors")
-    if scene.get("model") != "dovetail_sector" or not isinstance(number, int) or not surface.is_mesh:
+    if scene.get("model") != "dovetail_sector" or not isinstance(number, int) or surface is None:
         return None
-    if number < _FEWEST_SECTORS or number * len(surface.faces) > _MOST_OF_DISK:
+    if not surface.is_mesh or number < _FEWEST_SECTORS or number * len(surface.faces) > _MOST_OF_DISK:
         return None
     to_eye = _TO_EYE / np.linalg.norm(_TO_EYE)
     view = View("", np.ones(1, np.bool_), to_eye, np.array([1.0, 0.0, 0.0]), -1, -1)
     own = rgb(body_colours(surface.bodies), surface.body)
     nodes, faces, colours = [], [], []
-    for sector in range(number):
-        angle = 2.0 * np.pi * sector / number
+    for sector, angle in enumerate(2.0 * np.pi * np.arange(number) / number):
         turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
         nodes.append(surface.nodes @ turn.T)
         faces.append(surface.faces + sector * len(surface.nodes))
@@ -194,32 +187,3 @@ def _draw_disk(result: Result, surface: RootSurface) -> Drawing | None:
         f"Axis of rotation: z, towards the reader; parts: {', '.join(surface.bodies)}",
     )
     return Drawing("whole_disk", "The whole disk", text, figure)
-
-
-def draw_mode_fractions(result: Result) -> Iterator[Drawing | Missing]:
-    """Fractions of the period in which pairs slip and are open, at the shown point: a large amplitude.
-
-    Nothing where `_find_root` finds none.
-    """
-    surface, views = _find_root(result)
-    if surface is None:
-        return
-    point = result.shown_point()
-    for name, title in _TITLES.items():
-        if not result.has(name):
-            yield Missing(name, title, result.lacks(name))
-            continue
-        values = np.asarray(result.at(name, point).values, dtype=float)
-        if not np.isfinite(values).all():
-            yield Missing(name, title, "No point has a state.")
-            continue
-        label = f"fraction of the period {'in slip' if name == 'slip_fraction' else 'open'}"
-        state = State(name, 0, np.zeros(len(values)), values)
-        figure = _paint_state(surface, views, state, 1.0, scale_for("1", values), label)
-        pair = result.dataset["contact"].values[int(np.argmax(values))]
-        caption = as_sentences(
-            label.capitalize(),
-            f"Largest: {values.max():.3g} at pair {pair}" if values.max() > 0.0 else "No pair does",
-            "" if surface.is_mesh else "The file has no mesh: each pair is a patch",
-        )
-        yield Drawing(name, title_at(result, title), caption, figure)

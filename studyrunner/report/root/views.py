@@ -45,6 +45,11 @@ class View:
         up /= np.linalg.norm(up)
         return np.cross(up, self.to_eye), up, self.to_eye
 
+    def seen(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Places (..., 3), m, on paper (..., 2), mm."""
+        right, up, _ = self.frame
+        return 1e3 * np.stack([places @ right, places @ up], axis=-1)
+
 
 def find_views(result: Result, surface: RootSurface) -> tuple[View, ...]:
     """Close-ups of each contact surface of each body, the outermost body first, then the whole."""

@@ -15,7 +15,6 @@ from studies.fe_models.checks import (
     check_units,
     mass_of,
     omega_squared_of,
-    rotation_of_deck,
 )
 from studies.fe_models.deck.read import read_deck
 from studies.fe_models.matrices.matrices import Matrices
@@ -175,40 +174,15 @@ def test_speed_of_other_codes_and_none(tmp_path):
     assert check_speed(replace(deck, centrifugal=()), matrices, SI) is None
 
 
-def test_deck_of_two_speeds(tmp_path):
-    text = CUBES.replace("ALL, CENTRIF, 1e4", "LOWER, CENTRIF, 4e4, 0., 0., 0., 0., 0., 1.\nUPPER, CENTRIF, 1e4")
-    with pytest.raises(SceneError, match="LOWER at 200 rad/s and UPPER at 100 rad/s; give all of the model one speed"):
-        rotation_of_deck(read_deck(write(tmp_path, text)), SI)
-    with pytest.raises(SceneError, match="1 of 2 elements have a centrifugal load; give it to all of them"):
-        rotation_of_deck(read_deck(write(tmp_path, CUBES.replace("ALL, CENTRIF", "UPPER, CENTRIF"))), SI)
-
-
 def test_units(tmp_path):
     deck = read_deck(SECTOR)
     check_units(deck, 3.8, SI)
     check_units(deck, None, SI)
     with pytest.raises(SceneError, match=r"units: mass 3.8 t, extent 0.203 mm: not mm-t-s; give `units`"):
         check_units(deck, 3.8, MM)
-    with pytest.raises(SceneError, match=r"units: density 7.8e\+03 t/mm3: not mm-t-s; give `units`"):
-        check_units(deck, None, MM)
     in_mm = replace(deck, coordinates=1000 * deck.coordinates)
     check_units(in_mm, 3.8e-3, MM)
     with pytest.raises(SceneError, match=r"units: mass 0.0038 kg, extent 203 m: not SI; give `units`"):
         check_units(in_mm, 3.8e-3, SI)
     with pytest.raises(SceneError, match='units: \'inch\'; give "SI" or "mm-t-s"'):
         find_units("inch")
-
-
-def test_matrices_of_another_mesh(tmp_path):
-    deck = read_deck(write(tmp_path, CUBES))
-    matrices = springs(deck, [(1, 2, 1.0)])
-    other = replace(matrices, node=matrices.node + 1000)
-    with pytest.raises(SceneError, match=r"job_STIF1.mtx and deck.inp have no node in common"):
-        check_mesh_is_of_matrices(deck, other)
-    with pytest.raises(SceneError, match=r"A: 2 of 2 nodes have no dof in job_STIF1.mtx"):
-        check_nodes_have_dofs(other, np.array([1, 2]), "A")
-    part = matrices.node != 1
-    part[1] = True
-    kept = replace(matrices, node=matrices.node[part], direction=matrices.direction[part])
-    with pytest.raises(SceneError, match=r"A: 1 of 2 nodes lack dofs in job_STIF1.mtx"):
-        check_nodes_have_dofs(kept, np.array([1, 2]), "A")

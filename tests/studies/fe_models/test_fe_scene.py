@@ -383,11 +383,6 @@ def test_what_cannot_be_is_said():
     fast = MatrixModel(sector.mesh.coordinates, sector.mesh.numbers, softened, mass)
     with pytest.raises(SceneError, match="unstable: spin softening exceeds its stiffness"):
         build_fe_scene(fast, sector.joint(), ReductionOptions(), 1)
-    held = np.zeros((sector.mesh.n_nodes, 3), dtype=bool)
-    held[sector.bore] = True
-    held[sector.surfaces[0].nodes[:3]] = True
-    with pytest.raises(SceneError, match="3 nodes of BLADES are clamped, as node"):
-        build_fe_scene(sector.model(), sector.joint(held=held), ReductionOptions(), 1)
     slanted = np.zeros((sector.mesh.n_nodes, 3), dtype=bool)
     slanted[sector.bore] = True
     slanted[sector.left, 0] = True

@@ -12,6 +12,7 @@ from matplotlib.collections import LineCollection, PolyCollection, QuadMesh
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
+from studyrunner.report import contents
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, set_in_column, style
 from studyrunner.report.figures.flanks import find_flanks
@@ -266,7 +267,7 @@ def test_the_map_of_outcomes_speaks_words():
     result = make_result(failed=[2, 5])
     drawing = draw_figure(result, "outcome_map")
     panel = drawing.figure.axes[0]
-    np.testing.assert_array_equal(cells_of(panel), [[0, 1, 0, 0], [0, 0, 1, 0]])
+    np.testing.assert_array_equal(cells_of(panel), [[0, 3, 0, 0], [0, 0, 3, 0]])
     assert [label.get_text() for label in panel.get_xticklabels()] == ["200", "201", "202", "204"]
     assert [text.get_text() for text in drawing.figure.legends[0].get_texts()] == ["converged", "branch lost"]
 
@@ -420,3 +421,9 @@ def test_samples_are_those_of_the_file():
     two = draw_figure(Result(Path("two.nc"), sample_file(factor=1.05, jump=1.0)), "deciding_input").figure.axes[0]
     groups = {each.get_label(): len(each.get_offsets()) for each in two.collections if "group" in str(each.get_label())}
     assert groups == {"lower group": N_SAMPLES // 2, "upper group": N_SAMPLES // 2}
+
+
+def test_the_page_on_the_report_lists_all_figures():
+    page = (Path(contents.__file__).parents[1] / "REPORT.md").read_text(encoding="utf-8")
+    assert f"list_figures -->\n{contents.list_figures()}\n<!--" in page
+    assert len({entry.name for entry in contents.FIGURES}) == len(contents.FIGURES)

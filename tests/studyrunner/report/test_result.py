@@ -22,7 +22,7 @@ def test_a_result_file_is_opened_lazily(tmp_path):
     assert result.title == "Made up"
     np.testing.assert_array_equal(result.read("worn_volume").values, made.dataset["worn_volume"].values)
     assert result.shown_point() == made.shown_point()
-    result.close()
+    result.dataset.close()
 
 
 NO_POINT = xr.Dataset({"outcome": ("frequency", np.zeros(0, np.int8))}, {"cycle": [0.0], "contact": [0]})

@@ -9,9 +9,7 @@ from matplotlib.collections import PolyCollection
 
 from studies.finite_element.joint.pairing import build_contact_pairs
 from studies.finite_element.joint.surfaces import describe_mesh as describe_fe_mesh
-from studyrunner.report.figures.pairs import draw_numbers
 from studyrunner.report.root.contact_faces import face_normals
-from studyrunner.report.root.figures import draw_root
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.views import find_views
 from tests.studies.fe_models.sectors import Sector
@@ -142,13 +140,12 @@ def test_the_faces_near_the_contact_are_kept(tmp_path):
 
 
 def test_the_figures_of_the_dovetail(dovetail):
-    worn, disk = list(draw_root(dovetail))
-    assert [worn.name, disk.name] == ["worn_root", "whole_disk"]
+    worn, numbers = draw_figure(dovetail, "worn_root"), draw_figure(dovetail, "pair_numbers")
+    assert draw_figure(dovetail, "whole_disk").figure.axes
     depth = dovetail.at("wear_depth", dovetail.shown_point(), -1).values
     root = read_root(dovetail)
     assert f"at pair {int(np.argmax(depth))}." in worn.caption
     assert f"{root.exaggeration(float(depth.max())):g} times exaggerated" in worn.caption.replace("\u00a0", "")
-    (numbers,) = draw_numbers(dovetail)
     written = [text.get_text() for panel in numbers.figure.axes for text in panel.texts]
     assert sorted(map(int, written)) == list(range(16))
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.result.measured import read_profile
-from studyrunner.result.scars import find_scar
+from studyrunner.result.scars import find_scar, read_profile
 from studyrunner.result.view import Result, open_for_report
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.figure_numbers import draw_figure
@@ -92,7 +91,7 @@ def test_figures_show_the_chosen_point(tmp_path):
     result = open_for_report(path, {"frequency": f"{dataset['frequency'].values[3]:g}", "scheme": scheme})
     assert result.shown_point()["frequency"] == 3
     assert result.shown_point()["scheme"] == 1
-    result.close()
+    result.dataset.close()
     for wrong, words in (({"frequency": "1"}, "give one of the values of frequency"), ({"mu": "1"}, "one of the axes")):
         with pytest.raises(UserError, match=words):
             open_for_report(path, wrong)

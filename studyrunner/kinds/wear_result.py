@@ -12,24 +12,25 @@ from solver.outcome import Outcome
 from solver.results.cut_off import describe_cut_off
 from solver.results.history import WearHistory
 from solver.results.verdict import judge, last_error
-from studyrunner.plan.point_text import describe_reach, show_count
-from studyrunner.plan.results import MarchResult
-from studyrunner.plan.tasks import MarchTask
+from studyrunner.kinds.task import PointResult
+from studyrunner.kinds.wear import History
+from studyrunner.percent import describe_reach, show_count
 from studyrunner.variables import KEPT
 
 _ROUND_OFF = 1e-10
 _METHODS = KEPT["final_method"].flags
 
 
-def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> MarchResult:
+def build_result(task: History, history: WearHistory, place: int = 0) -> PointResult:
     """What the result file holds of one history of a task: the output counts and variables that the task asks for.
 
     What is per cycle is per cycle of that history. It knows nothing of what came after its last count: jumps, errors,
-    the end of the march. What was computed of a history that ends early is kept. Effort is that of the march.
+    the end of the integrated history. What was computed of a history that ends early is kept. Effort is that of the
+    integrated history.
     """
     scaled, own = task.histories[place], task.histories[0]
     slower = scaled.wear_coefficient / own.wear_coefficient if place else 1.0
-    endless = task.to_the_end is not None and not task.held
+    endless = task.to_the_end is not None and not task.unworn
     counts = history.cycles if endless else np.array(task.counts(scaled))
     rows = np.arange(counts.size) if endless else np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
@@ -41,7 +42,7 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         jump = jump / slower if endless or jump < (1.0 - _ROUND_OFF) * counts[-1] else math.nan
     target = history.cycles_to_target / slower
     if target > (1.0 + _ROUND_OFF) * counts[-1] / slower:
-        # another history of the march goes farther
+        # another history of the task goes farther
         target = math.nan
     life_error = math.nan if math.isnan(target) else history.cycles_to_target_error / slower
     whole = bool(reached.all())
@@ -57,7 +58,7 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         last = history.last_cycle / slower
     elif not whole:
         last = min(history.last_cycle / slower, last)
-    elif not outcome.complete and not task.held:
+    elif not outcome.complete and not task.unworn:
         last = min(history.last_cycle, last)
     depths = history.wear_depth[known]
     if not message and known.size and not outcome.complete:
@@ -74,13 +75,13 @@ def build_result(task: MarchTask, history: WearHistory, place: int = 0) -> March
         "final_method": _METHODS.index(history.final_method or "none"),
         "message": message or _of_target(task, history, known, target, life_error, whole=whole),
     }
-    of_march = {name: getattr(history, name) for name in KEPT if name not in of_its_own}
+    of_task = {name: getattr(history, name) for name in KEPT if name not in of_its_own}
     variables = {name: _variable(history, name, slower, rows, reached) for name in task.variables}
-    return MarchResult(scaled.points, {**variables, **of_march, **of_its_own}, place)
+    return PointResult(scaled.points, {**variables, **of_task, **of_its_own}, place)
 
 
 def _end_of_shared(
-    task: MarchTask, history: WearHistory, outcome: Outcome, slower: float, known: NDArray[np.intp], last: float
+    task: History, history: WearHistory, outcome: Outcome, slower: float, known: NDArray[np.intp], last: float
 ) -> str:
     """How far a history has come that ended before its last count, in cycles of its own.
 
@@ -95,7 +96,7 @@ def _end_of_shared(
 
 
 def _of_target(
-    task: MarchTask, history: WearHistory, known: NDArray[np.intp], target: float, error: float, *, whole: bool
+    task: History, history: WearHistory, known: NDArray[np.intp], target: float, error: float, *, whole: bool
 ) -> str:
     """That the target of a history was not reached, or that the counts behind it are not computed; else empty.
 

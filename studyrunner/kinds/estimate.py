@@ -19,7 +19,7 @@ ITERATIONS_OF_RAMP = 180
 """Newton iterations to the only state of a ramp (1 and 48 pairs: 221 and 146)."""
 
 ITERATIONS_A_STATE = 50
-"""Newton iterations for each further frequency of a branch (5 points of a slider 70, 18 around the resonance of the
+"""Newton iterations for each further frequency of a sweep (5 points of a slider 70, 18 around the resonance of the
 dovetail 65, 11 of a mass that hits a wall 130 to 260; 3 where nothing slips)."""
 
 ITERATIONS_OF_MODE = 900
@@ -46,12 +46,16 @@ ITERATIONS_AN_ADAPTIVE_STEP = 7
 reference solution."""
 
 MISSIONS_A_DOUBLING = 2.0
-"""Missions that are flown for each doubling of their number, by the history and again by its reference solution: 6 of
-20 on a slider, 18 to 26 of thousands on a dovetail, 42 of a million on a slider."""
+"""Missions that are computed for each doubling of their number, by the history and again by its reference solution: 6
+of 20 on a slider, 18 to 26 of thousands on a dovetail, 42 of a million on a slider."""
 
 WAYS_OF_ONE_PAIR = 0.25
-"""Ramps and sweeps of a joint of one pair that are computed, over those of a joint whose pairs stick, where each
-mission has its own: 2 of 14 with 20 missions, 12 of 84 with a million (`solver.missions.block_start`)."""
+"""Ramps and sweeps of a joint of one pair, which slips: 2 of 14 missions with 20 missions, 12 of 84 with a million
+(`solver.missions.block_start`)."""
+
+WAYS = 0.5
+"""Newton iterations of the way to a block in a later mission, over those of the first one (dovetail with 16 pairs: 150
+to 190 of 320 to 380)."""
 
 ITERATIONS_OF_BLOCK = 20
 """Newton iterations of a block behind its start state (slider: 10 to 35, those of a way that is not gone included)."""
@@ -86,7 +90,7 @@ def seconds_an_iteration(n_unknowns: int) -> float:
     return 1.5e-3 + 5e-6 * n_unknowns + 1.0e-9 * float(n_unknowns) ** 2
 
 
-def iterations_of_branch(sweep: str, n_frequencies: int) -> int:
+def iterations_of_sweep(sweep: str, n_frequencies: int) -> int:
     """Newton iterations of a sweep through so many frequencies, or of a ramp."""
     first = ITERATIONS_OF_RAMP if sweep == "ramp" else ITERATIONS_AT_FIRST
     return first + ITERATIONS_A_STATE * (n_frequencies - 1)
@@ -97,8 +101,8 @@ def iterations_of_mode(n_amplitudes: int) -> int:
     return ITERATIONS_OF_MODE + ITERATIONS_A_MODE_POINT * (n_amplitudes - 1)
 
 
-def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
-    """Newton iterations of a march over so many cycles where the joint wears."""
+def iterations_of_history(scheme: str, cycles: float, step: float) -> int:
+    """Newton iterations of a history over so many cycles where the joint wears."""
     if cycles > 0.0 and scheme == "final":
         return ITERATIONS_TO_A_FINAL_STATE
     if cycles > 0.0 and scheme == "adaptive":
@@ -106,8 +110,8 @@ def iterations_of_march(scheme: str, cycles: float, step: float) -> int:
     return ITERATIONS_A_STEP * (max(1, math.ceil(cycles / step)) if cycles < math.inf else STEPS_TO_THE_END)
 
 
-def missions_flown(missions: float) -> int:
-    """Missions that are flown for a number of missions, by the history or by its reference solution."""
+def missions_computed(missions: float) -> int:
+    """Missions that are computed for a number of missions, by the history or by its reference solution."""
     return math.ceil(min(missions, 2.0 + MISSIONS_A_DOUBLING * math.log2(max(missions, 1.0))))
 
 
@@ -117,9 +121,6 @@ def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float,
     blocks: how each block begins, and the octaves of a passage, 0 for steady vibration. one_pair: whether the joint has
     one contact pair only.
     """
-    if len(blocks) == 1 and blocks[0][1] == 0.0 and (blocks[0][0] == "continue" or missions <= 1.0):
-        # one wear history
-        return iterations_of_branch(blocks[0][0], 1) + iterations_of_march("adaptive", math.inf, 1.0)
     each = 0.0
     for begin, octaves in blocks:
         if octaves > 0.0:
@@ -127,8 +128,8 @@ def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float,
         elif begin == "continue":
             each += 2 * ITERATIONS_OF_BLOCK
         else:
-            each += ITERATIONS_OF_BLOCK + iterations_of_branch(begin, 1) * (WAYS_OF_ONE_PAIR if one_pair else 1.0)
-    return 2 * missions_flown(missions) * each
+            each += ITERATIONS_OF_BLOCK + iterations_of_sweep(begin, 1) * (WAYS_OF_ONE_PAIR if one_pair else WAYS)
+    return 2 * missions_computed(missions) * each
 
 
 def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float) -> float:

@@ -9,9 +9,9 @@ import numpy as np
 
 from solver.missions.result import MissionHistory
 from solver.model import FloatArray
-from studyrunner.plan.point_text import show_count
-from studyrunner.plan.results import MarchResult
-from studyrunner.plan.tasks import MarchTask
+from studyrunner.kinds.missions import Mission
+from studyrunner.kinds.task import PointResult
+from studyrunner.percent import show_count
 
 
 def missions_read(kept: Sequence[float]) -> tuple[int, ...]:
@@ -20,9 +20,9 @@ def missions_read(kept: Sequence[float]) -> tuple[int, ...]:
     return tuple(sorted({0, 1} | counts | {max(count - 1, 0) for count in counts}))
 
 
-def build_mission_result(task: MarchTask, history: MissionHistory) -> MarchResult:
+def build_mission_result(task: Mission, history: MissionHistory) -> PointResult:
     """The result of a task with a mission history, at the numbers of missions that the task asks for."""
-    counts = np.array(task.cycles)
+    counts = np.array(task.missions)
     rows, ends = (np.searchsorted(history.missions, each) for each in (counts, np.clip(counts, 1.0, None)))
     in_mission = history.block_volume[ends] - history.block_volume[ends - 1]
     rate = in_mission.sum(axis=1)
@@ -58,13 +58,13 @@ def build_mission_result(task: MarchTask, history: MissionHistory) -> MarchResul
         "missions_to_target_error": history.missions_to_target_error,
         "newton_iterations": history.newton_iterations,
         "run_time": history.run_time,
-        # a mission is flown for the vibration at 0
+        # a mission is computed for the vibration at 0
         "error_estimate": history.error_estimate if counts[-1] > 0.0 else 0.0,
         "last_mission": _last(history, counts),
         "largest_wear_depth": float(history.wear_depth[last].max(initial=0.0)) if reached.size else math.nan,
         "message": "; ".join(filter(None, (history.message, _of_target(task, history)))),
     }
-    return MarchResult(task.points, {**{name: of_task[name] for name in task.variables}, **kept})
+    return PointResult(task.points(0), {**{name: of_task[name] for name in task.variables}, **kept})
 
 
 def _shares(in_mission: FloatArray, rate: FloatArray) -> FloatArray:
@@ -79,12 +79,12 @@ def _last(history: MissionHistory, counts: FloatArray) -> float:
     return min(history.last_mission, float(counts[-1]))
 
 
-def _of_target(task: MarchTask, history: MissionHistory) -> str:
+def _of_target(task: Mission, history: MissionHistory) -> str:
     """What there is to say of the target."""
     if task.until is None or not history.outcome.complete:
         return ""
     if math.isnan(history.missions_to_target):
         return f"{task.until.quantity} stays below {task.until.value:g}"
-    if history.last_mission < task.cycles[-1]:
+    if history.last_mission < task.missions[-1]:
         return f"at its target at mission {show_count(round(history.missions_to_target))}: later ones are not computed"
     return ""

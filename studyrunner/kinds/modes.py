@@ -1,0 +1,171 @@
+"""Nonlinear modes: tasks and their computation."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, cast
+
+import numpy as np
+
+from studyrunner.kinds.estimate import ITERATIONS_A_MODE_POINT, iterations_of_mode, seconds_an_iteration
+from studyrunner.kinds.task import (
+    Identity,
+    JointTask,
+    Keep,
+    PointResult,
+    Task,
+    TaskPlan,
+    described,
+    digest,
+    joint_of,
+    n_unknowns_of,
+    number_points,
+    raise_fault,
+    settings_at,
+)
+from studyrunner.mpi.cost_model import CostKeys
+from studyrunner.scene.drawn_contacts import ContactChange
+from studyrunner.scene.scene_set import SceneSet
+from studyrunner.study.sections import SOLVER_AXES
+from studyrunner.study.study import Study
+from studyrunner.system.progress import count
+
+if TYPE_CHECKING:
+    from solver.model import ReducedModel
+
+_FOR_THE_TABLE = ("natural_frequency", "damping_ratio")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mode(JointTask):
+    """A nonlinear mode; a result at each modal amplitude.
+
+    mode: its number, from 1. direction: "up" or "down" along the amplitude. amplitudes: m sqrt(kg), ascending.
+    """
+
+    mode: int
+    direction: str
+    amplitudes: tuple[float, ...]
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """Indices of the amplitudes in the order in which they are computed."""
+        places = range(len(self.amplitudes))
+        return tuple(reversed(places) if self.direction == "down" else places)
+
+    @property
+    def cost_keys(self) -> CostKeys:
+        """All modes, this one."""
+        return (("mode", ("mode", self.number)),)
+
+    def cost_of(self, *, first: bool) -> float:
+        """Estimated time, s, of the first point with the way to it, or of one of the others."""
+        share = iterations_of_mode(1) if first else ITERATIONS_A_MODE_POINT
+        return self.cost * share / iterations_of_mode(self.n_results)
+
+    def names(self, identity: Identity) -> tuple[str, ...]:
+        """Hashes of the points. None depends on the other amplitudes."""
+        own = (identity.joint(self.joint), self.mode, self.direction, described(self.settings), identity.record)
+        return tuple(digest("mode", *own, amplitude) for amplitude in self.amplitudes)
+
+    def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
+        """Points of the mode."""
+        del keep
+        from solver.modes.points import follow_mode
+
+        model, wanted = self.joint.model(models), sorted(self.places)
+        amplitudes = np.array([self.amplitudes[place] for place in wanted])
+        direction = cast("Literal['up', 'down']", self.direction)
+        friction = self.joint.friction_coefficient
+        for place, found in follow_mode(model, friction, amplitudes, self.mode, direction, self.settings):
+            raise_fault(found.outcome, found.message)
+            values: Mapping[str, object] = {
+                "natural_frequency": found.frequency,
+                "natural_frequency_error": found.frequency_error,
+                "damping_ratio": found.damping_ratio,
+                "damping_ratio_error": found.damping_error,
+                "response_amplitude": np.abs(found.response),
+                "response_phase": np.angle(found.response),
+                "slip_fraction": found.slip_fraction,
+                "open_fraction": found.open_fraction,
+                "harmonics_used": found.harmonics_used,
+                "samples_used": found.samples_used,
+            }
+            kept = {
+                "outcome": int(found.outcome),
+                "newton_iterations": found.newton_iterations,
+                "run_time": found.run_time,
+                "message": found.message,
+            }
+            asked = {name: values[name] for name in self.variables}
+            yield PointResult(self.points(wanted[place]), {**asked, **kept}, wanted[place])
+
+    def describe(self, place: int) -> str:
+        """Where along the amplitude."""
+        return f"mode {self.mode} {self.direction} to {self.amplitudes[place]:.3g} m sqrt(kg)"
+
+
+def variables(study: Study) -> tuple[str, ...]:
+    """Variables of a point of a mode: those asked for and those that the last lines of a run are made of."""
+    return tuple(name for name in study.variables if name in study.outputs.variables or name in _FOR_THE_TABLE)
+
+
+def build_tasks(
+    study: Study, n_displacements: Sequence[int], contacts: Sequence[ContactChange], scenes: SceneSet
+) -> TaskPlan:
+    """Tasks of a study of nonlinear modes: one along the amplitude for each joint, mode, direction and setting."""
+    amplitudes, names = study.axes.modal_amplitude or (), tuple(study.dimensions)
+    ascending = sorted(range(len(amplitudes)), key=lambda place: amplitudes[place])
+    asked = variables(study)
+    modes: dict[Mode, list[dict[str, int]]] = {}
+    for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
+        joint, of_part = joint_of(part, scene, contact), dict(zip(study.axes_of_parts, part.place, strict=True))
+        for at in _lines(study):
+            settings = settings_at(study, at)
+            n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
+            mode = Mode(
+                number=0,
+                settings=settings,
+                cost=seconds_an_iteration(n_unknowns) * iterations_of_mode(len(amplitudes)),
+                n_unknowns=n_unknowns,
+                joint=joint,
+                mode=(study.axes.mode or ())[at["mode"]],
+                direction=study.axes.sweep[at["sweep"]],
+                amplitudes=tuple(amplitudes[place] for place in ascending),
+                variables=asked,
+            )
+            modes.setdefault(mode, []).append({**at, **of_part})
+    indices = {
+        mode: [
+            # dimensions of one value have no place
+            tuple(tuple({**line, "modal_amplitude": place}.get(name, 0) for name in names) for line in lines)
+            for place in ascending
+        ]
+        for mode, lines in modes.items()
+    }
+    return number_points(indices, study, len(scenes.studies))
+
+
+def _lines(study: Study) -> Iterator[dict[str, int]]:
+    """Indices along the axes of which a mode has one value, but for those of parts of the study."""
+    sizes = {"mode": len(study.axes.mode or ()), "sweep": len(study.axes.sweep)}
+    sizes |= {name: len(getattr(study, name)) for name in SOLVER_AXES}
+    for places in itertools.product(*map(range, sizes.values())):
+        yield dict(zip(sizes, places, strict=True))
+
+
+TIME = "to a factor of three; a mode that is lost at a large amplitude takes longer"
+
+
+def describe_tasks(tasks: Sequence[Task]) -> str:
+    """Tasks in words."""
+    points = count(sum(task.n_results for task in tasks), "point")
+    return f"{count(len(tasks), 'nonlinear mode')} over the amplitude, {points}"
+
+
+def slow_time(study: Study) -> list[tuple[str, str]]:
+    """Nothing wears."""
+    del study
+    return []

@@ -1,0 +1,365 @@
+"""What a rank computes at a time, and what it gives back.
+
+A task gives one result or several, one after the other, each at a place of its own. There are four kinds: `Sweep` and
+`History` (`wear`), `Mode` (`modes`), `Mission` (`missions`). What hands tasks out, saves and shows them uses this base
+alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from solver.outcome import Outcome
+from solver.packing import Packed
+from solver.settings import Automatic, SolverSettings
+from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
+from studyrunner.mpi.cost_model import CostKeys
+from studyrunner.scene.drawn_contacts import ContactChange
+from studyrunner.study.realisation import Realisation
+from studyrunner.study.sections import AUTO
+from studyrunner.study.study import Study
+from studyrunner.system.machine_faults import MachineFaultError, tells_of_machine
+from studyrunner.system.source_digest import package_digest
+
+if TYPE_CHECKING:
+    from solver.model import ReducedModel
+    from studyrunner.mpi.mapped_file import MappedFile
+
+Index = tuple[int, ...]
+"""Index of a point along the dimensions of the study."""
+
+Keep = Callable[[Packed | str | float], None]
+"""Takes the progress of a task: data to continue from, words, or the share that is done, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """The joint that a task computes.
+
+    scene: number of the scene (`studyrunner.scene.scene_set`). friction_coefficient: of all pairs; None where each pair
+    has its own. contact: arrays of the contact interface that a sample draws, in place of those of the scene.
+    """
+
+    scene: int
+    friction_coefficient: float | None
+    contact: ContactChange = ()
+
+    def model(self, models: Mapping[int, ReducedModel]) -> ReducedModel:
+        """The model of the scene with what is drawn for the pairs. models: by number of the scene."""
+        model = models[self.scene]
+        drawn: dict[str, Any] = {name: np.array(values) for name, values in self.contact}
+        return replace(model, contact=replace(model.contact, **drawn)) if drawn else model
+
+
+def joint_of(part: Realisation, scene: int, contact: ContactChange) -> Joint:
+    """The joint of a part of a study. scene: its number. contact: what is drawn for its pairs."""
+    of_pairs = any(name == "friction_coefficient" for name, _ in contact)
+    return Joint(scene, None if of_pairs else part.study.friction_coefficient, contact)
+
+
+@dataclass(frozen=True)
+class StartResult:
+    """Start state at one frequency of a sweep.
+
+    moves: whether any pair slips or lifts; otherwise nothing wears. n_unknowns: of the state; 0 where there is none.
+    fault: fault of the machine that ended the computation; then this is no result. Empty without a fault.
+    """
+
+    place: int
+    start: Packed
+    moves: bool
+    n_unknowns: int
+    fault: str = ""
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is no state."""
+        return self.n_unknowns == 0
+
+    def pack(self) -> Packed:
+        """Everything except the place, for a file."""
+        return Packed(json.dumps([self.moves, self.n_unknowns, self.start.text]), self.start.arrays)
+
+
+def unpack_start(place: int, packed: Packed) -> StartResult:
+    """The start state from the output of `StartResult.pack`."""
+    moves, n_unknowns, text = json.loads(packed.text)
+    return StartResult(place, Packed(text, packed.arrays), moves, n_unknowns)
+
+
+@dataclass(frozen=True)
+class PointResult:
+    """The result of one point, or of several points that share it.
+
+    points: indices along the dimensions of the study.
+    values: variables of the result by name, with the dimensions after the axes. Values that were not reached are NaN,
+        or 0 in whole numbers; missing variables are NaN, 0 or an empty text in the file.
+    progress: progress of a history that was ended by its time limit.
+    """
+
+    points: tuple[Index, ...]
+    values: Mapping[str, Any]
+    place: int = 0
+    progress: Packed | None = None
+
+    @property
+    def outcome(self) -> int:
+        """Outcome of the computation, as a number of the result file."""
+        return int(self.values["outcome"])
+
+    @property
+    def fault(self) -> str:
+        """Fault of the machine that ended the computation; then this is no result. Empty without a fault."""
+        return str(self.values["message"]) if self.outcome == Outcome.NOT_COMPUTED else ""
+
+
+Result = StartResult | PointResult
+
+
+@cache
+def solver_digest() -> str:
+    """Hash of the source of the solver and of the versions of the packages that it uses."""
+    return package_digest("solver")
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What the results of a study depend on beside their tasks.
+
+    scenes: hash of the model of each scene, see SceneFacts. record: hash of the variables of a result and their sizes.
+    """
+
+    scenes: tuple[str, ...]
+    record: str
+
+    def joint(self, joint: Joint) -> tuple[object, ...]:
+        """Scene and friction, and the solver."""
+        return (self.scenes[joint.scene], joint.friction_coefficient, *joint.contact, solver_digest())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task(ABC):
+    """A task.
+
+    number: among the sweeps, or the other tasks, of the study. cost: estimated time, s.
+    n_unknowns: of its largest state; an estimate where the number of harmonics is automatic.
+    known: places whose results are not needed, or are there from an earlier run.
+    resume: progress of an earlier run; None to begin at the beginning.
+    key: hash of the task in the file of the run.
+    models: reduced models of `scenes`, or files with them, for a rank that does not have them.
+    variables: names of the variables in a result. indices: for each place the points of the study that have its result;
+        none for start states.
+    """
+
+    gives_starts: ClassVar[bool] = False
+    """Whether other tasks wait for the results."""
+
+    number: int
+    settings: SolverSettings
+    cost: float
+    n_unknowns: int
+    known: frozenset[int] = frozenset()
+    resume: Packed | None = field(default=None, compare=False, repr=False)
+    key: str = field(default="", compare=False, repr=False)
+    models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
+    variables: tuple[str, ...] = ()
+    indices: tuple[tuple[Index, ...], ...] = ()
+
+    @property
+    @abstractmethod
+    def scenes(self) -> tuple[int, ...]:
+        """Numbers of the scenes whose models the task needs."""
+
+    @property
+    @abstractmethod
+    def order(self) -> tuple[int, ...]:
+        """Places of all results, in the order in which they are given."""
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        """Places of the results that are needed, in the order in which they are given."""
+        return tuple(place for place in self.order if place not in self.known)
+
+    @property
+    def n_results(self) -> int:
+        """Number of results that the task gives."""
+        return len(self.places)
+
+    @property
+    def waits_for(self) -> tuple[int, int] | None:
+        """Number of the sweep, and place of the start state, without which the task cannot begin."""
+        return None
+
+    def from_start(self, result: StartResult) -> Task:  # noqa: ARG002
+        """The task that begins from a start state, where it waits for one."""
+        return self
+
+    @property
+    @abstractmethod
+    def cost_keys(self) -> CostKeys:
+        """Groups of similar tasks, see `CostModel`."""
+
+    @property
+    def group(self) -> str:
+        """Most general of the groups."""
+        return str(self.cost_keys[0][0])
+
+    def cost_of(self, *, first: bool) -> float:
+        """Estimated time, s, of the first result, or of one of the others; by default all are alike."""
+        del first
+        return self.cost / self.n_results
+
+    def points(self, place: int) -> tuple[Index, ...]:
+        """Points that have the result at a place."""
+        return self.indices[place] if self.indices else ()
+
+    @abstractmethod
+    def names(self, identity: Identity) -> tuple[str, ...]:
+        """Hashes of all inputs of each result, in the order of the places. Equal hashes mean equal results."""
+
+    @abstractmethod
+    def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[Result]:
+        """Gives the results one by one, and the progress from time to time. models: by number of the scene."""
+
+    def failed(self, place: int, outcome: int, message: str) -> Result:
+        """In place of a result that was not computed."""
+        return PointResult(self.points(place), {"outcome": outcome, "message": message}, place)
+
+    @abstractmethod
+    def describe(self, place: int) -> str:
+        """The task in words while it computes the result at a place."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointTask(Task):
+    """A task of one joint."""
+
+    joint: Joint
+
+    @property
+    def scenes(self) -> tuple[int, ...]:
+        """That of the joint."""
+        return (self.joint.scene,)
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Number of points that are not computed alone, and the reason."""
+
+    n_points: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class TaskPlan:
+    """All tasks of a study.
+
+    results: tasks that give the results of points; histories wait for a start state. sweeps: they give start states.
+    left_out: points that share a result, by reason. n_points, n_scenes: of the study.
+    """
+
+    results: tuple[Task, ...]
+    left_out: tuple[LeftOut, ...]
+    n_points: int
+    n_scenes: int
+    sweeps: tuple[Task, ...] = ()
+
+    @cached_property
+    def waiting(self) -> Mapping[tuple[int, int], tuple[Task, ...]]:
+        """Tasks that wait for a start state, by number of the sweep and place."""
+        found: dict[tuple[int, int], list[Task]] = {}
+        for task in self.results:
+            if task.waits_for is not None:
+                found.setdefault(task.waits_for, []).append(task)
+        return {start: tuple(tasks) for start, tasks in found.items()}
+
+    @property
+    def n_unknowns(self) -> int:
+        """Of the largest task."""
+        return max(task.n_unknowns for task in self.results)
+
+    @property
+    def cost(self) -> float:
+        """Estimated time on one rank, s, where every point wears."""
+        return sum(task.cost for task in (*self.sweeps, *self.results))
+
+    @property
+    def longest(self) -> float:
+        """Estimated time, s, of the longest task, with the sweep that it waits for."""
+        return max(
+            task.cost + (0.0 if task.waits_for is None else self.sweeps[task.waits_for[0]].cost)
+            for task in self.results
+        )
+
+
+EQUAL_POINTS = "all values are those of another point"
+"""Reason for a result that points share, whatever the kind of study."""
+
+
+def number_points(tasks: Mapping[Any, Sequence[tuple[Index, ...]]], study: Study, n_scenes: int) -> TaskPlan:
+    """The plan of a study without start states. tasks: each, without number and points, with its `indices`."""
+    results = tuple(
+        replace(task, number=number, indices=tuple(indices)) for number, (task, indices) in enumerate(tasks.items())
+    )
+    n_points = math.prod(len(values) for values in study.dimensions.values())
+    shared = n_points - sum(len(task.order) for task in results)
+    return TaskPlan(results, (LeftOut(shared, EQUAL_POINTS),) if shared else (), n_points, n_scenes)
+
+
+def digest(*values: object) -> str:
+    """Hash of values; numbers enter with all bits."""
+    # by hand: `joblib.hash` hashes pickled bytes, which change with the versions of Python and numpy
+    return hashlib.sha256(json.dumps(values, allow_nan=True).encode()).hexdigest()[:32]
+
+
+def settings_at(study: Study, at: Mapping[str, int]) -> SolverSettings:
+    """Settings of the solver. at: indices along the axes, those of `SOLVER_AXES` among them."""
+    return SolverSettings(
+        harmonics=study.harmonics[at["harmonics"]],
+        samples=study.samples[at["samples"]],
+        tolerance=study.tolerance[at["tolerance"]],
+        rtol=study.rtol[at["rtol"]],
+        time_limit=math.inf if study.solver.time_limit is None else study.solver.time_limit,
+    )
+
+
+def described(settings: SolverSettings) -> list[tuple[str, object]]:
+    """Settings for a hash; a time limit decides whether there is a result, not the values of the result."""
+    return [item for item in asdict(settings).items() if item[0] != "time_limit"]
+
+
+def n_unknowns_of(n_displacements: int, harmonics: int | Automatic) -> int:
+    """Unknowns of a state with this number of harmonics, or with that which automatic ones take on average."""
+    return n_displacements * (2 * (AUTOMATIC_HARMONICS if harmonics == AUTO else harmonics) + 1)
+
+
+def raise_fault(outcome: Outcome, message: str) -> None:
+    """The solver takes whatever breaks it off for an end: raises MachineFaultError where that was not its own."""
+    if outcome is Outcome.EXCEPTION and tells_of_machine(message):
+        raise MachineFaultError(message)
+
+
+class Reached:
+    """Hands the progress of a task on, and remembers the last. last: None where there is none."""
+
+    def __init__(self, task: Task, keep: Keep) -> None:
+        self.last = task.resume
+        self._keep = keep
+
+    def __call__(self, progress: Packed | str | float) -> None:
+        """Takes progress as `Keep` does."""
+        self.last = progress if isinstance(progress, Packed) else self.last
+        self._keep(progress)
+
+    def after(self, outcome: Outcome) -> Packed | None:
+        """From where a history goes on with more time; None where it has not run out of it."""
+        return self.last if outcome is Outcome.TIME_LIMIT else None

@@ -1,0 +1,302 @@
+"""Tasks of wear: start states along a sweep, and wear histories that begin from them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, astuple, dataclass, field, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.contact.wear_law import WearLaw
+from solver.outcome import Outcome
+from solver.packing import Packed, pack, unpack
+from solver.settings import FollowedFrequency, Resolution, SolverSettings, ToTheEnd, WearTarget
+from studyrunner.kinds.estimate import ITERATIONS_A_STATE, iterations_of_sweep
+from studyrunner.kinds.sharing import ScaledHistory, counts_of
+from studyrunner.kinds.task import (
+    Identity,
+    Index,
+    JointTask,
+    Keep,
+    PointResult,
+    Reached,
+    StartResult,
+    described,
+    digest,
+    raise_fault,
+)
+from studyrunner.mpi.cost_model import CostKeys
+
+if TYPE_CHECKING:
+    from solver.model import ReducedModel
+    from solver.results.history import StartState, WearHistory
+
+AT_REST = "history at rest"
+"""Most general group of histories in which nothing wears, see `CostModel`."""
+
+COST_AT_REST = 0.01
+"""Estimated time of a history in which nothing wears, over the time of a history with steps."""
+
+_NEIGHBOURS = 4  # frequencies whose histories take about as long
+_ROUND_OFF = 1e-10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sweep(JointTask):
+    """Start states along the frequency, or that of a ramp at a single frequency; a result at each frequency.
+
+    excitation_amplitude: N. direction: "up", "down" or "ramp". frequencies: Hz, ascending.
+    follow: what the frequency follows in place of `frequencies`, whose only value is then the middle of the range.
+    """
+
+    gives_starts = True
+
+    excitation_amplitude: float
+    direction: str
+    frequencies: tuple[float, ...]
+    follow: FollowedFrequency | None = None
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """Indices of the frequencies in the order of the sweep."""
+        places = range(len(self.frequencies))
+        return tuple(reversed(places) if self.direction == "down" else places)
+
+    @property
+    def cost_keys(self) -> CostKeys:
+        """All sweeps, this sweep."""
+        return (("sweep", ("sweep", self.number)),)
+
+    def cost_of(self, *, first: bool) -> float:
+        """Estimated time, s, of the first state with the sweep to it, or of one of the other states."""
+        share = iterations_of_sweep(self.direction, 1) if first else ITERATIONS_A_STATE
+        return self.cost * share / iterations_of_sweep(self.direction, self.n_results)
+
+    def names(self, identity: Identity) -> tuple[str, ...]:
+        """Hashes of the start states."""
+        return tuple(_name_of_start(self, identity, frequency) for frequency in self.frequencies)
+
+    def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[StartResult]:
+        """Start states as the sweep reaches them."""
+        given: set[int] = set()
+        for result in self._compute(models, keep):
+            given.add(result.place)
+            yield result
+        if len(given) < self.n_results and self.resume is not None:
+            # the earlier run had passed states that are damaged, or that it did not need
+            yield from replace(self, known=self.known | given, resume=None)._compute(models, keep)
+
+    def _compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[StartResult]:
+        # numba is loaded where a task runs, so that --plan and --help do without it
+        from solver.loading_history.start_states import follow_branch
+
+        model, wanted = self.joint.model(models), sorted(self.places)
+        n_displacements = int(np.count_nonzero(np.asarray(model.contact.dofs) >= 0))
+        for place, start in follow_branch(
+            model,
+            self.joint.friction_coefficient,
+            self.excitation_amplitude,
+            # no state depends on those that are known
+            self.follow or np.array([self.frequencies[place] for place in wanted]),
+            cast("Literal['up', 'down', 'ramp']", self.direction),
+            self.settings,
+            keep=keep,
+            resume=self.resume,
+        ):
+            raise_fault(start.outcome, start.message)
+            n_unknowns = 0 if start.state is None else n_displacements * (2 * len(start.resolution.orders) + 1)
+            yield StartResult(wanted[place], pack(start), _moves(start), n_unknowns)
+
+    def failed(self, place: int, outcome: int, message: str) -> StartResult:
+        """A start without a state."""
+        from solver.results.history import StartState
+
+        nan = math.nan
+        broken = StartState(Outcome.EXCEPTION, None, nan, Resolution((1,), 4), nan, nan, 0, 0.0, message=message)
+        fault = message if outcome == Outcome.NOT_COMPUTED else ""
+        return StartResult(place, pack(broken), moves=False, n_unknowns=0, fault=fault)
+
+    def describe(self, place: int) -> str:
+        """Where the sweep goes."""
+        how = "ramp" if self.direction == "ramp" else f"sweep {self.direction}"
+        return f"{how} to {self.frequencies[place]:.6g} Hz"
+
+
+@dataclass(frozen=True, kw_only=True)
+class History(JointTask):
+    """A wear history from a start state, and the histories of other points that are read from it.
+
+    sweep, position: number of the sweep and place of the start state. frequency, Hz, excitation_amplitude, N,
+    direction, follow: of the start state.
+    histories: one result each. The first is integrated; it needs the most cycles.
+    unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles. Step and scheme are then those of
+        the first point.
+    cycles: cycle counts of the output of every history. to_the_end: integration until nothing wears any more; then
+        `cycles` numbers the outputs. until: wear at which the history ends before the last count.
+    loops: pairs whose fretting loops are among the variables.
+    moves: of the start state, see StartResult; True until it is there.
+    start: start state; None until the sweep has reached it.
+    """
+
+    law: WearLaw
+    sweep: int
+    position: int
+    frequency: float
+    excitation_amplitude: float
+    direction: str
+    scheme: str
+    largest_depth: float | None
+    histories: tuple[ScaledHistory, ...]
+    unworn: bool
+    cycles: tuple[float, ...]
+    loops: tuple[int, ...]
+    moves: bool = True
+    follow: FollowedFrequency | None = None
+    until: WearTarget | None = None
+    to_the_end: ToTheEnd | None = None
+    start: Packed | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """One place for each history."""
+        return tuple(range(len(self.histories)))
+
+    @property
+    def waits_for(self) -> tuple[int, int]:
+        """The start state."""
+        return self.sweep, self.position
+
+    @property
+    def wear_coefficient(self) -> float:
+        """Wear coefficient of the integrated history, 1/Pa."""
+        return self.histories[0].wear_coefficient
+
+    @property
+    def step(self) -> float:
+        """Step of the integrated history, cycles."""
+        return self.histories[0].step
+
+    def points(self, place: int) -> tuple[Index, ...]:
+        """Points that have the history at a place."""
+        return self.histories[place].points
+
+    def counts(self, scaled: ScaledHistory) -> tuple[float, ...]:
+        """Cycle counts of the integrated history at which a history is read, one for each of `cycles`."""
+        if self.unworn:
+            return (0.0,) * len(self.cycles)
+        return counts_of(self.cycles, scaled, self.histories[0], self.scheme not in ("adaptive", "final"))
+
+    @property
+    def cost_keys(self) -> CostKeys:
+        """By motion, unknowns and start state, and by wear coefficient, step and scheme."""
+        kind = "history" if self.moves else AT_REST
+        near, here = (kind, self.sweep, "near", self.position // _NEIGHBOURS), (kind, self.sweep, self.position)
+        wear = (kind, self.wear_coefficient, self.step, self.scheme)
+        return ((kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
+
+    def from_start(self, result: StartResult) -> History:
+        """The history from a start state. The time is in proportion to its unknowns, whatever moves: a history seldom
+        factorises anew.
+        """
+        n_unknowns = result.n_unknowns or self.n_unknowns
+        cost = self.cost * (n_unknowns / self.n_unknowns * (1.0 if result.moves else COST_AT_REST))
+        return replace(self, start=result.start, cost=cost, n_unknowns=n_unknowns, moves=result.moves)
+
+    def names(self, identity: Identity) -> tuple[str, ...]:
+        """Hashes of the histories: of their start state, and of all that is done with it."""
+        start = _name_of_start(self, identity, self.frequency)
+        ends = tuple(None if each is None else astuple(each) for each in (self.until, self.to_the_end))
+        kept = _name_of_kept(identity.record, self.cycles, self.loops, ends)
+        scheme = "" if self.unworn else self.scheme
+        own = (*self._wear(self.histories[0]), scheme, self.unworn, self.largest_depth, asdict(self.law))
+        wear = (self._wear(scaled) for scaled in self.histories)
+        return tuple(digest("history", start, kept, own, place > 0, each) for place, each in enumerate(wear))
+
+    def _wear(self, scaled: ScaledHistory) -> tuple[float, float | None]:
+        """Wear coefficient, and step where the step matters."""
+        own_steps = self.unworn or self.scheme in ("adaptive", "final")
+        own_steps = own_steps or (self.scheme == "explicit" and self.largest_depth is not None)
+        return scaled.wear_coefficient, None if own_steps else scaled.step
+
+    def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
+        """All histories, read from one, as far as it went."""
+        from studyrunner.kinds.wear_result import build_result
+
+        reached = Reached(self, keep)
+        history = self.integrate(self.joint.model(models), reached)
+        for place in self.places:
+            yield replace(build_result(self, history, place), progress=reached.after(history.outcome))
+
+    def integrate(self, model: ReducedModel, keep: Keep) -> WearHistory:
+        """The integrated history, at all counts at which one of the histories is read."""
+        from solver.wear.final_state.find import find_final_state
+        from solver.wear.history import integrate_wear
+        from solver.wear.solutions import SlowTime
+
+        if self.start is None:
+            raise TypeError(f"task without a start state: {self}")
+        counts: NDArray[np.float64] | ToTheEnd
+        if self.to_the_end is not None and not self.unworn:
+            counts = self.to_the_end
+        else:
+            # a history begins at cycle 0, whether that count is kept or not
+            read = (self.counts(scaled) for scaled in self.histories)
+            counts = np.unique([0.0, *itertools.chain.from_iterable(read)])
+        final = self.scheme == "final"
+        asked = SlowTime(
+            self.wear_coefficient,
+            cast("Literal['explicit', 'implicit', 'adaptive']", "adaptive" if final else self.scheme),
+            counts,
+            self.step,
+            largest_depth=self.largest_depth,
+            law=self.law,
+            until=self.until,
+            loops=self.loops,
+            follow=self.follow,
+        )
+        solve = find_final_state if final and isinstance(counts, ToTheEnd) else integrate_wear
+        friction = self.joint.friction_coefficient
+        history = solve(model, friction, self.settings, unpack(self.start), asked, keep, self.resume)
+        raise_fault(history.outcome, history.message)
+        return history
+
+    def describe(self, place: int) -> str:  # noqa: ARG002
+        """Its frequency and scheme."""
+        return f"{self.frequency:.6g} Hz {self.scheme}"
+
+
+def _name_of_start(task: Sweep | History, identity: Identity, frequency: float) -> str:
+    """Hash of a start state, whatever the other frequencies: the steps of a sweep follow from the joint."""
+    joint = identity.joint(task.joint)
+    line = _name_of_line(joint, task.excitation_amplitude, task.direction, task.settings, task.follow)
+    return digest("start", line, frequency)
+
+
+@lru_cache(maxsize=16)
+def _name_of_line(
+    joint: tuple[object, ...],
+    amplitude: float,
+    direction: str,
+    settings: SolverSettings,
+    follow: FollowedFrequency | None,
+) -> str:
+    followed = None if follow is None else astuple(follow)
+    return digest("line", joint, amplitude, direction, described(settings), followed)
+
+
+@lru_cache(maxsize=16)
+def _name_of_kept(*kept: object) -> str:
+    return digest(*kept)
+
+
+def _moves(start: StartState) -> bool:
+    """Whether the relative motion in the joint is more than the round-off of its mean; no where there is no state."""
+    if start.state is None:
+        return False
+    motion_h = start.state.displacement_h
+    return bool(np.linalg.norm(motion_h[:, :, 1:]) > _ROUND_OFF * np.linalg.norm(motion_h))

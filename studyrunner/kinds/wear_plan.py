@@ -1,0 +1,234 @@
+"""Study of wear -> sweeps, and histories from their start states."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from solver.settings import SolverSettings, ToTheEnd
+from studyrunner.kinds.estimate import iterations_of_history, iterations_of_sweep, seconds_an_iteration
+from studyrunner.kinds.sharing import EQUAL, IDLE_RTOL, Alike, ScaledHistory, describe_left_out, share_histories
+from studyrunner.kinds.task import Index, Joint, Task, TaskPlan, joint_of, n_unknowns_of, settings_at
+from studyrunner.kinds.wear import History, Sweep
+from studyrunner.scene.drawn_contacts import ContactChange
+from studyrunner.scene.scene_set import SceneSet
+from studyrunner.study.realisation import Realisation
+from studyrunner.study.sections import AUTO, SOLVER_AXES
+from studyrunner.study.study import Study
+from studyrunner.system.progress import count
+from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, LOOPS
+
+_OF_SWEEP = ("excitation_amplitude", "sweep")
+"""Axes of which each sweep has one value, beside those of the solver."""
+
+_OF_HISTORY = ("wear_coefficient", "step", "scheme")
+
+_FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
+
+
+@dataclass(frozen=True)
+class _Case:
+    """What the states of a sweep have in common. values: of `_OF_SWEEP`."""
+
+    joint: Joint
+    values: tuple[float | str, ...]
+    settings: SolverSettings
+
+
+@dataclass(frozen=True)
+class _Start:
+    """Points of one part of a study that start from one state. at: their indices along the axes but `_OF_HISTORY`."""
+
+    part: Realisation
+    at: Mapping[str, int]
+
+
+def variables(study: Study) -> tuple[str, ...]:
+    """Variables of a history: those asked for and those that the table at the end is made of."""
+    asked = (name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
+    return (*asked, *(LOOPS if study.outputs.loops else ()), *(COUNTS if study.to_the_end else ()))
+
+
+def build_tasks(
+    study: Study, n_displacements: Sequence[int], contacts: Sequence[ContactChange], scenes: SceneSet
+) -> TaskPlan:
+    """Tasks of a study of wear.
+
+    Points whose history is the same for a reason that the study itself shows share a task, see `sharing`. Points with a
+    solution of their own never do. The order and the numbers of the tasks depend on the study alone.
+    """
+    planner = _Planner(study, n_displacements)
+    for case, at in _cases(study, contacts, scenes).items():
+        ascending = sorted(at)
+        for frequencies in [[one] for one in ascending] if "ramp" in case.values else [ascending]:
+            planner.add_sweep(case, {frequency: at[frequency] for frequency in frequencies})
+    return TaskPlan(
+        results=tuple(planner.histories),
+        left_out=describe_left_out(planner.causes),
+        n_points=math.prod(len(values) for values in study.dimensions.values()),
+        n_scenes=len(n_displacements),
+        sweeps=tuple(planner.sweeps),
+    )
+
+
+def _cases(study: Study, contacts: Sequence[ContactChange], scenes: SceneSet) -> dict[_Case, dict[float, list[_Start]]]:
+    """Points that one sweep reaches, by frequency, in the order of the study."""
+    cases: dict[_Case, dict[float, list[_Start]]] = {}
+    names = (*_OF_SWEEP, *SOLVER_AXES)
+    sizes = [len(getattr(study.axes if name in _OF_SWEEP else study, name)) for name in names]
+    lines = [dict(zip(names, places, strict=True)) for places in itertools.product(*map(range, sizes))]
+    settings_of = [_settings(study, at) for at in lines]
+    for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
+        axes, joint = part.study.axes, joint_of(part, scene, contact)
+        for at, settings in zip(lines, settings_of, strict=True):
+            case = _Case(joint, tuple(getattr(axes, name)[at[name]] for name in _OF_SWEEP), settings)
+            for place, frequency in enumerate(axes.frequency):
+                start = _Start(part, {**at, "frequency": place})
+                cases.setdefault(case, {}).setdefault(frequency, []).append(start)
+    return cases
+
+
+def _settings(study: Study, at: Mapping[str, int]) -> SolverSettings:
+    """Settings of a line of points; with the first `rtol` where nothing uses it, so that all of its values share."""
+    settings = settings_at(study, at)
+    automatic = {"adaptive", "final"} & set(study.axes.scheme) or AUTO in (settings.harmonics, settings.samples)
+    return settings if automatic or not study.solver.shortcuts else replace(settings, rtol=study.rtol[0])
+
+
+class _Planner:
+    """Builds the tasks of a study one after the other. causes: numbers of points that share a history, by reason."""
+
+    def __init__(self, study: Study, n_displacements: Sequence[int]) -> None:
+        self._study = study
+        self._n_displacements = n_displacements
+        self._variables = variables(study)
+        self._shared: dict[object, tuple[tuple[Alike, ...], Counter[str]]] = {}
+        self.causes: Counter[str] = Counter()
+        self.sweeps: list[Sweep] = []
+        self.histories: list[History] = []
+
+    def add_sweep(self, case: _Case, at: Mapping[float, Sequence[_Start]]) -> None:
+        """A sweep and its histories. at: by frequency."""
+        n_unknowns = n_unknowns_of(self._n_displacements[case.joint.scene], case.settings.harmonics)
+        amplitude, direction = case.values
+        sweep = Sweep(
+            number=len(self.sweeps),
+            joint=case.joint,
+            excitation_amplitude=float(amplitude),
+            direction=str(direction),
+            settings=case.settings,
+            frequencies=tuple(at),
+            cost=seconds_an_iteration(n_unknowns) * iterations_of_sweep(str(direction), len(at)),
+            n_unknowns=n_unknowns,
+            follow=self._study.follow,
+        )
+        self.sweeps.append(sweep)
+        for position, starts in enumerate(at.values()):
+            by_law: dict[object, list[_Start]] = {}
+            for start in starts:
+                by_law.setdefault(start.part.study.wear_law, []).append(start)
+            for same in by_law.values():
+                self._add_histories(sweep, position, same)
+
+    def _add_histories(self, sweep: Sweep, position: int, starts: Sequence[_Start]) -> None:
+        """Tasks of all points that start from one state and wear by one law."""
+        owners: dict[float, list[tuple[_Start, int]]] = {}
+        for start in starts:
+            for place, value in enumerate(start.part.study.axes.wear_coefficient):
+                owners.setdefault(value, []).append((start, place))
+        study = _with_wear_coefficients(starts[0].part.study, tuple(owners))
+        key = (study.wear_law, tuple(owners))
+        if key not in self._shared:
+            # the same from each start state
+            self._shared[key] = share_histories(study)
+        tasks, causes = self._shared[key]
+        of_value = list(owners.values())
+        n_others = len(study.axes.step) * len(study.axes.scheme)
+        n_points, n_parts = (
+            sum(map(len, of_value)),
+            sum(len({id(start.part) for start, _ in each}) for each in of_value),
+        )
+        self.causes += causes
+        self.causes[IDLE_RTOL] += n_others * (n_points - n_parts)
+        self.causes[EQUAL] += n_others * (n_parts - len(of_value))
+        for alike in tasks:
+            histories = []
+            for choices in alike.histories:
+                points = tuple(
+                    self._point(start, (wear, *choice[1:])) for choice in choices for start, wear in of_value[choice[0]]
+                )
+                wear, step, _ = choices[0]
+                histories.append(ScaledHistory(study.axes.wear_coefficient[wear], study.axes.step[step], points))
+            self._add_history(study, sweep, position, alike, tuple(histories))
+
+    def _add_history(
+        self, study: Study, sweep: Sweep, position: int, alike: Alike, histories: tuple[ScaledHistory, ...]
+    ) -> None:
+        scheme = study.axes.scheme[alike.histories[0][0][2]]
+        cycles = 0.0 if alike.unworn else math.inf if study.to_the_end else study.cycles_kept[-1]
+        iterations = iterations_of_history(scheme, cycles, histories[0].step)
+        end = ToTheEnd(len(study.cycles_kept), study.slow_time.final_share) if study.to_the_end else None
+        self.histories.append(
+            History(
+                number=len(self.histories),
+                joint=sweep.joint,
+                law=study.wear_law,
+                sweep=sweep.number,
+                position=position,
+                frequency=sweep.frequencies[position],
+                excitation_amplitude=sweep.excitation_amplitude,
+                direction=sweep.direction,
+                settings=sweep.settings,
+                scheme=scheme,
+                largest_depth=study.slow_time.largest_depth if scheme == "explicit" else None,
+                histories=histories,
+                unworn=alike.unworn,
+                cycles=study.cycles_kept,
+                variables=self._variables,
+                loops=study.outputs.loops,
+                cost=seconds_an_iteration(sweep.n_unknowns) * iterations,
+                n_unknowns=sweep.n_unknowns,
+                until=study.until,
+                follow=study.follow,
+                to_the_end=end,
+            )
+        )
+
+    def _point(self, start: _Start, choice: Sequence[int]) -> Index:
+        """Index of a point along the dimensions of the study. choice: places along `_OF_HISTORY`."""
+        places = {**start.at, **dict(zip(_OF_HISTORY, choice, strict=True))}
+        return (*(places[name] for name in self._study.own_axes), *start.part.place)
+
+
+def _with_wear_coefficients(study: Study, values: tuple[float, ...]) -> Study:
+    if values == study.axes.wear_coefficient:
+        return study
+    return study.model_copy(update={"axes": study.axes.model_copy(update={"wear_coefficient": values})})
+
+
+TIME = "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long"
+
+
+def describe_tasks(tasks: Sequence[Task]) -> str:
+    """Tasks in words."""
+    sweeps = [task for task in tasks if isinstance(task, Sweep)]
+    n_histories = count(len(tasks) - len(sweeps), "wear history", "wear histories")
+    if not sweeps:
+        return n_histories
+    n_ramps = sum(sweep.direction == "ramp" for sweep in sweeps)
+    ways = [(len(sweeps) - n_ramps, "sweep"), (n_ramps, "ramp")]
+    named = " and ".join(count(number, way) for number, way in ways if number)
+    n_starts = count(sum(sweep.n_results for sweep in sweeps), "start state")
+    return f"{n_starts} by {named}, and {n_histories}"
+
+
+def slow_time(study: Study) -> list[tuple[str, str]]:
+    """Cycles."""
+    n_kept = len(study.cycles_kept)
+    if study.to_the_end:
+        until = f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest"
+        return [("cycles", f"{until}; {n_kept} states are kept, spaced evenly in worn volume and cycles")]
+    return [("cycles", f"{study.cycles_kept[-1]:g}, of which {count(n_kept, 'count is', 'counts are')} kept")]

@@ -1,0 +1,155 @@
+"""The worn joint of a result computed again: its response curve, loops and natural frequencies, without its history.
+
+The depths of the pairs in the result are those of a joint that is mounted worn, see `[scene] worn` of a study: a study
+of zero cycles gives its states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import xarray as xr
+
+from studyrunner.api import run_study
+from studyrunner.result.scene_pairs import depths, pairs_of_scene, tells_depth
+from studyrunner.result.view import Result, open_for_report
+from studyrunner.statistics.samples import DRAWN
+from studyrunner.study.sections import AxesSection, WearSection
+from studyrunner.study.study_file import read_study
+from studyrunner.user_error import UserError, Verbatim
+
+_N_FREQUENCIES = 25  # of the curve around a resonance that the study follows
+_LEFT_OUT = ("scatter", "loading", "slow_time.until")
+_HOW = (
+    "Computed again from the wear depths of the file: the joint is mounted worn, and the sweep leads to the frequency;"
+    " its friction forces at the start are not those at the end of the wear history"
+)
+
+
+def compute_worn_joint(
+    path: str | Path,
+    folder: str | Path,
+    *,
+    loops: Sequence[int] = (),
+    response: bool = False,
+    natural_frequencies: bool = False,
+    point: Mapping[str, str] | None = None,
+    progress: bool = True,
+) -> dict[str, xr.Dataset]:
+    """What a result does not hold of one worn joint, from the wear depths that it holds.
+
+    Parameters
+    ----------
+    path
+        Result file with `wear_depth` or `wear_depth_last`, of wear histories.
+    folder
+        For the result files of what is computed; what is there already is not computed twice.
+    loops
+        Contact pairs: gives `"loops"`, their `loop_displacement`, m, and `loop_force`, N, with dimensions (cycle,
+        contact, phase, component), at the first count where the file holds its depths and at the last count.
+    response
+        Gives `"response"`: `response_amplitude`, m (cycle, frequency, response), and its relative error at the
+        frequencies of the study; with a followed frequency over its range, and of the new joint as well.
+    natural_frequencies
+        Gives `"natural_frequencies"`: those of the sector with the joint stuck, Hz (nodal_diameter, mode).
+    point
+        Values of axes, as text; by default the point that wears most.
+
+    Raises
+    ------
+    UserError
+        Where the file does not hold the depths, or the study has no such pairs or frequencies.
+    """
+    result, folder = open_for_report(path, point), Path(folder)
+    with result.dataset:
+        if result.has_modes or result.blocks is not None:
+            raise UserError(str(path), "kind of study", None, "give a result of wear histories")
+        shown, common = result.shown_point(), _overrides(result)
+        last = result.last_kept(shown)
+        title = f"worn by {result.cycle_label(last)} at {result.describe(shown, ('frequency', *result.varying))}"
+        given, found = {**common, "scene.worn": _depths(result, shown, last)}, {}
+        if loops:
+            asked = {**given, "outputs.variables": ["response_amplitude"], "outputs.loops": list(loops)}
+            states = _run(result, asked, folder / "worn_joint_loops.nc", progress)
+            found["loops"] = states.sel(contact=list(loops))[["loop_displacement", "loop_force"]]
+        if response:
+            others = {name: at for name, at in shown.items() if name not in ("frequency", "frequency_ratio")}
+            frequencies = result.dataset["frequency"].isel(others, missing_dims="ignore").values.tolist()
+            if result.followed:
+                low, high = map(float, cast("list[float]", result.study["loading"]["between"]))
+                frequencies = np.linspace(low, high, _N_FREQUENCIES).tolist()
+            elif len(frequencies) == 1:
+                remedy = "give a result with several frequencies: this one has a single point of a curve"
+                raise UserError(str(path), "axes.frequency", frequencies[0], remedy)
+            if not result.followed:
+                given["scene.worn"] = _depths(result, shown, last, only_last=True)
+            asked = {**given, "axes.frequency": frequencies}
+            asked["outputs.variables"] = ["response_amplitude", "response_error"]
+            states = _run(result, asked, folder / "worn_joint_response.nc", progress)
+            found["response"] = states[["response_amplitude", "response_error"]].transpose("cycle", "frequency", ...)
+        if natural_frequencies:
+            # nothing slips, and no state takes time
+            asked = {**common, "axes.excitation_amplitude": 1e-9, "outputs.variables": ["natural_frequency", "mesh"]}
+            states = _run(result, asked, folder / "worn_joint_frequencies.nc", progress)
+            found["natural_frequencies"] = states[["natural_frequency"]].isel(cycle=0, drop=True)
+    return {name: each.assign_attrs(title=title, how=_HOW) for name, each in found.items()}
+
+
+def _overrides(result: Result) -> dict[str, Any]:
+    """Keys of a study of the shown point alone, new and without wear."""
+    shown, given = result.shown_point(), dict[str, Any]()
+    for name in result.axes:
+        value = result.dataset[name].values[shown[name]].item()
+        if name == "sample":
+            given |= _drawn_inputs(result, shown)
+        elif name != "worn_cycle" and not (name == "frequency" and result.followed):
+            given[f"axes.{name}"] = float(value) if name == "rtol" else value
+    if result.followed:
+        given["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_kept(shown)))
+    given |= dict.fromkeys(_LEFT_OUT)
+    return given | {"axes.scheme": "adaptive", "slow_time": {"cycles": 0.0}, "outputs.loops": [], "scene.worn": None}
+
+
+def _drawn_inputs(result: Result, shown: Mapping[str, int]) -> dict[str, Any]:
+    """Keys of the study with what the shown sample has drawn. Raises UserError where each pair has drawn its own."""
+    found = {}
+    for coordinate, drawn in result.dataset.coords.items():
+        name = str(coordinate).removeprefix(DRAWN)
+        if str(coordinate).startswith(DRAWN) and name not in WearSection.AXES:
+            value = drawn.isel(shown, missing_dims="ignore")
+            if value.ndim:
+                remedy = "give a result whose samples draw no value for each pair"
+                raise UserError(str(result.path), f"scatter.{name}", Verbatim("drawn for each pair"), remedy)
+            found[f"{'axes' if name in AxesSection.model_fields else 'scene'}.{name}"] = float(value)
+    return found
+
+
+def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: bool = False) -> dict[str, Any]:
+    """The table `scene.worn` with the depths at the first count, where they are known, and at the last one."""
+    if not tells_depth(result):
+        raise UserError(str(result.path), "wear_depth", None, result.lacks("wear_depth").removesuffix("."))
+    depth = depths(result, shown)[:, pairs_of_scene(result, shown)]
+    if result.has("worn_depth"):
+        depth = depth + result.dataset["worn_depth"].isel(shown, missing_dims="ignore").values
+    kept = [last] if only_last or last == 0 or np.isnan(depth[0]).any() else [0, last]
+    cycles = result.cycles[kept]
+    if not np.isfinite(cycles).all():
+        return {"depth": [depth[last].tolist()]}
+    return {"depth": depth[kept].tolist(), "cycle": cycles.tolist()}
+
+
+def _run(result: Result, overrides: Mapping[str, object], output: Path, progress: bool) -> xr.Dataset:
+    """States (cycle, ...) of a study of zero cycles, with the wear before as `cycle` and without axes of one value."""
+    study = read_study(result.path, overrides)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with run_study(study, output, overwrite=True, progress=progress) as dataset:
+        points = dataset["outcome"].dims
+        single = [axis for axis in points if axis not in ("worn_cycle", "frequency") or dataset.sizes[axis] == 1]
+        kept = dataset.load().isel({axis: 0 for axis in single if axis != "worn_cycle"}, drop=True)
+    states = kept.isel(cycle=0, drop=True)
+    if "worn_cycle" not in states.dims:
+        states = states.expand_dims(worn_cycle=[result.cycles[-1]])
+    return states.rename(worn_cycle="cycle")

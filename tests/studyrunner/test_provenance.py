@@ -1,0 +1,107 @@
+"""Commit and address of the software, and the date in a result: where they are known or asked for, and nothing else."""
+
+import json
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+import netCDF4
+import pytest
+
+from studyrunner.api import run_study
+from studyrunner.cli import main
+from studyrunner.result import software
+from studyrunner.result.creation_date import check_date
+from studyrunner.result.software import CHANGED, commit_of, describe_software
+from studyrunner.user_error import UserError
+from tests.studyrunner.faked_runs import SMALL
+
+
+def attributes():
+    with netCDF4.Dataset("out.nc") as file:
+        return {name: file.getncattr(name) for name in file.ncattrs()}
+
+
+def git(folder, *arguments):
+    command = ["git", "-C", str(folder), "-c", "user.name=a", "-c", "user.email=b", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_the_commit_is_that_of_git(tmp_path, monkeypatch):
+    monkeypatch.setenv("GIT_CONFIG_GLOBAL", "/dev/null")
+    git(tmp_path, "init", "-q")
+    head = ""
+    for text in ("one", "two"):
+        (tmp_path / "a.py").write_text(text, encoding="utf-8")
+        git(tmp_path, "add", "a.py")
+        assert not head or commit_of(tmp_path) == head + CHANGED
+        git(tmp_path, "commit", "-qm", text)
+        git(tmp_path, "tag", "-a", text, "-m", "a name is no commit")
+        head = git(tmp_path, "rev-parse", "HEAD")
+        assert commit_of(tmp_path) == head
+    assert commit_of(tmp_path.parent) == ""
+
+
+@pytest.mark.parametrize(
+    ("direct_url", "expected"),
+    [
+        (None, {}),
+        ("[1]", {}),
+        (json.dumps({"url": "file:///home/me", "dir_info": {"editable": True}}), {}),
+        (json.dumps({"url": "a", "vcs_info": {"commit_id": "a" * 40}}), {"software_commit": "a" * 40}),
+        (json.dumps({"url": 3, "vcs_info": {"commit_id": 4}}), {}),
+    ],
+)
+def test_a_package_from_a_repository_says_its_commit(direct_url, expected, tmp_path, monkeypatch):
+    about = tmp_path / "tool-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: tool\nVersion: 1\n", encoding="utf-8")
+    if direct_url is not None:
+        (about / "direct_url.json").write_text(direct_url, encoding="utf-8")
+    monkeypatch.setattr(metadata, "distribution", lambda _: metadata.Distribution.at(about))
+    monkeypatch.setattr(metadata, "metadata", lambda _: metadata.Distribution.at(about).metadata)
+    monkeypatch.setattr(software, "commit_of", lambda _: "")
+    assert describe_software("tool") == expected
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ("20261123", "2026-11-23"),
+        ("2026-11-23T14:05", "2026-11-23T14:05:00"),
+        ("2026-11-23 14:05:00Z", "2026-11-23T14:05:00Z"),
+        ("20261123T140500+0100", "2026-11-23T14:05:00+01:00"),
+        ("now", "now"),
+    ],
+)
+def test_dates_are_kept_in_the_extended_form(given, kept):
+    assert check_date(given, "command line", "--date") == kept
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize("wrong", ["", "23.11.2026", "2026-02-29"])
+def test_a_wrong_date_is_bad_input(wrong, capsys):
+    assert main(["sdof_slider", f"--date={wrong}"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--date" in line
+    assert list(Path().iterdir()) == []
+    with pytest.raises(UserError, match="run_study: date"):
+        run_study("sdof_slider", date=wrong)
+
+
+@pytest.mark.usefixtures("folder")
+def test_date_and_software_stand_in_the_result_and_change_nothing_else(solver, monkeypatch):
+    there = {"software_url": "https://b.example/r", "software_commit": "b" * 40}
+    monkeypatch.setattr("studyrunner.run.describe_software", lambda _: {})
+    assert main(SMALL) == 0
+    without, n_results = attributes(), solver.n_results
+    solver.begin_again()
+    # what is finished is known by the same hashes whatever the date and the commit
+    monkeypatch.setattr("studyrunner.run.describe_software", lambda _: there)
+    assert main([*SMALL, "--date=2026-11-23"]) == 0
+    assert attributes() == without | there | {"date_created": "2026-11-23"}
+    assert main([*SMALL, "--date"]) == 0
+    now = attributes()
+    assert str(now.pop("date_created")).endswith("Z")
+    assert now == without | there
+    assert solver.n_results == 0 < n_results

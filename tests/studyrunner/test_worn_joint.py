@@ -1,0 +1,56 @@
+"""What is computed again of a worn joint is what a study gives that holds it, or that begins with its depths."""
+
+import numpy as np
+import pytest
+
+from studyrunner import UserError, compute_worn_joint, run_study
+from studyrunner.report.cli import main
+
+COARSE = {"solver.harmonics": 3, "solver.samples": 64, "slow_time.cycles": 8000.0, "slow_time.outputs": 3}
+POINTS = {"axes.frequency": [150.0, 160.0], "axes.scheme": "adaptive", "outputs.loops": [0]}
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    found = tmp_path_factory.mktemp("worn") / "slider.nc"
+    run_study("sdof_slider", found, overrides=COARSE | POINTS, progress=False).close()
+    return found
+
+
+@pytest.mark.slow
+def test_loops_and_responses_are_those_of_studies_that_ask_for_them(path, tmp_path):
+    found = compute_worn_joint(path, tmp_path, loops=[0], response=True, progress=False)
+    with run_study("sdof_slider", path, overrides=COARSE | POINTS, progress=False) as result:
+        worn = result.worn_volume.isel(cycle=-1).values.ravel()
+        at = int(np.argmax(worn))
+        point = result.isel(frequency=at).squeeze()
+        frequency = result.frequency.values[at]
+        assert found["loops"].cycle.values.tolist() == [0.0, 8000.0]
+        for name in ("loop_displacement", "loop_force"):
+            # the joint without wear is the same; the worn one has another history of friction
+            np.testing.assert_allclose(
+                found["loops"][name].isel(cycle=0).values.squeeze(),
+                point[name].isel(cycle=0).values.squeeze(),
+                rtol=1e-6,
+                atol=1e-9 * float(abs(point[name]).max()),
+            )
+        assert f"{frequency:g} Hz" in found["response"].attrs["title"]
+    table = {"result": str(path), "frequency": float(frequency), "cycle": [8000.0]}
+    given = COARSE | {"scene.worn": table, "axes.frequency": POINTS["axes.frequency"], "axes.scheme": "adaptive"}
+    given |= {"slow_time.cycles": 0.0, "slow_time.outputs": 1}
+    with run_study("sdof_slider", tmp_path / "begun.nc", overrides=given, progress=False) as begun:
+        expected = begun.response_amplitude.squeeze().values
+    np.testing.assert_array_equal(found["response"].response_amplitude.squeeze().values, expected)
+
+
+@pytest.mark.slow
+def test_the_command_draws_what_it_computes_and_says_what_is_wrong(path, tmp_path, capsys):
+    assert main([str(path), "-o", str(tmp_path), "--worn-response", "--loops", "0"]) == 0
+    assert "worn by" in (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert (tmp_path / "fretting_loops.csv").exists()
+    capsys.readouterr()
+    for wrong in (["--loops", "7"], ["--loops", "a"], ["--natural-frequencies"]):
+        assert main([str(path), "-o", str(tmp_path), *wrong]) == 2
+        assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    with pytest.raises(UserError, match="frequency"):
+        compute_worn_joint(path, tmp_path, response=True, point={"frequency": "1"})
