@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import get_args
+from dataclasses import dataclass, fields
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solver.forced_response import check_friction, check_numbers, check_settings, check_word, worn_model
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
-from solver.modes.points import Direction, follow_mode, values_of
+from solver.modes.points import Direction, follow_mode
 from solver.outcome import Outcome
 from solver.presentation import PresentedMode
-from solver.results.mode_values import OF_A_POINT
 from solver.settings import SolverSettings
 
 
@@ -106,11 +105,12 @@ def backbone(
     ascending, place = np.unique(wanted, return_inverse=True)
     found = dict(follow_mode(worn, friction, ascending, int(mode), sweep, settings))
     points = [found[index] for index in place.tolist()]
-    columns = [values_of(model, point) for point in points]
-    gathered = {name: np.array([getattr(each, name) for each in columns]) for name in OF_A_POINT}
-    return Backbone(
-        amplitude=wanted,
-        outcome=tuple(each.outcome for each in columns),
-        message=tuple(each.message for each in columns),
-        **gathered,
-    )
+    columns = {
+        field.name: [getattr(point, field.name) for point in points]
+        for field in fields(Backbone)
+        if field.name != "amplitude"
+    }
+    gathered: dict[str, Any] = {
+        name: tuple(values) if name in ("outcome", "message") else np.array(values) for name, values in columns.items()
+    }
+    return Backbone(amplitude=wanted, **gathered)

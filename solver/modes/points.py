@@ -24,17 +24,18 @@ from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path_of_states import Step
 from solver.loading_history.sweep import Sweep
-from solver.model import BoolArray, FloatArray, ReducedModel
+from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import natural_frequencies
 from solver.modes.mode_balance import ModeProblem, ModeState
 from solver.modes.mode_path import TOP_BASE, ModePath, Rest, find_rest
 from solver.newton.run import Budget, OutOfTimeError, Run
 from solver.outcome import Outcome, describe_error, known_to
-from solver.results.mode_values import ModeValues, without_state
 from solver.settings import ROUND_OFF, Resolution, SolverSettings
 from solver.structure.fourier import to_complex
 
 Direction = Literal["up", "down"]
+
+_NO_FIRST = Failure(Outcome.START_FAILED, "the mode was not found at its first amplitude")
 
 NEAR_RESONANCE = 0.02
 """Distance of a harmonic from a natural frequency, relative, that the message of a lost mode names."""
@@ -45,22 +46,39 @@ RESONANT_ORDER = 7
 
 @dataclass(frozen=True)
 class ModePoint:
-    """A point of a nonlinear mode.
+    """A point of a nonlinear mode. Its values are NaN where no state was found.
 
-    - outcome, message: how the computation of the point ended. A point without state has no further values.
-    - problem: joint with the harmonics of the state. state: the state.
-    - errors (2,): estimated errors of the frequency, rad/s, and of the damping ratio.
+    - outcome, message: how the computation of the point ended.
+    - frequency to samples_used: as in `solver.Backbone`, at one amplitude.
     - newton_iterations: of the way from rest to the point and of the point, as for this point alone.
     - run_time: CPU seconds of the computing thread since the point before.
+    - found: the state, and the joint with its harmonics.
     """
 
     outcome: Outcome
-    message: str = ""
-    problem: ModeProblem | None = None
-    state: ModeState | None = None
-    errors: FloatArray | None = None
+    message: str
+    frequency: float
+    damping_ratio: float
+    frequency_error: float
+    damping_error: float
+    response: ComplexArray
+    shape: ComplexArray
+    slip_fraction: FloatArray
+    open_fraction: FloatArray
+    harmonics_used: int
+    samples_used: int
     newton_iterations: int = 0
     run_time: float = 0.0
+    found: tuple[ModeProblem, ModeState] | None = None
+
+
+def without_state(model: ReducedModel, outcome: Outcome, message: str = "") -> ModePoint:
+    """A point of a mode of a model that has no state."""
+    nan, linear = float("nan"), model.linear[0]
+    sizes = len(linear.response), len(linear.mass), model.contact.n_contact
+    response, shape, pairs = (np.full(size, nan) for size in sizes)
+    vectors = response.astype(complex), shape.astype(complex), pairs, pairs
+    return ModePoint(outcome, message, nan, nan, nan, nan, *vectors, 0, 0)
 
 
 def follow_mode(
@@ -80,15 +98,18 @@ def follow_mode(
     for index in sorted(range(len(amplitudes)), key=lambda index: way.place(float(amplitudes[index]))):
         began = computing_time()
         run = Run(settings.tolerance, Budget(deadline=began + settings.time_limit))
+        point: ModePoint | Failure
         try:
             point = way.point(float(amplitudes[index]), run)
         except OutOfTimeError:
-            point = ModePoint(Outcome.TIME_LIMIT)
+            point = Failure(Outcome.TIME_LIMIT)
         except np.linalg.LinAlgError:
-            point = ModePoint(Outcome.SINGULAR)
+            point = Failure(Outcome.SINGULAR)
         except Exception as error:
             # an error spoils one point only
-            point = ModePoint(Outcome.EXCEPTION, describe_error(error))
+            point = Failure(Outcome.EXCEPTION, describe_error(error))
+        if isinstance(point, Failure):
+            point = without_state(model, point.outcome, point.message)
         iterations = way.spent + run.budget.iterations
         yield index, replace(point, newton_iterations=iterations, run_time=computing_time() - began)
 
@@ -123,7 +144,7 @@ class _Way:
         """Key by which amplitudes come in the order of the way."""
         return (0.0, amplitude) if self.direction == "up" else (top_of(amplitude), -amplitude)
 
-    def point(self, amplitude: float, run: Run) -> ModePoint:
+    def point(self, amplitude: float, run: Run) -> ModePoint | Failure:
         """The point at the next amplitude, m sqrt(kg). run: of this point alone."""
         deadline = run.budget.deadline
         if self.rest is None:
@@ -131,13 +152,13 @@ class _Way:
             self.rest, self.to_rest = find_rest(*self.asked, own), own.budget.iterations
         self.spent, rest = self.to_rest, self.rest
         if isinstance(rest, Failure):
-            return ModePoint(rest.outcome, rest.message)
+            return rest
         if self.direction == "up" and not rest.glued:
             said = 'the joint has no such mode while its pairs stick: give sweep = "down", from large amplitudes'
-            return ModePoint(Outcome.START_FAILED, said)
+            return Failure(Outcome.START_FAILED, said)
         if self.direction == "up" and amplitude < rest.first_amplitude:
             node = rest.raised(amplitude, run)
-            return _no_first() if node is None else judge_point(rest.problem, node, None, run)
+            return _NO_FIRST if node is None else judge_point(rest.problem, node, None, run)
         if self.direction == "up":
             sweep, before = self._raised_to(rest, amplitude, deadline), self.to_up
         else:
@@ -145,11 +166,11 @@ class _Way:
             sweep, before = self.down, self.to_down
         self.spent = before
         if sweep is None:
-            return _no_first()
+            return _NO_FIRST
         if sweep is self.down and sweep.here is not None and sweep.here.parameter < amplitude:
             # the mode could not be raised to the amplitude from which it is lowered
             assert self.up is not None
-            return ModePoint(Outcome.BRANCH_LOST, describe_loss(self.up))
+            return Failure(Outcome.BRANCH_LOST, describe_loss(self.up))
         sweep.set_deadline(deadline)
         sweep.advance_to(amplitude)
         self.spent += sweep.n_iterations
@@ -192,20 +213,16 @@ def _begun(path: ModePath, first: ModeState, direction: float, deadline: float) 
     return sweep
 
 
-def _no_first() -> ModePoint:
-    return ModePoint(Outcome.START_FAILED, "the mode was not found at its first amplitude")
-
-
-def solve_point(sweep: Sweep[ModeState], amplitude: float, run: Run) -> ModePoint:
+def solve_point(sweep: Sweep[ModeState], amplitude: float, run: Run) -> ModePoint | Failure:
     """The point of a mode at an amplitude, m sqrt(kg), to which a sweep was advanced."""
     if sweep.here is None:
-        return ModePoint(Outcome.BRANCH_LOST, describe_loss(sweep))
+        return Failure(Outcome.BRANCH_LOST, describe_loss(sweep))
     found = sweep.state_at(amplitude, run.fresh())
     if not isinstance(found, Step):
         ahead = sweep.here if sweep.ahead is None else sweep.ahead.state
         ends = f"{sweep.here.parameter:.4g} and {ahead.parameter:.4g}"
         said = f"no state was found between the amplitudes {ends} m sqrt(kg), where the mode has states"
-        return ModePoint(Outcome.BRANCH_LOST, said)
+        return Failure(Outcome.BRANCH_LOST, said)
     reference = sweep.reference_at(amplitude, run.fresh())
     other = None if reference is None or sweep.reference is None else (problem_of(sweep.reference), reference)
     return judge_point(problem_of(sweep), found.state, other, run)
@@ -219,7 +236,7 @@ def problem_of(sweep: Sweep[ModeState]) -> ModeProblem:
 
 def judge_point(
     problem: ModeProblem, found: ModeState, reference: tuple[ModeProblem, ModeState] | None, run: Run
-) -> ModePoint:
+) -> ModePoint | Failure:
     """The point with the harmonics that it needs, and its errors.
 
     problem, found: the state, with the harmonics of the problem. reference: the same from the reference sweep, if any.
@@ -238,19 +255,30 @@ def judge_point(
     if reference is not None:
         by_steps = reference[0].move(reference[1], problem, run) or reference[1]
         errors = errors + np.abs(by_steps.values - found.values)[:2]
-    joint = problem.joint_of(found.values)
-    certificate = certify(joint, found.state.evaluation)
+    joint, at, resolution = problem.joint_of(found.values), found.state.evaluation, problem.case.resolution
+    certificate = certify(joint, at)
     if not certificate.holds(settings.tolerance):
-        return ModePoint(Outcome.CERTIFICATE_FAILED, certificate.sentence(settings.tolerance))
+        return Failure(Outcome.CERTIFICATE_FAILED, certificate.sentence(settings.tolerance))
     # the damping ratio is the sum of parts that may cancel: its error is judged against the part of friction
-    by_friction = float(joint.law.friction_work(found.state.evaluation).sum()) / (
-        2.0 * np.pi * (found.omega * found.parameter) ** 2
-    )
+    by_friction = float(joint.law.friction_work(at).sum()) / (2.0 * np.pi * (found.omega * found.parameter) ** 2)
     damping = max(by_friction, abs(found.damping_ratio), ROUND_OFF)
     known = {"natural frequency": float(errors[0]) / found.omega, "damping ratio": float(errors[1]) / damping}
     said = [f"the {name} {known_to(error, settings.rtol)}" for name, error in known.items() if error > settings.rtol]
-    outcome = Outcome.INACCURATE if said or not accurate else Outcome.CONVERGED
-    return ModePoint(outcome, "; ".join(said), problem, found, errors)
+    return ModePoint(
+        outcome=Outcome.INACCURATE if said or not accurate else Outcome.CONVERGED,
+        message="; ".join(said),
+        frequency=found.omega / (2.0 * np.pi),
+        damping_ratio=found.damping_ratio,
+        frequency_error=float(errors[0]) / (2.0 * np.pi),
+        damping_error=float(errors[1]),
+        response=to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0],
+        shape=found.shape,
+        slip_fraction=_slips(at).mean(axis=1),
+        open_fraction=(at.status_t == SEPARATED).mean(axis=1),
+        harmonics_used=resolution.highest,
+        samples_used=resolution.samples,
+        found=(problem, found),
+    )
 
 
 def _errors_by_resolution(problem: ModeProblem, state: ModeState, run: Run) -> FloatArray:
@@ -289,31 +317,6 @@ def describe_loss(sweep: Sweep[ModeState]) -> str:
 
 def _hertz(omega: float) -> str:
     return f"{omega / (2.0 * np.pi):.6g} Hz"
-
-
-def values_of(model: ReducedModel, point: ModePoint) -> ModeValues:
-    """What is reported of a point of a mode of a model."""
-    ended, effort = (point.outcome, point.message), (point.newton_iterations, point.run_time)
-    state, problem = point.state, point.problem
-    if state is None or problem is None or point.errors is None:
-        linear = model.linear[0]
-        return without_state(*ended, (len(linear.response), len(linear.mass), model.contact.n_contact), *effort)
-    joint, at, resolution = problem.joint_of(state.values), state.state.evaluation, problem.case.resolution
-    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
-    return ModeValues(
-        *ended,
-        state.omega / (2.0 * np.pi),
-        state.damping_ratio,
-        float(point.errors[0]) / (2.0 * np.pi),
-        float(point.errors[1]),
-        response,
-        state.shape,
-        _slips(at).mean(axis=1),
-        (at.status_t == SEPARATED).mean(axis=1),
-        resolution.highest,
-        resolution.samples,
-        *effort,
-    )
 
 
 def _slips(at: Evaluation) -> BoolArray:

@@ -73,14 +73,13 @@ class Mode(JointTask):
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """Points of the mode."""
         del keep
-        from solver.modes.points import follow_mode, values_of
+        from solver.modes.points import follow_mode
 
         model, wanted = self.joint.model(models), sorted(self.places)
         amplitudes = np.array([self.amplitudes[place] for place in wanted])
         direction = cast("Literal['up', 'down']", self.direction)
         friction = self.joint.friction_coefficient
-        for place, point in follow_mode(model, friction, amplitudes, self.mode, direction, self.settings):
-            found = values_of(model, point)
+        for place, found in follow_mode(model, friction, amplitudes, self.mode, direction, self.settings):
             raise_fault(found.outcome, found.message)
             values: Mapping[str, object] = {
                 "natural_frequency": found.frequency,

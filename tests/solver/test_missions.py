@@ -253,10 +253,14 @@ def exact_blocks(monkeypatch):
     return computed
 
 
-def exactly_known(missions, cycles=1.0, order=1, **more):
+def known_blocks(missions, cycles=1.0, **more):
     model = pairs()
     blocks = (Block(model, 1.0, 1.0, 0.5, cycles), Block(model, 2.0, 1.0, 0.5, 2.0 * cycles))
-    return integrate_missions(Mission(blocks[::order], 1.0, missions, SETTINGS, **more))
+    return Mission(blocks, 1.0, missions, SETTINGS, **more)
+
+
+def exactly_known(missions, cycles=1.0, **more):
+    return integrate_missions(known_blocks(missions, cycles, **more))
 
 
 @pytest.mark.slow
@@ -283,8 +287,7 @@ def test_two_thousand_missions_agree_with_missions_one_by_one(exact_blocks, cycl
 
 def test_a_step_is_of_second_order_and_its_error_is_known(exact_blocks):
     """After exact missions 0, H and 2H: against missions one by one."""
-    model = pairs()
-    mission = Mission((Block(model, 1.0, 1.0, 0.5, 1.0), Block(model, 2.0, 1.0, 0.5, 2.0)), 1.0, (0, 64), SETTINGS)
+    mission = known_blocks((0, 64))
     nodes = list(MissionCourse.unworn(2, 2).nodes)
 
     def run(place, depth, carried, with_slope):
@@ -309,19 +312,8 @@ def test_a_step_is_of_second_order_and_its_error_is_known(exact_blocks):
     assert 6.0 < errors[4] / errors[3] < 8.5
 
 
-def test_the_order_of_blocks_counts_by_less_than_a_mission(exact_blocks):
-    one, other = (exactly_known((0, 40), 5.0, order, largest_step=1) for order in (1, -1))
-    many = [exactly_known((0, 40), 5.0, order) for order in (1, -1)]
-    apart = one.wear_depth[-1] - other.wear_depth[-1]
-    assert np.abs(apart).max() > 1e-4 * one.wear_depth[-1].max()
-    for literal, history in zip((one, other), many, strict=True):
-        assert (np.abs(history.wear_depth - literal.wear_depth) <= history.wear_depth_error).all()
-
-
 def test_an_interrupted_mission_goes_on_to_the_last_bit(exact_blocks):
-    model = pairs()
-    blocks = (Block(model, 1.0, 1.0, 0.5, 3.0), Block(model, 2.0, 1.0, 0.5, 6.0))
-    mission, kept = Mission(blocks, 1.0, (0, 100, 301), SETTINGS), list[Packed]()
+    mission, kept = known_blocks((0, 100, 301), 3.0), list[Packed]()
     whole = integrate_missions(mission, keep=kept.append)
     n_runs = len(exact_blocks)
     for place in (0, 1, 5, len(kept) // 2, len(kept) - 2, len(kept) - 1):
@@ -466,15 +458,19 @@ def test_the_half_power_width_is_that_of_the_damping():
     assert half_width(at[:150], peak[:150]) == 0.0
 
 
+def passing(passage, wear=WEAR, settings=SETTINGS):
+    """A passage of the damped slider."""
+    block = Block(scene("sdof_slider", damping=6.0), passage, 10.0, FRICTION)
+    return BlockCase(Mission((block,), wear, (0, 1), settings), 0, np.zeros(1), None, settings)
+
+
 @pytest.mark.slow
 def test_a_vibration_is_late_by_its_decay_time():
     """The free slider with 6 N s/m and 0.1 kg decays by exp(-30 t): at 7 Hz/s it is late by 7/30 Hz."""
 
     def case(rate):
-        block = Block(scene("sdof_slider", damping=6.0), Passage(180.0, 220.0, rate), 10.0, FRICTION, begin="up")
         # too little wear to change the pressures on the way
-        mission = Mission((block,), 1e-6 * WEAR, (0, 1), SETTINGS)
-        return BlockCase(mission, 0, np.zeros(1), None, with_slope=False, settings=SETTINGS)
+        return passing(Passage(180.0, 220.0, rate), 1e-6 * WEAR)
 
     fast, slow = run_passage(case(7.0)), run_passage(case(0.07))
     assert fast.sweep_rate == pytest.approx(7.0 / (30.0 / (2.0 * np.pi)) ** 2)
@@ -488,11 +484,10 @@ def test_a_vibration_is_late_by_its_decay_time():
 
 @pytest.mark.slow
 def test_a_passage_wears_as_a_fixed_grid_of_frequencies():
-    model, passage = scene("sdof_slider", damping=6.0), Passage(185.0, 215.0, 5.0)
-    block = Block(model, passage, 10.0, FRICTION, begin="up")
-    history = integrate((block,), 1)
-    mission = Mission((block,), WEAR, (0, 1), SETTINGS)
-    case = BlockCase(mission, 0, np.zeros(1), None, with_slope=False, settings=SETTINGS)
+    passage = Passage(185.0, 215.0, 5.0)
+    case = passing(passage)
+    mission = case.mission
+    history = integrate(mission.blocks, 1)
     grid = np.linspace(185.0, 215.0, 33)
     fixed = states_at(case, passage, grid)
     assert isinstance(fixed, list)
@@ -506,10 +501,8 @@ def test_a_passage_wears_as_a_fixed_grid_of_frequencies():
 
 @pytest.mark.slow
 def test_the_reference_of_a_passage_takes_its_resolutions_and_estimates_no_errors():
-    # a passage begins with a sweep
-    block = Block(scene("sdof_slider", damping=6.0), Passage(185.0, 215.0, 5.0), 10.0, FRICTION)
     settings = SolverSettings(rtol=2e-3)
-    case = BlockCase(Mission((block,), WEAR, (0, 1), settings), 0, np.zeros(1), None, settings)
+    case = passing(Passage(185.0, 215.0, 5.0), settings=settings)
     fine = run_passage(case)
     assert fine.like is not None
     assert len({resolution for _, resolution in fine.like.resolutions}) > 1
@@ -583,22 +576,20 @@ def test_the_next_passage_begins_with_the_frequencies_that_count(monkeypatch):
 
 # --- what users may get wrong ---
 
+PASSAGE = {"frequency": Passage(2.0, 3.0, 1.0), "cycles": None}
+
 
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"begin": "sweep"}, r"blocks\[1\]: begin: give one of ramp, up, down, continue instead of 'sweep'"),
+        ({"begin": "sweep"}, r"blocks\[1\]: begin: give one of"),
         ({"cycles": 0.0}, r"blocks\[1\]: cycles: give values above 0"),
-        ({"frequency": Passage(2.0, 2.0, 1.0), "cycles": None}, r"blocks.*: frequency.stop: give another"),
-        ({"frequency": Passage(2.0, 3.0, -1.0), "cycles": None}, r"blocks.*: frequency.rate: give values above 0"),
-        ({"frequency": Passage(2.0, 3.0, 1.0)}, r"blocks.*: cycles: the cycles of a passage follow"),
-        (
-            {"frequency": Passage(2.0, 3.0, 1.0), "cycles": None, "begin": "down"},
-            r'blocks.*: begin: this passage goes up: give "up"',
-        ),
         ({"cycles": None}, r"blocks.*: cycles: missing"),
+        ({"frequency": Passage(2.0, 2.0, 1.0), "cycles": None}, r"blocks.*: frequency.stop"),
+        ({"frequency": Passage(2.0, 3.0, -1.0), "cycles": None}, r"blocks.*: frequency.rate"),
+        ({**PASSAGE, "cycles": 1.0}, r"blocks.*: cycles"),
+        ({**PASSAGE, "begin": "down"}, r'blocks.*: begin: .* give "up"'),
         ({"frequency": np.nan}, r"blocks\[1\]: frequency: give finite numbers"),
-        ({"excitation_amplitude": -1.0}, r"blocks\[1\]: excitation_amplitude: give values of at least 0"),
         ({"excitation_amplitude": 0.0}, r"blocks\[1\]: excitation_amplitude: give values above 0"),
         ({"friction_coefficient": [0.1, 0.2]}, r"blocks\[1\]: friction_coefficient has shape"),
         ({"friction_coefficient": 0.4}, r"begin: continue goes with the model and friction"),
@@ -615,14 +606,11 @@ def test_a_wrong_block_is_named(changed, said):
     ("wrong", "said"),
     [
         ({"missions": [1.5]}, "missions: give ascending whole numbers"),
-        ({"missions": [3, 2]}, "missions: give ascending whole numbers"),
         ({"missions": 0}, "missions: give ascending whole numbers, the last of at least 1"),
         ({"blocks": ()}, "blocks: give at least one block"),
-        ({"largest_step": 0}, "largest_step: give values of at least 1"),
         ({"largest_step": 1.5}, "largest_step: give a whole number"),
         ({"until": WearTarget("frequency_shift", 0.1)}, "until.quantity: give one of wear_depth, worn_volume"),
         ({"sweep": "continue"}, "sweep: give one of up, down, ramp"),
-        ({"law": WearLaw("rust")}, 'wear law "rust"'),
     ],
 )
 def test_a_wrong_mission_is_a_sentence(wrong, said):
@@ -634,5 +622,5 @@ def test_a_block_without_a_start_state_is_an_outcome():
     """The time is over before the first state."""
     history = integrate_mission(two_blocks("up"), WEAR, 10, settings=replace(SETTINGS, time_limit=0.0))
     assert history.outcome is Outcome.TIME_LIMIT
-    assert np.isnan(history.error_estimate) or history.last_mission == 0
+    assert history.last_mission == 0
     assert np.isnan(history.worn_volume[1:]).all()

@@ -189,8 +189,8 @@ def test_the_negative_damping_feeds_in_what_damping_and_friction_take(joint):
     found = dict(follow_mode(model, friction, amplitudes, 1, way, settings))  # type: ignore[arg-type]
     seen = 0
     for point in found.values():
-        if point.problem is not None and point.state is not None:
-            fed, taken = energies(point.problem, point.state)
+        if point.found is not None:
+            fed, taken = energies(*point.found)
             assert fed == pytest.approx(taken, rel=1e-6)
             seen += 1
     assert seen == len(amplitudes)
