@@ -15,15 +15,8 @@ For use in Python, from this package itself:
   coefficients and time signals of a state as a `PeriodicMotion`;
 - `SolverSettings`: resolution and accuracy; `Outcome`: how a computation ended.
 
-The rooms, from the ground up: `contact` (Coulomb friction and unilateral contact through a period), `structure`
-(Fourier basis, condensation, penalty, the joint), `harmonic_balance` (the DLFT balance and its Jacobian), `newton`
-(iteration, linear solvers, preconditioners), `stability`, `continuation` (natural and arc length, homotopies, first
-state, transient), `accuracy` (number of harmonics, refinement, reference solution and errors, certificate), `results`,
-`loading_history` (the unworn states of a sweep or a ramp), `modes` (nonlinear modes), `wear` (the integration over the
-slow time), `missions` (blocks in order). On top: `forced_response`, `nonlinear_modes`, `single_mode_theory`,
-`wear_history`, `mission_history`, `balance_functions`, `whole_response`. On the ground: `model`,
-`model_from_matrices`, `compliant_contact`, `settings`, `outcome`, `clock`, `packing`. `PHYSICS.md` has the equations in
-one sign convention, the misprints of the paper, and measurements.
+`CONTRIBUTING.md` has a map of the rooms. `PHYSICS.md` has the equations in one sign convention, the misprints of the
+paper, and measurements.
 """
 
 from __future__ import annotations
@@ -32,47 +25,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from solver.balance_functions import HarmonicBalance, balance_of
-    from solver.compliant_contact import with_contact_stiffness
-    from solver.forced_response import FrequencyResponse, frequency_response
-    from solver.mission_history import integrate_mission
-    from solver.missions.blocks import Block, Passage
-    from solver.missions.result import MissionHistory
-    from solver.model import ReducedModel
-    from solver.model_from_matrices import build_model
-    from solver.nonlinear_modes import Backbone, backbone
-    from solver.outcome import Outcome
-    from solver.results.history import WearHistory
-    from solver.results.periodic_motion import PeriodicMotion
-    from solver.settings import SolverSettings
-    from solver.single_mode_theory import ModalResponse, modal_response
-    from solver.wear_history import march_wear
-    from solver.whole_response import ResponseCurve, response_curve
-
-__all__ = [
-    "Backbone",
-    "Block",
-    "FrequencyResponse",
-    "HarmonicBalance",
-    "MissionHistory",
-    "ModalResponse",
-    "Outcome",
-    "Passage",
-    "PeriodicMotion",
-    "ReducedModel",
-    "ResponseCurve",
-    "SolverSettings",
-    "WearHistory",
-    "backbone",
-    "balance_of",
-    "build_model",
-    "frequency_response",
-    "integrate_mission",
-    "march_wear",
-    "modal_response",
-    "response_curve",
-    "with_contact_stiffness",
-]
+    from solver.balance_functions import HarmonicBalance as HarmonicBalance
+    from solver.balance_functions import balance_of as balance_of
+    from solver.compliant_contact import with_contact_stiffness as with_contact_stiffness
+    from solver.forced_response import FrequencyResponse as FrequencyResponse
+    from solver.forced_response import frequency_response as frequency_response
+    from solver.mission_history import integrate_mission as integrate_mission
+    from solver.missions.blocks import Block as Block
+    from solver.missions.blocks import Passage as Passage
+    from solver.missions.result import MissionHistory as MissionHistory
+    from solver.model import ReducedModel as ReducedModel
+    from solver.model_from_matrices import build_model as build_model
+    from solver.nonlinear_modes import Backbone as Backbone
+    from solver.nonlinear_modes import backbone as backbone
+    from solver.outcome import Outcome as Outcome
+    from solver.results.history import WearHistory as WearHistory
+    from solver.results.periodic_motion import PeriodicMotion as PeriodicMotion
+    from solver.settings import SolverSettings as SolverSettings
+    from solver.single_mode_theory import ModalResponse as ModalResponse
+    from solver.single_mode_theory import modal_response as modal_response
+    from solver.wear_history import march_wear as march_wear
+    from solver.whole_response import ResponseCurve as ResponseCurve
+    from solver.whole_response import response_curve as response_curve
 
 # Loaded at the first use: rooms import each other through this package, and loading numba takes a while.
 _PLACES = {
@@ -100,6 +74,9 @@ _PLACES = {
     "with_contact_stiffness": "compliant_contact",
 }
 
+if not TYPE_CHECKING:
+    __all__ = list(_PLACES)
+
 
 def __getattr__(name: str) -> object:
     if name not in _PLACES:
@@ -108,4 +85,4 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *_PLACES})

@@ -58,11 +58,6 @@ def unpack(packed: Packed) -> Any:
     return _rebuilt(json.loads(packed.text), packed.arrays)
 
 
-def attributes(part: object, state: type[T]) -> T:
-    """Those attributes of an object that are keys of a TypedDict `state`."""
-    return cast("T", {name: getattr(part, name) for name in state.__annotations__})
-
-
 def _described(value: object, arrays: list[NDArray[np.generic]]) -> object:
     """JSON of a value; its arrays are appended to `arrays`."""
     if isinstance(value, Outcome):

@@ -127,20 +127,9 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
     """One result of several: the axes hold the values of all of them. A point in several is taken whole from the last.
 
     A point in none of them is NaN, its whole numbers 0 and its `outcome` not_computed. Attributes are kept that all
-    agree on.
-
-    Parameters
-    ----------
-    datasets
-        Results, read from files of `run-study`.
-    dim
-        Name of a key of the study that differs between them and is no axis, e.g. "friction_coefficient" or
-        "scene.friction_coefficient"; it becomes the first axis.
-
-    Raises
-    ------
-    ValueError
-        Where the results have different axes or pairs, are of different scenes and no `dim` is given, or lack the key.
+    agree on. dim: key of the study that differs between the results and is no axis, as "friction_coefficient" or
+    "scene.friction_coefficient"; it becomes the first axis. ValueError: the results have different axes or pairs, are
+    of different scenes and no `dim` is given, or lack the key.
     """
     if not datasets:
         raise ValueError("There are no results to join.")

@@ -11,7 +11,7 @@ _SPACED = 1e4  # counts from here on have spaces between thousands
 def show_percent(fraction: float, rtol: float | None = None) -> str:
     """A relative error in percent: "2.6 %"; more than ten times the whole in short.
 
-    With `rtol`, what it is held against, it has as many digits as it takes to stand on the right side of it: an error
+    With `rtol`, the error that was asked for, it has as many digits as show on which side of `rtol` it is: an error
     just above 1 % is not shown as 1 %.
     """
     if fraction >= 1.0:

@@ -1,6 +1,6 @@
 """The numbers of harmonics between which automatic settings choose, and how many more an error estimate needs.
 
-The list `harmonic_levels` of the options holds the highest harmonics of these resolutions. "One level up" means the
+The list `HARMONIC_LEVELS` holds the highest harmonics of these resolutions. "One level up" means the
 next entry of this list.
 
 Two effects hide an error from a comparison with only a few more harmonics:
@@ -17,11 +17,25 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.accuracy.options import ACCURACY
 from solver.model import ReducedModel
 from solver.settings import Resolution, SolverSettings, all_orders, samples_for
 from solver.structure.condensation import relative_indices
 from solver.structure.penalty import build_penalty, compliance_at
+
+HARMONIC_LEVELS = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
+"""Highest harmonics between which "auto" chooses. The last two serve for comparison only. 7 is left out: on the
+dovetail, states with five and seven harmonics agree by chance (212 Hz: errors of the worn volume of 1.9, 1.2 and 0.1 %
+with 5, 7 and 9)."""
+
+DISPLACEMENTS_OF_LIMITS = 144
+"""Number of relative displacements of the dovetail with 48 pairs, to which the limits of unknowns belong. For a larger
+joint the limits grow in proportion, so that they limit the harmonics and not the pairs."""
+
+STIFFNESS_MISMATCH = 0.25
+"""Largest |1 - E G|: above, structure and penalty answer differently, and more harmonics are needed."""
+
+MOST_UNKNOWNS = 8000
+"""Most unknowns of a balance in a history with "auto"; of a balance that is solved for comparison half as many more."""
 
 
 def n_unknowns(resolution: Resolution, n_rel: int) -> int:
@@ -34,16 +48,16 @@ def room_for(unknowns: float, n_rel: int) -> float:
 
     The limit grows with the number of displacements, so that the number of harmonics does not depend on the mesh.
     """
-    return unknowns * max(1.0, n_rel / ACCURACY.displacements_of_limits)
+    return unknowns * max(1.0, n_rel / DISPLACEMENTS_OF_LIMITS)
 
 
 def shifted(resolution: Resolution, levels: int) -> Resolution:
     """Resolution so many levels up, or one level down for -1, with enough samples; odd harmonics stay odd."""
     if levels > 0:
-        above = [highest for highest in ACCURACY.harmonic_levels if highest > resolution.highest]
+        above = [highest for highest in HARMONIC_LEVELS if highest > resolution.highest]
         highest = above[levels - 1] if len(above) >= levels else (levels + 1) * resolution.highest
     else:
-        below = (highest for highest in ACCURACY.harmonic_levels if highest < resolution.highest)
+        below = (highest for highest in HARMONIC_LEVELS if highest < resolution.highest)
         highest = max(below, default=resolution.highest)
     orders = all_orders(highest)
     if resolution.highest > 1 and all(order % 2 for order in resolution.orders):
@@ -66,18 +80,18 @@ def levels_to_see(resolution: Resolution, contact: float, fewest: int) -> int:
     The force of a contact shorter than about half a period of the highest harmonic is nearly equal in all harmonics. A
     few more harmonics then change almost nothing, however large the error is.
     """
-    above = [highest for highest in ACCURACY.harmonic_levels if highest > resolution.highest]
+    above = [highest for highest in HARMONIC_LEVELS if highest > resolution.highest]
     blind = sum(highest * contact < 0.5 for highest in above)
     return max(fewest, min(blind + 1, len(above)))
 
 
 def levels_to_reach(resolution: Resolution, highest: int, fewest: int) -> int:
     """Levels up, at least `fewest`, to a resolution with the harmonic `highest`."""
-    return max(fewest, sum(resolution.highest < level <= highest for level in ACCURACY.harmonic_levels))
+    return max(fewest, sum(resolution.highest < level <= highest for level in HARMONIC_LEVELS))
 
 
 def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
-    """Whether |1 - E G| is below `stiffness_mismatch` for all pairs and for all harmonics of the list above `highest`.
+    """Whether |1 - E G| is below `STIFFNESS_MISMATCH` for all pairs and for all harmonics of the list above `highest`.
 
     G is evaluated at real rates (growth instead of vibration), where the structure has no resonances.
     omega: rad/s.
@@ -85,10 +99,10 @@ def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
     penalty = build_penalty(model, omega, highest)
     _, component_index = relative_indices(model.contact)
     pair, tangent = component_index // 3, np.minimum(component_index % 3, 1)
-    half_octaves = np.arange(0.0, 2.0 * np.log2(ACCURACY.harmonic_levels[-1] / (highest + 1)) + 1.0)
+    half_octaves = np.arange(0.0, 2.0 * np.log2(HARMONIC_LEVELS[-1] / (highest + 1)) + 1.0)
     for rate in (highest + 1) * omega * 2.0 ** (0.5 * half_octaves):
         acts = penalty.at_rate(rate)[pair, tangent]
-        if np.abs(1.0 - acts * compliance_at(model, rate)).max(initial=0.0) > ACCURACY.stiffness_mismatch:
+        if np.abs(1.0 - acts * compliance_at(model, rate)).max(initial=0.0) > STIFFNESS_MISMATCH:
             return False
     return True
 
@@ -98,5 +112,5 @@ def reach(model: ReducedModel, omega: float, highest: int) -> int:
 
     omega: rad/s.
     """
-    above = (level for level in ACCURACY.harmonic_levels if level > highest)
-    return next((level for level in (highest, *above) if reaches(model, omega, level)), ACCURACY.harmonic_levels[-1])
+    above = (level for level in HARMONIC_LEVELS if level > highest)
+    return next((level for level in (highest, *above) if reaches(model, omega, level)), HARMONIC_LEVELS[-1])

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
-from solver.accuracy.harmonic_levels import room_for, shifted
+from solver.accuracy.harmonic_levels import HARMONIC_LEVELS, MOST_UNKNOWNS, room_for, shifted
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
 from solver.accuracy.resolved_state import ResolvedState
@@ -29,6 +29,25 @@ from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, SMALL_JOINT
 from solver.newton.run import Run
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import Case, Joint
+
+MOST_MIXED_HARMONICS = 79
+"""Highest harmonic of "auto" with even harmonics: motions with impacts gain nothing from more."""
+
+NODE_UNKNOWNS = 1600
+"""Most unknowns of a node of a sweep: about those of the dovetail of 48 pairs with five harmonics (1584). Most unknowns
+of a small joint, too: impacts couple all harmonics, and no preconditioner helps."""
+
+MOST_SAMPLES = 8192
+"""Most samples of a period that "auto" takes."""
+
+SAMPLES_OF_UNKNOWNS = 512
+"""Most samples of a period at the largest number of unknowns; more with fewer unknowns. Nine pairs of a blade that lift
+off at 2000 N: without this limit 27 harmonics take 8192 samples, 0.2 s an iteration, and the wear rate at the edge of
+the contact is no more accurate than with 2048."""
+
+REFINEMENT_WORK = 1.2e6
+"""Most Newton iterations of one refinement, times the unknowns two levels up. Failed solves take most of them. A joint
+of 48 pairs with nine harmonics may take 200."""
 
 
 @dataclass(frozen=True)
@@ -59,32 +78,13 @@ def refine(
 ) -> Refined:
     """Estimate the error of a state at fixed wear depth; refine the state to an error below rtol in automatic settings.
 
-    Parameters
-    ----------
-    case
-        The case, with the harmonics and samples of the state.
-    omega, excitation_amplitude
-        rad/s, N.
-    point
-        The state.
-    run
-        Tolerance and limits.
-    most
-        Most unknowns of a joint of 48 pairs with more harmonics (`room_for`), by default `most_unknowns`.
-    usual_work
-        N m, lower bound of the slip work to which errors are relative, for states with almost no slip.
+    The result is the last state found, with its error, where none is accurate.
 
-    Returns
-    -------
-    Refined
-        The refined state, or the last one found with its error where none is accurate.
-
-    Raises
-    ------
-    OutOfTimeError
-        The time is over.
+    case, point: the state and the case with its harmonics and samples. omega, excitation_amplitude: rad/s, N.
+    most: most unknowns of a joint of 48 pairs with more harmonics (`room_for`), by default `MOST_UNKNOWNS`.
+    usual_work: N m, lower bound of the slip work to which errors are relative, for states with almost no slip.
     """
-    search = _Search(case.settings, run, run.budget.iterations, most or ACCURACY.most_unknowns)
+    search = _Search(case.settings, run, run.budget.iterations, most or MOST_UNKNOWNS)
     return search.refined(ResolvedState(case, case.joint(omega, excitation_amplitude), point, usual_work).at_rest(run))
 
 
@@ -179,7 +179,7 @@ class _Search:
 
         finer, richer: known states with more samples and with more harmonics.
         """
-        limit = self.begun + ACCURACY.refinement_work / here.unknowns(shifted(here.case.resolution, 2))
+        limit = self.begun + REFINEMENT_WORK / here.unknowns(shifted(here.case.resolution, 2))
         if wanted == here.case.resolution or not self._allowed(here, wanted) or self.run.budget.iterations >= limit:
             return None
         for known in (finer, richer):
@@ -199,19 +199,19 @@ class _Search:
             return False
         n_rel = here.joint.component_index.size
         # the contact law costs unknowns times samples
-        room = ACCURACY.samples_of_unknowns * room_for(self.most, n_rel)
+        room = SAMPLES_OF_UNKNOWNS * room_for(self.most, n_rel)
         if here.unknowns(resolution) * resolution.samples > room:
             return False
         small = n_rel <= SMALL_JOINT
-        most = room_for(min(self.most, ACCURACY.node_unknowns) if small else self.most, n_rel)
-        if resolution.highest > ACCURACY.most_mixed_harmonics:
+        most = room_for(min(self.most, NODE_UNKNOWNS) if small else self.most, n_rel)
+        if resolution.highest > MOST_MIXED_HARMONICS:
             # more harmonics for friction without impacts only, whose harmonics are odd
             if not all(order % 2 for order in resolution.orders):
                 return False
             most = min(most, EXPENSIVE_UNKNOWNS)
         # the two highest resolutions serve for a comparison only
-        in_levels = resolution.highest <= ACCURACY.harmonic_levels[-3]
-        return resolution.samples <= ACCURACY.most_samples and in_levels and here.unknowns(resolution) <= most
+        in_levels = resolution.highest <= HARMONIC_LEVELS[-3]
+        return resolution.samples <= MOST_SAMPLES and in_levels and here.unknowns(resolution) <= most
 
 
 def state_difference(case: Case, joint: Joint, one: State, other: State) -> Estimate:

@@ -1,7 +1,7 @@
 """A state at one resolution (harmonics and samples), the corresponding states at others, and their differences.
 
 A state is solved again with more harmonics or with more samples. The change, times a safety factor for the rest of the
-series (`AccuracyOptions`), is its error.
+series, is its error.
 """
 
 from __future__ import annotations
@@ -10,9 +10,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.certificate import certify
+from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.accuracy.error_estimate import UNKNOWN, Estimate
-from solver.accuracy.harmonic_levels import fewer, levels_to_reach, levels_to_see, n_unknowns, reach, room_for, shifted
+from solver.accuracy.harmonic_levels import (
+    MOST_UNKNOWNS,
+    fewer,
+    levels_to_reach,
+    levels_to_see,
+    n_unknowns,
+    reach,
+    room_for,
+    shifted,
+)
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import half_wave_symmetric, lacks_even, nothing_happens, shortest_contact
 from solver.continuation.homotopy import add_harmonics, start_with_tail
@@ -27,6 +36,15 @@ from solver.newton.run import Run
 from solver.settings import FINE_SAMPLES, NEGLIGIBLE, ROUND_OFF, Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
+
+FAR_UNKNOWNS = 400
+"""Most unknowns of a balance that only resolves a short contact, or the structure at higher harmonics."""
+
+COMPARED_UNKNOWNS = 3 * MOST_UNKNOWNS // 2
+"""Most unknowns of a balance that is solved to estimate an error."""
+
+SMALL_PEAK = 0.01
+"""Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
 
 
 @dataclass(frozen=True)
@@ -74,12 +92,7 @@ class ResolvedState:
         if 2 * resolution.highest < self.case.resolution.samples:
             case = self.case.at(resolution)
             joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
-            level = self._solved(
-                case,
-                joint,
-                *start_with_tail(self.case, joint, self.point.evaluation),
-                run,
-            )
+            level = self._solved(case, joint, *start_with_tail(self.case, joint, self.point.evaluation), run)
             if level is not None:
                 return level
         led = add_harmonics(self.case, self.joint, self.point.evaluation, resolution, run)
@@ -113,7 +126,7 @@ class ResolvedState:
         It is the larger one of `usual_work` and a fraction of the work of the excitation.
         """
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
-        return max(ACCURACY.small_work * abs(self.joint.structure.input_work(motion)), self.usual_work)
+        return max(SMALL_WORK * abs(self.joint.structure.input_work(motion)), self.usual_work)
 
     def without_even(self, run: Run) -> ResolvedState | None:
         """The state solved with odd harmonics only; None where it needs even harmonics or holds none already."""
@@ -152,17 +165,14 @@ class ResolvedState:
         - Twice as many samples contain the sample next to an event, which may still be the next one. Then both states
           have the same error. So the other state has 3 N + 2 samples, which share only the phases 0 and pi with the N.
         - Many unknowns mean many events. Then 2 N samples suffice, with which the refinement can go on.
-        - Where no such state is found, the error is the difference to the state with N / 2 samples, which is at least
-          as large.
         """
         orders, samples = self.case.resolution.orders, self.case.resolution.samples
         few = self.unknowns(self.case.resolution) <= EXPENSIVE_UNKNOWNS
         finer = self.compared_at(Resolution(orders, 3 * samples + 2 if few else 2 * samples), run)
-        if finer is not None:
-            safety = ACCURACY.triple_samples_safety if few else ACCURACY.two_levels_safety
-            return self.difference(finer).times(safety), finer
-        coarser = self.compared_at(Resolution(orders, samples // 2), run) if samples // 2 > 2 * orders[-1] else None
-        return (UNKNOWN if coarser is None else coarser.difference(self)), None
+        if finer is None:
+            return UNKNOWN, None
+        safety = ACCURACY.triple_samples_safety if few else ACCURACY.two_levels_safety
+        return self.difference(finer).times(safety), finer
 
     def harmonics_error(self, run: Run, known: ResolvedState | None = None) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error by missing harmonics, and the state with more harmonics that gave it.
@@ -184,11 +194,11 @@ class ResolvedState:
         contact = shortest_contact(evaluation.status_t, evaluation.force_t[:, 0], felt)
         # a contact of one period of the highest harmonic is resolved well, one of half a period just resolved
         far, seeing = (levels_to_see(self.case.resolution, part * contact, 2) for part in (0.5, 1.0))
-        while far > 2 and not self.may_solve(shifted(self.case.resolution, far), ACCURACY.far_unknowns):
+        while far > 2 and not self.may_solve(shifted(self.case.resolution, far), FAR_UNKNOWNS):
             far -= 1
         seeing = min(seeing, far)
         reaching = 2
-        most = ACCURACY.far_unknowns
+        most = FAR_UNKNOWNS
         if self.may_solve(shifted(self.case.resolution, 2), most):
             reaching = levels_to_reach(
                 self.case.resolution, reach(self.case.model, self.joint.omega, self.case.resolution.highest), 2
@@ -197,7 +207,7 @@ class ResolvedState:
                 reaching -= 1
         for levels in sorted({far, seeing, *range(1, reaching + 1), -1}, reverse=True):
             other = shifted(self.case.resolution, levels)
-            affordable = self.unknowns(other) <= room_for(ACCURACY.compared_unknowns, self.joint.component_index.size)
+            affordable = self.unknowns(other) <= room_for(COMPARED_UNKNOWNS, self.joint.component_index.size)
             if other.highest != self.case.resolution.highest and self.case.model.holds(other.highest) and affordable:
                 level = known if 2 < levels <= reaching and known is not None and known.covers(other) else None
                 level = level or self.compared_at(other, run)
@@ -270,12 +280,12 @@ class ResolvedState:
         least = better.least_response()
         first = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), least)
         mine_peak, its_peak = self.peaks(), better.peaks()
-        size = np.maximum(its_peak, max(ACCURACY.small_peak * float(its_peak.max(initial=0.0)), least))
+        size = np.maximum(its_peak, max(SMALL_PEAK * float(its_peak.max(initial=0.0)), least))
         response = max(first, float((np.abs(mine_peak - its_peak) / size).max(initial=0.0)))
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
         work = max(self.least_work(), better.least_work())
-        if max(its_slip, mine_slip) <= ACCURACY.small_work * work:
+        if max(its_slip, mine_slip) <= SMALL_WORK * work:
             return Estimate(response, 0.0)
         # the wear rate cannot be more accurate than the motion that causes it
-        slip = max(its_slip, ACCURACY.small_work * work)
+        slip = max(its_slip, SMALL_WORK * work)
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))

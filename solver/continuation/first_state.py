@@ -128,7 +128,7 @@ def _sliding_start(balance: Balance, rest: State) -> FloatArray | None:
 
     if (np.linalg.norm(of_pairs(load)[:, 1:], axis=1) <= limit).any():
         return None
-    friction, moved = np.zeros((limit.size, 3), complex), load
+    friction, moved = np.zeros((limit.size, 3), complex), load.astype(np.complex128)
     for _ in range(LINEARISATIONS):
         left = load - friction.ravel()[joint.component_index]
         moved = np.asarray(np.linalg.solve(stiffness, left), dtype=np.complex128)

@@ -214,37 +214,27 @@ class Linearisation:
         """Part `1 - d lambda/dp` (n, 3m, 3m) that the active pairs do not transmit, in single precision."""
         return identity_less(self.force_tangent, self.active)
 
-    def dense(self, pairs: IntArray, n_harmonics: int | None = None) -> FloatArray:
-        """Rows and columns of the Jacobian for some pairs, in the order (relative displacement, harmonic).
-
-        n_harmonics: number of the lowest harmonics that are included; all if not given.
-        """
-        whole = self.joint.basis.synthesis.shape[0]
-        m = whole if n_harmonics is None else 2 * n_harmonics + 1
-        rows, pair, component = self._rows(pairs)
-        n_rows = rows.size
+    def dense(self, pairs: IntArray) -> FloatArray:
+        """Rows and columns of the Jacobian for some pairs, in the order (relative displacement, harmonic)."""
+        m = self.joint.basis.synthesis.shape[0]
+        rows = self.joint.rows_of(pairs)
+        pair, component = np.divmod(self.joint.component_index[rows], 3)
+        pair = np.searchsorted(pairs, pair)
         # blocks of the pairs, spread over the existing rows and columns: (row, harmonic, column, harmonic)
-        spread = np.zeros((2, n_rows, m, n_rows, m))
-        same = pair[:, None] == pair[None, :]
-        row, column = np.nonzero(same)
+        spread = np.zeros((2, rows.size, m, rows.size, m))
+        row, column = np.nonzero(pair[:, None] == pair[None, :])
         for place, part in enumerate((self.motion_tangent, self.force_tangent)):
-            blocks = part[pairs].reshape(pairs.size, 3, whole, 3, whole)
-            spread[place][row, :, column] = blocks[pair[row], component[row], :m, component[column], :m]
-        motion, matrix = spread[0].reshape(n_rows, m, -1), spread[1].reshape(n_rows, m, -1)
+            blocks = part[pairs].reshape(pairs.size, 3, m, 3, m)
+            spread[place][row, :, column] = blocks[pair[row], component[row], :, component[column]]
+        motion, matrix = spread.reshape(2, rows.size, m, -1)
         structure = self.joint.structure
         matrix[:, 0] += structure.static_stiffness[np.ix_(rows, rows)] @ motion[:, 0]
         if m > 1:
             amplitude = (motion[:, 1::2] - 1j * motion[:, 2::2]).transpose(1, 0, 2)
-            stiffness = structure.dynamic_stiffness[: (m - 1) // 2, rows[:, None], rows]
-            moved = np.matmul(stiffness, amplitude).transpose(1, 0, 2)
+            moved = np.matmul(structure.dynamic_stiffness[:, rows[:, None], rows], amplitude).transpose(1, 0, 2)
             matrix[:, 1::2] += moved.real
             matrix[:, 2::2] -= moved.imag
-        return np.asarray(matrix.reshape(n_rows * m, n_rows * m))
-
-    def _rows(self, pairs: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-        """Rows of `pairs`; for each row the index of its pair in `pairs`, and its component."""
-        rows = self.joint.rows_of(pairs)
-        return rows, np.searchsorted(pairs, self.joint.component_index[rows] // 3), self.joint.component_index[rows] % 3
+        return np.asarray(matrix.reshape(rows.size * m, rows.size * m))
 
 
 @njit(cache=True)

@@ -14,7 +14,7 @@ import numpy as np
 from solver.accuracy.harmonic_levels import shifted
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
-from solver.accuracy.refinement import Refined, refine
+from solver.accuracy.refinement import NODE_UNKNOWNS, Refined, refine
 from solver.accuracy.resolved_state import ResolvedState
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.arc_length import ARC_SPAN, Arc, follow_arc
@@ -256,8 +256,8 @@ class LoadingPath:
 
 def choose_resolution(case: Case, joint: Joint, point: State, run: Run) -> Refined:
     """A node with the harmonics and samples that it needs, at least the first ones of automatic settings."""
-    # `node_unknowns` limits the harmonics: their error shows in the difference to the reference sweep
-    refined = refine(case, joint.omega, joint.excitation_amplitude, point, run, ACCURACY.node_unknowns)
+    # `NODE_UNKNOWNS` limits the harmonics: their error shows in the difference to the reference sweep
+    refined = refine(case, joint.omega, joint.excitation_amplitude, point, run, NODE_UNKNOWNS)
     fewest = first_resolution(case.settings)
     if refined.case.resolution.highest >= fewest.highest:
         return refined

@@ -1,19 +1,20 @@
 """Lengths of the steps on the slow time scale: given, by the largest depth, growing, or by the local error.
 
-`one_step` takes a step as long as the plan and the branch of the vibration allow. Where no step is found, however
-short, it tries in this order, each once: an Euler step and a longer step across corners of the branch (adaptive steps
+`one_step` takes a step as long as the plan and the branch of the vibration allow. Where no step is found, it tries in
+this order, each once: an Euler step, an Euler step in parts, a longer step across corners of the branch (adaptive steps
 only), and a jump to a state behind the end of the branch.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.continuation.natural import follow_naturally
 from solver.continuation.options import CONTINUATION
-from solver.harmonic_balance.state import Failure, vibration_change
+from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
 from solver.march.steps import Lengths, take_step
 from solver.model import FloatArray
 from solver.newton.iteration import SHORTEST_STEP
@@ -21,7 +22,7 @@ from solver.outcome import Outcome
 from solver.settings import Scheme
 from solver.wear.jump import jump
 from solver.wear.rate_slope import too_long
-from solver.wear.state import WearState
+from solver.wear.state import Reached, WearState
 from solver.wear.step import Step, attempt_step
 from solver.wear.wearing_joint import WearingJoint
 
@@ -72,24 +73,25 @@ class Given:
     def wanted(self, state: WearState) -> tuple[float, float]:
         """Length of the next step by the plan alone, and of the shortest one, cycles."""
         length = self._wanted(state)
-        shortest = SHORTEST_STEP * length
-        return length, min(shortest, FOLD_RESOLUTION * state.cycle) if state.cycle > 0.0 else shortest
+        return length, SHORTEST_STEP * length if self.work.where.follows else length
 
     def _wanted(self, _: WearState) -> float:
         return self.length
 
     def attempt(self, state: WearState, length: float) -> Step | None:
         """As in Line."""
-        return attempt_step(self.work, state, length, self.scheme)
+        return euler_step(self.work, state, length, self.scheme)
 
-    def judge(self, state: WearState, step: Step, _: float) -> float:
-        """As in Line: a stable state counts whatever its error, unless a frequency is followed."""
-        stable = self.work.where.follows or self.work.is_stable(self.work.at(state), step.state.point.evaluation)
-        return 0.0 if stable else math.inf
+    def judge(self, _: WearState, __: Step, ___: float) -> float:
+        """As in Line: a step counts whatever its error."""
+        return 0.0
 
     def rescue(self, state: WearState, length: float) -> Step | Failure:
-        """As in Line."""
-        return step_behind(self, state, length)
+        """As in Line: a step to the end of the branch, and a jump from there."""
+        step, known_to = step_in_parts(self.work, state, length, self.scheme), SHORTEST_STEP * length
+        if step is not None and step.state.cycle - state.cycle > 2.0 * known_to:
+            return step
+        return step_behind(self, state if step is None else step.state, 2.0 * known_to)
 
 
 @dataclass(frozen=True)
@@ -156,11 +158,12 @@ class Adaptive:
 
     def rescue(self, state: WearState, length: float) -> Step | Failure:
         """As in Line, where the vibration changes much over the shortest step, or its end is not found."""
-        work = self.work
-        euler = attempt_step(work, state, length, "implicit")
-        if euler is None or not (work.where.follows or work.is_stable(work.at(state), euler.state.point.evaluation)):
-            euler = step_across(work, state, length, self.end)
-        return euler or step_behind(self, state, length)
+        euler = euler_step(self.work, state, length, "implicit")
+        parts = None if euler else step_in_parts(self.work, state, length, "implicit")
+        if parts is not None and parts.state.cycle >= (state.cycle + length) * (1.0 - 1e-12):
+            euler = parts
+        last = state if parts is None else parts.state
+        return euler or step_across(self.work, state, length, self.end) or step_behind(self, last, length)
 
 
 Steps = Given | Adaptive
@@ -185,9 +188,45 @@ def one_step(steps: Steps, state: WearState) -> Step | Failure:
     return failure or replace(step, state=replace(step.state, length=ahead))
 
 
-def step_behind(steps: Steps, state: WearState, length: float) -> Step | Failure:
-    """A jump as a step, at the frequency that is followed; length: of the shortest step, cycles."""
-    work, beyond = steps.work, min(2.0 * length, steps.end - state.cycle)
+def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step | None:
+    """An Euler step to a stable state; None where it is not found.
+
+    A followed resonance may be unstable at constant frequency.
+    """
+    step = attempt_step(work, state, length, scheme)
+    if step is None or work.where.follows or work.is_stable(work.at(state), step.state.point.evaluation):
+        return step
+    return None
+
+
+def step_in_parts(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step | None:
+    """An Euler step by shorter and shorter parts, at the tangential history of its start, as far as its branch goes.
+
+    None where no part or no stable state is found.
+    """
+    if work.where.follows:
+        return None
+    joint, depth, start = work.at(state), state.depth, state.point
+    rate, gain = work.rate(start.evaluation), work.gain(length)
+
+    def balance_at(fraction: float, history: FloatArray) -> Balance:
+        if scheme == "explicit":
+            return Balance(joint, history, depth + fraction * length * rate)
+        return Balance(joint, history, depth, fraction * gain, work.wearing)
+
+    begin = replace(start, parameter=0.0)
+    last, _ = follow_naturally(balance_at, begin, 1.0, work.run, keep_history=True)
+    if last.parameter <= 0.0 or not work.is_stable(joint, last.evaluation):
+        return None
+    point = State(last.evaluation, final_history(balance_at(last.parameter, start.history), last.evaluation))
+    ahead = last.parameter * length
+    after = work.accepted(state, Reached(point, state.omega, state.lag, state.half_width), ahead)
+    return Step(after, 0.5 * ahead * (work.rate(point.evaluation) - rate))
+
+
+def step_behind(steps: Steps, state: WearState, beyond: float) -> Step | Failure:
+    """A jump over so many cycles as a step, at the frequency that is followed."""
+    work, beyond = steps.work, min(beyond, steps.end - state.cycle)
     worn = state.depth + beyond * work.rate(state.point.evaluation)
     if (failure := refused(steps, state, worn, beyond)) is not None:
         return failure

@@ -257,14 +257,14 @@ class Store:
                 self.path.unlink()
 
     def _describe_run(self) -> bytes:
-        noted = {
+        run = {
             **self._study,
             "run": f"process {os.getpid()} on {socket.gethostname()}",
             "open": self._is_open,
             "under_way": sorted(self._under_way),
             "crashes": self.crashes,
         }
-        return json.dumps(noted).encode()
+        return json.dumps(run).encode()
 
 
 def read_study(path: Path) -> tuple[str, str] | None:

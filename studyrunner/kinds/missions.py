@@ -18,7 +18,6 @@ from studyrunner.kinds.task import (
     Joint,
     Keep,
     PointResult,
-    PointTask,
     Reached,
     Task,
     TaskPlan,
@@ -71,7 +70,7 @@ class PlannedBlock:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mission(PointTask):
+class Mission(Task):
     """A mission history: blocks of vibration, one after the other, many times. It has one result.
 
     begin: how the first mission begins where its first block continues; "" elsewhere.
@@ -130,7 +129,7 @@ class Mission(PointTask):
         )
         reached, n_computed = Reached(self, keep), itertools.count(1)
         # as many again for the reference solution
-        n_planned = 2 * len(blocks) * missions_computed(self.missions[-1])
+        n_planned = 2 * len(blocks) * max(1, missions_computed(self.missions[-1]))
 
         def note(progress: Packed) -> None:
             reached(progress)

@@ -12,10 +12,9 @@ import numpy as np
 from studyrunner.kinds.estimate import ITERATIONS_A_MODE_POINT, iterations_of_mode, seconds_an_iteration
 from studyrunner.kinds.task import (
     Identity,
-    Joint,
+    JointTask,
     Keep,
     PointResult,
-    PointTask,
     Task,
     TaskPlan,
     described,
@@ -40,21 +39,15 @@ _FOR_THE_TABLE = ("natural_frequency", "damping_ratio")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mode(PointTask):
+class Mode(JointTask):
     """A nonlinear mode; a result at each modal amplitude.
 
     mode: its number, from 1. direction: "up" or "down" along the amplitude. amplitudes: m sqrt(kg), ascending.
     """
 
-    joint: Joint
     mode: int
     direction: str
     amplitudes: tuple[float, ...]
-
-    @property
-    def scenes(self) -> tuple[int, ...]:
-        """That of the joint."""
-        return (self.joint.scene,)
 
     @property
     def order(self) -> tuple[int, ...]:

@@ -14,7 +14,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -156,6 +156,8 @@ class Task(ABC):
     resume: progress of an earlier run; None to begin at the beginning.
     key: hash of the task in the file of the run.
     models: reduced models of `scenes`, or files with them, for a rank that does not have them.
+    variables: names of the variables in a result. indices: for each place the points of the study that have its result;
+        none for start states.
     """
 
     gives_starts: ClassVar[bool] = False
@@ -169,6 +171,8 @@ class Task(ABC):
     resume: Packed | None = field(default=None, compare=False, repr=False)
     key: str = field(default="", compare=False, repr=False)
     models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
+    variables: tuple[str, ...] = ()
+    indices: tuple[tuple[Index, ...], ...] = ()
 
     @property
     @abstractmethod
@@ -214,9 +218,9 @@ class Task(ABC):
         del first
         return self.cost / self.n_results
 
-    def points(self, place: int) -> tuple[Index, ...]:  # noqa: ARG002
-        """Points that have the result at a place; none for start states."""
-        return ()
+    def points(self, place: int) -> tuple[Index, ...]:
+        """Points that have the result at a place."""
+        return self.indices[place] if self.indices else ()
 
     @abstractmethod
     def names(self, identity: Identity) -> tuple[str, ...]:
@@ -236,18 +240,15 @@ class Task(ABC):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PointTask(Task):
-    """A task of points that share what they begin from with no other task.
+class JointTask(Task):
+    """A task of one joint."""
 
-    indices: for each place the points of the study that have its result. variables: names of the variables in a result.
-    """
+    joint: Joint
 
-    variables: tuple[str, ...]
-    indices: tuple[tuple[Index, ...], ...] = ()
-
-    def points(self, place: int) -> tuple[Index, ...]:
-        """Points at a place."""
-        return self.indices[place]
+    @property
+    def scenes(self) -> tuple[int, ...]:
+        """That of the joint."""
+        return (self.joint.scene,)
 
 
 @dataclass(frozen=True)
@@ -303,10 +304,8 @@ class TaskPlan:
 EQUAL_POINTS = "all values are those of another point"
 """Reason for a result that points share, whatever the kind of study."""
 
-AnyTask = TypeVar("AnyTask", bound=PointTask)
 
-
-def number_points(tasks: Mapping[AnyTask, Sequence[tuple[Index, ...]]], study: Study, n_scenes: int) -> TaskPlan:
+def number_points(tasks: Mapping[Any, Sequence[tuple[Index, ...]]], study: Study, n_scenes: int) -> TaskPlan:
     """The plan of a study without start states. tasks: each, without number and points, with its `indices`."""
     results = tuple(
         replace(task, number=number, indices=tuple(indices)) for number, (task, indices) in enumerate(tasks.items())

@@ -21,12 +21,11 @@ from studyrunner.kinds.sharing import ScaledHistory, counts_of
 from studyrunner.kinds.task import (
     Identity,
     Index,
-    Joint,
+    JointTask,
     Keep,
     PointResult,
     Reached,
     StartResult,
-    Task,
     described,
     digest,
     raise_fault,
@@ -48,7 +47,7 @@ _ROUND_OFF = 1e-10
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sweep(Task):
+class Sweep(JointTask):
     """Start states along the frequency, or that of a ramp at a single frequency; a result at each frequency.
 
     excitation_amplitude: N. direction: "up", "down" or "ramp". frequencies: Hz, ascending.
@@ -57,16 +56,10 @@ class Sweep(Task):
 
     gives_starts = True
 
-    joint: Joint
     excitation_amplitude: float
     direction: str
     frequencies: tuple[float, ...]
     follow: FollowedFrequency | None = None
-
-    @property
-    def scenes(self) -> tuple[int, ...]:
-        """That of the joint."""
-        return (self.joint.scene,)
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -135,7 +128,7 @@ class Sweep(Task):
 
 
 @dataclass(frozen=True, kw_only=True)
-class History(Task):
+class History(JointTask):
     """A wear history from a start state, and the histories of other points that are read from it.
 
     sweep, position: number of the sweep and place of the start state. frequency, Hz, excitation_amplitude, N,
@@ -145,12 +138,11 @@ class History(Task):
         the first point.
     cycles: cycle counts of the output of every history. to_the_end: integration until nothing wears any more; then
         `cycles` numbers the outputs. until: wear at which the history ends before the last count.
-    variables: names of the variables in a result. loops: pairs whose fretting loops are among them.
+    loops: pairs whose fretting loops are among the variables.
     moves: of the start state, see StartResult; True until it is there.
     start: start state; None until the sweep has reached it.
     """
 
-    joint: Joint
     law: WearLaw
     sweep: int
     position: int
@@ -162,18 +154,12 @@ class History(Task):
     histories: tuple[ScaledHistory, ...]
     unworn: bool
     cycles: tuple[float, ...]
-    variables: tuple[str, ...]
     loops: tuple[int, ...]
     moves: bool = True
     follow: FollowedFrequency | None = None
     until: WearTarget | None = None
     to_the_end: ToTheEnd | None = None
     start: Packed | None = field(default=None, compare=False, repr=False)
-
-    @property
-    def scenes(self) -> tuple[int, ...]:
-        """That of the joint."""
-        return (self.joint.scene,)
 
     @property
     def order(self) -> tuple[int, ...]:

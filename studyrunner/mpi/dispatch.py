@@ -67,7 +67,7 @@ class Assignment(Generic[Task]):
 
 
 @dataclass
-class _Held(Generic[Task]):
+class _Running(Generic[Task]):
     """A task that a rank has.
 
     n_left: number of results that are still to come. began: when the rank began the task, None where the task waits.
@@ -128,9 +128,9 @@ class Dispatcher(Generic[Task]):
         self._next_watch = self._began + WATCH_SECONDS
         self._first: _Waiting[Task] = _Waiting(costs)
         self._others: _Waiting[Task] = _Waiting(costs)
-        self._held: dict[int, _Held[Task]] = {}
-        self._held_by: list[list[int]] = [[] for _ in range(n_ranks)]
-        # Ranks that hold nothing, and those that may hold one more: the last is the next to get one.
+        self._given: dict[int, _Running[Task]] = {}
+        self._of_rank: list[list[int]] = [[] for _ in range(n_ranks)]
+        # Ranks without a task, and those that may get one more: the last is the next to get one.
         self._free = dict.fromkeys(reversed(range(n_ranks)))
         self._ahead: dict[int, None] = {}
         self._shunned: set[int] = set()
@@ -138,7 +138,7 @@ class Dispatcher(Generic[Task]):
     @property
     def done(self) -> bool:
         """Whether no task waits and no task runs."""
-        return not self._held and self._n_waiting == 0
+        return not self._given and self._n_waiting == 0
 
     @property
     def wants_more(self) -> bool:
@@ -170,22 +170,22 @@ class Dispatcher(Generic[Task]):
 
         typical: whether similar tasks may take as long; not where the task broke off.
         """
-        held = self._held[number]
-        task = held.task
-        if held.measurement is not None:
-            self._costs.forget(held.measurement)
-            held.measurement = None
+        given = self._given[number]
+        task = given.task
+        if given.measurement is not None:
+            self._costs.forget(given.measurement)
+            given.measurement = None
         if typical:
-            self._costs.learn(task.cost_keys, task.cost_of(first=held.n_left == task.n_results), seconds)
+            self._costs.learn(task.cost_keys, task.cost_of(first=given.n_left == task.n_results), seconds)
             self._n_measured += 1
-        held.n_left -= 1
-        held.began = self._clock()
-        if held.n_left == 0:
-            del self._held[number]
-            self._held_by[rank].remove(number)
+        given.n_left -= 1
+        given.began = self._clock()
+        if given.n_left == 0:
+            del self._given[number]
+            self._of_rank[rank].remove(number)
             self._ahead.pop(rank, None)
-            if self._held_by[rank]:
-                self._held[self._held_by[rank][0]].began = self._clock()
+            if self._of_rank[rank]:
+                self._given[self._of_rank[rank][0]].began = self._clock()
                 self._see_ahead(rank)
             elif rank not in self._shunned:
                 self._free[rank] = None
@@ -200,12 +200,12 @@ class Dispatcher(Generic[Task]):
 
     def task(self, number: int) -> Task:
         """A running task."""
-        return self._held[number].task
+        return self._given[number].task
 
     def running(self) -> list[tuple[Task, int, float]]:
         """Running tasks, longest first: the task, number of results to come, time since the last result, s."""
-        now = self._clock()
-        busy = [(held.task, held.n_left, now - held.began) for held in self._held.values() if held.began is not None]
+        now, tasks = self._clock(), self._given.values()
+        busy = [(each.task, each.n_left, now - each.began) for each in tasks if each.began is not None]
         return sorted(busy, key=lambda entry: -entry[2])
 
     def watch(self) -> None:
@@ -218,15 +218,15 @@ class Dispatcher(Generic[Task]):
         if now < self._next_watch or not self._n_waiting:
             return
         self._next_watch = now + max(WATCH_SECONDS, _WATCH_SHARE * (now - self._began))
-        for held in self._held.values():
-            task = held.task
-            if held.began is None or task.gives_starts:
+        for given in self._given.values():
+            task = given.task
+            if given.began is None or task.gives_starts:
                 continue
-            at_least = _AS_LONG_AGAIN * (now - held.began)
+            at_least = _AS_LONG_AGAIN * (now - given.began)
             if at_least > task.cost * self._costs.correction(task.cost_keys):
-                if held.measurement is not None:
-                    self._costs.forget(held.measurement)
-                held.measurement = self._costs.learn(task.cost_keys, task.cost, at_least)
+                if given.measurement is not None:
+                    self._costs.forget(given.measurement)
+                given.measurement = self._costs.learn(task.cost_keys, task.cost, at_least)
         self._n_measured = 0
         self._others.reorder()
 
@@ -236,13 +236,13 @@ class Dispatcher(Generic[Task]):
 
     def _hand_out(self, rank: int) -> Assignment[Task]:
         number, task = (self._first if self._first and (self.wants_more or not self._others) else self._others).pop()
-        self._held[number] = _Held(task, task.n_results, None if self._held_by[rank] else self._clock())
-        self._held_by[rank].append(number)
+        self._given[number] = _Running(task, task.n_results, None if self._of_rank[rank] else self._clock())
+        self._of_rank[rank].append(number)
         return Assignment(number, task)
 
     def _see_ahead(self, rank: int) -> None:
         """Notes whether a rank with one task may get a second task."""
-        task = self._held[self._held_by[rank][0]].task
+        task = self._given[self._of_rank[rank][0]].task
         short = task.n_results == 1 and task.cost * self._costs.correction(task.cost_keys) < AHEAD_SECONDS
         if short and rank not in self._shunned:
             self._ahead[rank] = None

@@ -30,7 +30,7 @@ _RANKS = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "PMIX_RANK"
 _JOBS = ("SLURM_NTASKS", "PBS_NP", "LSB_DJOB_NUMPROC", "NSLOTS")
 _SIGNS = (*_SIZES, *_RANKS[:-1], "PMI_FD", "PMI_CONTROL_PORT", "PALS_RANKID")
 _SECONDS_TO_PRINT = 1.0
-_SECONDS_TO_ANSWER = 60.0
+_SECONDS_TO_ANSWER = 300.0  # a rank imports the solver first, from a slow disk for one
 _SHARED = "/dev/shm/mpich_shm_"
 _MANY_SENT = 64
 _REMEDY = (
@@ -148,7 +148,7 @@ class MpiRanks(Ranks):
         self._mpi.Finalize()
 
     def abort(self, status: int) -> None:  # noqa: D102
-        # The launcher passes on what a rank prints; what it has not passed on when it is told to end all is lost.
+        # The launcher passes on what a rank prints; what it has not passed on when it ends all is lost.
         sys.stderr.flush()
         time.sleep(_SECONDS_TO_PRINT)
         self._world.Abort(status)

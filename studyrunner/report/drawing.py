@@ -96,8 +96,10 @@ class Drawing:
         A figure of one panel also becomes `<name>_column.svg` and `<name>_column.png`, as wide as a column. A figure
         without lines and maps has no CSV file.
         """
+        values = folder / f"{self.name}.csv"
+        values.unlink(missing_ok=True)
         if rows := plotted_values(self.figure):
-            with (folder / f"{self.name}.csv").open("w", newline="", encoding="utf-8") as file:
+            with values.open("w", newline="", encoding="utf-8") as file:
                 csv.writer(file).writerows([("panel", "series", "x", "x value", "y", "y value", "value"), *rows])
         with style():
             paths = [_save(self.figure, folder / self.name)]

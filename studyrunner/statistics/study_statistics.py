@@ -46,30 +46,15 @@ def worn_volume_statistics(
     value less or more its numerical error. With saltelli, indices are of the whole design, all others of its
     independent rows.
 
-    Parameters
-    ----------
-    dataset
-        Result with the dimension `sample`, drawn values as coordinates `sample_NAME`, and `worn_volume`.
-    quantiles
-        Probabilities between 0 and 1, ascending.
-    confidence
-        Of the intervals, between 0 and 1.
-    exceed, depth
-        Worn volumes, m3, and depths, m, whose probability of exceedance is wanted; by default 41 up to the largest.
+    dataset: with the dimension `sample`, drawn values as coordinates `sample_NAME`, and `worn_volume`. quantiles:
+    probabilities, ascending. confidence: of the intervals. exceed, depth: worn volumes, m3, and depths, m, whose
+    probability of exceedance is wanted; by default 41 up to the largest.
 
-    Returns
-    -------
-    xr.Dataset
-        worn_volume_quantile (m3), worn_volume_exceedance, wear_depth_exceedance, and of each input
-        first_index and total_index (1) with saltelli, else rank_correlation (1), each with _interval and _error;
-        n_samples, n_without_value; of the last count
-        worn_volume_density (1/m3) over worn_volume_grid (m3), group_size (2), group_gap (m3, two ends; NaN for one
-        group), deciding_contact (-1: none).
-
-    Raises
-    ------
-    ValueError
-        Where the result has no samples or no worn volume, or a probability is not between 0 and 1.
+    Returns worn_volume_quantile (m3), worn_volume_exceedance, wear_depth_exceedance, and of each input first_index and
+    total_index (1) with saltelli, else rank_correlation (1), each with _interval and _error; n_samples,
+    n_without_value; of the last count worn_volume_density (1/m3) over worn_volume_grid (m3), group_size (2), group_gap
+    (m3, two ends; NaN for one group), deciding_contact (-1: none). Raises ValueError where the result has no samples or
+    no worn volume, or a probability is not between 0 and 1.
     """
     for name in ("worn_volume", "outcome"):
         if name not in dataset or SAMPLE not in dataset[name].dims:

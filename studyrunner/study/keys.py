@@ -1,6 +1,6 @@
-"""The keys of a study file as text, from the classes that check them: a new study, and the table of STUDY_FILE.md.
+"""The keys of a study file as text, from the classes that check them: a new study, and the list of STUDY_FILE.md.
 
-`python -m studyrunner.study.keys` prints the table.
+`python -m studyrunner.study.keys` prints the list.
 """
 
 from __future__ import annotations
@@ -117,16 +117,16 @@ def _new_study(name: str, tables: dict[str, Given]) -> str:
     return "\n".join([*lines, _TAIL])
 
 
-def key_table() -> str:
-    """Markdown: all keys of a study file with meaning and default."""
-    lines = ["| key | meaning | default |", "|---|---|---|"]
+def key_list() -> str:
+    """Markdown: all keys of a study file with default and meaning."""
+    lines = []
     kinds: dict[str, type[Section]] = {**SECTIONS, "scene": SceneSection, "mission": MissionBlock}
     for table in ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", "loading", "scatter", "mission"):
         for key, field in kinds[table].model_fields.items():
             if field.description and not (table == "axes" and key in SOLVER_AXES):
                 default = _default(table, field)
-                shown = default if default in ("required", "-") else f"`{default}`"
-                lines.append(f"| `{table}.{key}` | {_meaning(field)} | {shown} |")
+                shown = {"required": f"`{table}.{key}` (required)", "-": f"`{table}.{key}`"}
+                lines.append(f"- {shown.get(default, f'`{table}.{key} = {default}`')}: {_meaning(field)}")
     return "\n".join(lines)
 
 
@@ -150,4 +150,4 @@ def _default(table: str, field: FieldInfo) -> str:
 
 
 if __name__ == "__main__":
-    print(key_table())
+    print(key_list())

@@ -6,8 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.accuracy.certificate import Certificate, certify
-from solver.accuracy.options import ACCURACY
+from solver.accuracy.certificate import VIOLATION_LIMITS, Certificate, certify
 from solver.harmonic_balance.dlft import Balance
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
@@ -154,9 +153,9 @@ def test_surfaces_in_each_other_are_caught():
     assert certify(joint, replace(evaluation, wear_depth=evaluation.wear_depth + moved)).penetration == 0.0
 
 
-@pytest.mark.parametrize("name", ["residual", *ACCURACY.violation_limits])
+@pytest.mark.parametrize("name", ["residual", *VIOLATION_LIMITS])
 def test_each_number_is_judged_and_named(name):
-    limit = ACCURACY.violation_limits.get(name, 2.0 * TOLERANCE)
+    limit = VIOLATION_LIMITS.get(name, 2.0 * TOLERANCE)
     assert GOOD.holds(TOLERANCE)
     assert replace(GOOD, **{name: limit}).holds(TOLERANCE)
     for wrong in (1.01 * limit, float("inf"), float("nan")):
@@ -165,7 +164,6 @@ def test_each_number_is_judged_and_named(name):
         assert set(broken.failures(TOLERANCE)) == {name}
         assert f"{wrong:.2g}" in broken.sentence(TOLERANCE)
     sentences = {
-        replace(GOOD, **{other: 1.0}).sentence(TOLERANCE).split(" 1")[0]
-        for other in ("residual", *ACCURACY.violation_limits)
+        replace(GOOD, **{other: 1.0}).sentence(TOLERANCE).split(" 1")[0] for other in ("residual", *VIOLATION_LIMITS)
     }
-    assert len(sentences) == 1 + len(ACCURACY.violation_limits)
+    assert len(sentences) == 1 + len(VIOLATION_LIMITS)

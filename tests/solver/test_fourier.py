@@ -51,17 +51,6 @@ def test_analysis_undoes_synthesis_for_any_orders(orders, extra, seed):
     assert values_h @ basis.synthesis @ basis.analysis == pytest.approx(values_h, abs=1e-13)
 
 
-def test_odd_harmonics_are_rows_of_all_of_them():
-    odd, every = build_basis((1, 3, 5), 32), build_basis((1, 2, 3, 4, 5), 32)
-    rows = [0, 1, 2, 5, 6, 9, 10]
-    assert np.array_equal(odd.synthesis, every.synthesis[rows])
-    assert np.array_equal(odd.analysis, every.analysis[:, rows])
-    time_series = np.array([0.3, 1.1, -0.4, 0.0, 2.5, 0.0, 0.7]) @ odd.synthesis
-    phase = 2 * np.pi * np.arange(32) / 32
-    expected = 0.3 + 1.1 * np.cos(phase) - 0.4 * np.sin(phase) + 2.5 * np.sin(3 * phase) + 0.7 * np.sin(5 * phase)
-    assert time_series == pytest.approx(expected, abs=1e-14)
-
-
 @pytest.mark.parametrize(
     ("orders", "wanted"),
     [

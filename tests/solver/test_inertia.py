@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from solver.contact.coulomb import STICK
-from solver.contact.rigid_slider import step_line, step_mass, step_plane
+from solver.contact.rigid_slider import step_line, step_plane
 from solver.structure.fourier import build_basis, to_complex
 from tests.solver import mass_twin
 from tests.solver.kernel_cases import FRICTION, mass_case, run_masses
@@ -62,23 +62,6 @@ def test_the_derivative_of_a_step_is_that_of_differences(force, velocity, limit)
             ends.append(one_step(*moved)[0][[0, 1, 3]])
         difference = (ends[0] - ends[1]) / (2.0 * step)
         assert tangent[:, column] == pytest.approx(difference, rel=1e-6, abs=1e-6 * max(np.abs(tangent).max(), 1.0))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("line", [0, 1])
-def test_a_pair_with_one_tangent_moves_along_it_alone(line):
-    force, velocity = np.array([7.0, -11.0]), np.array([0.3, 0.4])
-    out, tangent = np.full(7, np.nan), np.full((5, 5), np.nan)
-    step_mass(force, velocity, 5.0, GAIN, LOSS, line, out, tangent)
-    small = np.empty((3, 3))
-    friction, after, mean, speed = step_line(force[line], velocity[line], 5.0, GAIN, LOSS, small)
-    expected = np.zeros(7)
-    expected[[line, 2 + line, 4 + line, 6]] = friction, after, mean, speed
-    assert np.array_equal(out, expected)
-    rows = [line, 2 + line, 4]
-    assert np.array_equal(tangent[np.ix_(rows, rows)], small)
-    tangent[np.ix_(rows, rows)] = 0.0
-    assert not tangent.any()
 
 
 @pytest.mark.slow

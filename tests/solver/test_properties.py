@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from solver.accuracy.options import ACCURACY
+from solver.accuracy.certificate import SMALL_WORK, VIOLATION_LIMITS
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
 from solver.newton.run import Run
@@ -139,7 +139,7 @@ def test_friction_and_wear_only_take(seed):
     work, damping = (
         series_work(force, moved) for force in (joint.to_relative(at.force_h), joint.structure.apply(moved))
     )
-    least = ACCURACY.violation_limit * float(at.slip_work.sum()) + ACCURACY.small_work * elastic_work(joint, at)
+    least = VIOLATION_LIMITS["energy_error"] * float(at.slip_work.sum()) + SMALL_WORK * elastic_work(joint, at)
     opens = at.status_t == 0
     if (opens.any(axis=1) & ~opens.all(axis=1)).any():
         # few harmonics leave a pair that comes and goes wrong by a little of what flows: beyond the bound of all others

@@ -1,7 +1,6 @@
 """How states choose their harmonics and samples, and their error estimates against much finer states."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ import pytest
 from solver.accuracy import refinement
 from solver.accuracy.certificate import certify
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.options import ACCURACY
+from solver.accuracy.harmonic_levels import HARMONIC_LEVELS
 from solver.accuracy.refinement import refine
 from solver.contact.coulomb import SLIP, STICK
 from solver.harmonic_balance.prolongation import transfer
@@ -95,20 +94,20 @@ def test_a_stuck_state_keeps_the_first_harmonic_alone(settings):
     )
 
 
-@pytest.mark.parametrize(("name", "most"), [("most_samples", 64), ("node_unknowns", 5)])
+@pytest.mark.parametrize(("name", "most"), [("MOST_SAMPLES", 64), ("NODE_UNKNOWNS", 5)])
 def test_a_state_that_is_not_allowed_what_it_needs_says_so(name, most, monkeypatch):
     case, point = slider(SolverSettings(rtol=1e-4))
-    monkeypatch.setattr(refinement, "ACCURACY", replace(ACCURACY, **{name: most}))
+    monkeypatch.setattr(refinement, name, most)
     refined = refine(case, SLIDER_OMEGA, 10.0, point, Run(case.settings.tolerance))
     assert not refined.accurate
     assert refined.estimate.largest > 1e-4
     assert refined.point.evaluation.scaled_residual() <= 1e-8
     resolution = refined.case.resolution
-    if name == "most_samples":
+    if name == "MOST_SAMPLES":
         assert resolution.samples <= 64
     else:
         assert refined.point.evaluation.predicted_h.size <= 7  # what it began with
-    assert ACCURACY.harmonic_levels[-1] >= resolution.highest
+    assert HARMONIC_LEVELS[-1] >= resolution.highest
 
 
 def test_a_state_far_better_than_needed_goes_down_to_fewer():

@@ -135,7 +135,8 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
         return scheme != "adaptive" or not euler or length <= found_from * shortest
 
     tried, euler = failing(monkeypatch, fails)
-    monkeypatch.setattr(control, "jump", lambda *_, **__: Failure(Outcome.MARCH_FAILED))
+    monkeypatch.setattr(control, "step_in_parts", lambda *_: None)
+    monkeypatch.setattr(control, "jump", lambda *_: Failure(Outcome.MARCH_FAILED))
     step = one_step(Adaptive(work, 1e-2, end=end * shortest), first)
     if doublings is None:
         assert step == Failure(Outcome.MARCH_FAILED)
@@ -146,18 +147,12 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
         assert step.volume_error(work.area) > 0.0
 
 
-def test_a_given_step_that_is_not_found_is_shortened_and_the_steps_grow_again(monkeypatch):
-    first = 4000.0
-    own, tried = control.attempt_step, list[float]()
-
-    def attempt(work, state, length, scheme):
-        tried.append(length)
-        return None if state.cycle == 0.0 and length > 300.0 else own(work, state, length, scheme)
-
-    monkeypatch.setattr(control, "attempt_step", attempt)
-    states, _ = steps_of(planned(Given, "implicit", first, END), 5)
-    assert tried[:3] == [first, first / 4.0, first / 16.0]
-    assert np.diff(counts(states)).tolist() == [250.0, 500.0, 1000.0, 2000.0, 4000.0]
+def test_a_given_step_that_is_not_found_is_taken_in_parts(monkeypatch):
+    whole, _ = steps_of(planned(Given, "implicit", 4000.0, END), 2)
+    monkeypatch.setattr(control, "attempt_step", lambda *_: None)
+    parts, _ = steps_of(planned(Given, "implicit", 4000.0, END), 2)
+    assert counts(parts).tolist() == counts(whole).tolist()
+    assert depths(parts) == pytest.approx(depths(whole), rel=1e-7)
 
 
 def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):

@@ -138,4 +138,4 @@ def test_the_report_draws_frequency_and_damping(result, study_file, tmp_path):
     drawn = {line.get_label(): line.get_ydata() for line in lines}
     for label, values in zip(("mode 1, cycle 10\N{NO-BREAK SPACE}000", "mode 1, cycle 0"), found, strict=True):
         np.testing.assert_allclose(drawn[label], values[[1, 2, 0]])
-    shown.close()
+    shown.dataset.close()

@@ -156,6 +156,20 @@ def test_tasks_that_run_count_for_the_time_left_and_are_named():
     assert 0.2e6 <= alone.look([(history, 1, 1e6)]).seconds_left <= 0.5e6
 
 
+def test_the_time_left_of_a_task_follows_the_share_of_it_that_is_done():
+    """The task takes more than three times as long as it was expected to."""
+    progress = TaskProgress(MemoryIndex(plan_of()))
+    (task, *_) = progress.tasks
+    expected, true = 57.0, 190.0
+    left = []
+    for percent in range(0, 100, 5):
+        progress.keep(task, 0.01 * percent)
+        left.append(progress._still(task, expected, 0.01 * percent * true))
+    assert left[0] == expected
+    assert max(left) < 2.0 * expected
+    assert left[10:] == pytest.approx([0.01 * (100 - percent) * true for percent in range(50, 100, 5)])
+
+
 @pytest.mark.parametrize("n_ranks", [1, 3, 1000])
 def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks):
     """Equal costs and no overheads: the time is that of the work, or of a sweep and a history."""

@@ -20,15 +20,18 @@ LISTS = {"wear": WEAR, "missions": OF_MISSIONS | OF_A_MISSION, "modes": OF_MODES
 def listed(variables: Mapping[str, Variable], known: Mapping[str, Variable]) -> str:
     """A line for each set of dimensions, and one for what is as in `known`; errors of variables are not named."""
     errors = {f"{name}_error" for name in variables}
-    variables = {name: entry for name, entry in variables.items() if name not in errors}
     lines: dict[str, list[str]] = {}
     for name, entry in variables.items():
-        if name not in known or known[name].long_name != entry.long_name:
+        like = known.get(name.removesuffix("_begin"))
+        if name in errors:
+            continue
+        when = entry.long_name.removeprefix(like.long_name) if like is not None else entry.long_name
+        if when == "" or when.startswith(" "):
+            lines.setdefault(f"as above{when}", []).append(f"`{name}`")
+        else:
             unit = "" if entry.units == "1" or entry.is_text else f" ({entry.units})"
             lines.setdefault(", ".join(entry.dimensions) or "point", []).append(f"`{name}`{unit}: {entry.long_name}")
-    found = [f"- **{of}**: {'; '.join(entries)}." for of, entries in lines.items()]
-    same = [f"`{name}`" for name in variables if name in known and known[name].long_name == variables[name].long_name]
-    return "\n".join([*found, *([f"- As above: {', '.join(same)}."] if same else [])])
+    return "\n".join(f"- **{of}**: {'; '.join(entries)}." for of, entries in lines.items())
 
 
 def page_with_lists(text: str) -> str:

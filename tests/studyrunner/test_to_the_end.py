@@ -106,7 +106,7 @@ def test_the_scheme_final_is_computed_once_and_says_how(tmp_path):
     study = study_with(*overrides)
     plan = build_tasks(study, 2)
     assert len(plan.results) == 2
-    assert any("comes to the same state for every wear_coefficient" in item.reason for item in plan.left_out)
+    assert any("the same state for every wear_coefficient" in item.reason for item in plan.left_out)
     with run_study(study, tmp_path / "final.nc") as opened:
         result = opened.squeeze(drop=True).load()
     direct = result.sel(scheme="final")

@@ -40,11 +40,15 @@ _DARKEST, _BRIGHTEST = 0x18, 0xE8
 
 @dataclass(frozen=True)
 class Shown:
-    """A drawing as it stands on the page: SVG elements. column: that of narrow windows; empty where there is none."""
+    """A drawing as it stands on the page: SVG elements.
+
+    column: that of narrow windows; empty where there is none. has_values: whether it has a CSV file.
+    """
 
     drawing: Drawing
     svg: str
     column: str
+    has_values: bool
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,7 @@ def _save(drawing: Drawing, folder: Path) -> Shown:
     texts = [
         inline_svg(path.read_text(encoding="utf-8"), f"{path.stem}-", drawing.title) for path in drawing.save(folder)
     ]
-    return Shown(drawing, texts[0], texts[1] if len(texts) > 1 else "")
+    return Shown(drawing, texts[0], texts[1] if len(texts) > 1 else "", (folder / f"{drawing.name}.csv").exists())
 
 
 def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str:

@@ -83,6 +83,6 @@ def draw_scale_bar(panel: Axes, nodes: NDArray[np.float64], view: View) -> None:
     length = 10.0 ** np.floor(np.log10(0.4 * size))
     length *= max(factor for factor in (1.0, 2.0, 5.0) if factor * length <= 0.4 * size or factor == 1.0)
     bottom = low[1] - 0.05 * size
-    panel.fill_between([low[0], low[0] + length], bottom - 0.006 * size, bottom + 0.006 * size, color="black", lw=0.0)
+    panel.fill_between([low[0], low[0] + length], bottom - 0.006 * size, bottom + 0.006 * size, color="0.1", lw=0.0)
     panel.text(low[0] + 0.5 * length, bottom - 0.02 * size, f"{length:g} mm", ha="center", va="top")
     panel.set_ylim(bottom - 0.1 * size, high[1] + 0.02 * size)
