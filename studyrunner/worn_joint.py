@@ -74,7 +74,7 @@ def compute_worn_joint(
         if loops:
             asked = {**given, "outputs.variables": ["response_amplitude"], "outputs.loops": list(loops)}
             states = _run(result, asked, folder / "worn_joint_loops.nc", progress)
-            found["loops"] = states.sel(contact=list(loops))[["loop_displacement", "loop_force"]]
+            found["loops"] = states[["loop_displacement", "loop_force"]].rename(loop_contact="contact")
         if response:
             others = {name: at for name, at in shown.items() if name not in ("frequency", "frequency_ratio")}
             frequencies = result.dataset["frequency"].isel(others, missing_dims="ignore").values.tolist()

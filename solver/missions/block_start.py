@@ -29,6 +29,10 @@ from solver.structure.joint import Case, build_case
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
 
+CHANGE_OF_A_WAY = 0.5
+"""Change of the vibration behind such a sweep, after which the sweep chooses its nodes anew and its error is estimated
+again. A state without its way is left after `smooth_change`, as only the way tells on which branch it lies."""
+
 MOST_HALVINGS = 12
 """Most halvings of the distance of two such nodes in one sweep, to come past a corner at the resonance."""
 
@@ -91,10 +95,10 @@ def _again(line: FrequencySweep, begun: Begun, every_node: int) -> StartState | 
     at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
     before = State(at, state.start_history, target)
     try:
-        found = path.solve((before,), target, run) if path.forgets(before) else None
+        found, most = path.solve((before,), target, run) if path.forgets(before) else None, CONTINUATION.smooth_change
         if found is None or not path.forgets(found):
-            found = _through_nodes(path, begun, target, every_node, run)
-        if found is None or vibration_change(at, found.evaluation) > CONTINUATION.smooth_change:
+            found, most = _through_nodes(path, begun, target, every_node, run), CHANGE_OF_A_WAY
+        if found is None or vibration_change(at, found.evaluation) > most:
             return None
         joint = path.joint_at(target)
         if find_instability(case, joint, found.evaluation, run, line.every):

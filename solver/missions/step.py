@@ -9,7 +9,7 @@ last one, p(n + H) - p(n + H - 1) = R(Z) with Z = p(n + H - 1), so that
     W(n + H) = Z + R(Z).
 
 This is the backward difference formula of second order for sequences (Petzold, SIAM J. Numer. Anal. 18 (1981) 455). For
-H = 1 it is the mission itself, for large H the BDF2 of `solver.wear.bdf2`, with its stability: blocks that adapt the
+H = 1 it is the mission itself, for large H the BDF2 of `solver.wear.step`, with its stability: blocks that adapt the
 pressures against each other within few missions do not shorten a step. All factors are positive, so that wear never
 falls, and each block has its part of the sum. With the third divided difference w of the nodes, the local error is
 

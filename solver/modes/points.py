@@ -173,6 +173,8 @@ class _Way:
             return Failure(Outcome.BRANCH_LOST, describe_loss(self.up))
         sweep.set_deadline(deadline)
         sweep.advance_to(amplitude)
+        # the reference sweep as well, so that its iterations do not depend on the points before
+        sweep.reference_node(amplitude)
         self.spent += sweep.n_iterations
         return solve_point(sweep, amplitude, run)
 

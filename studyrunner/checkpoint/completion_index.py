@@ -61,12 +61,16 @@ class CompletionIndex:
 
         Raises StorageError where the disk fails.
         """
-        found = [self.store.read(RESULTS, name) for name in names]
+        # one after the other into their places: a slab of results is in memory once
+        contents, there = bytearray(len(names) * self.kind.itemsize), np.zeros(len(names), np.bool_)
         # the data type of a record is part of its name
         empty = empty_record(self.kind).tobytes()
-        contents = [empty if each is None else each.arrays[0].tobytes() for each in found]
-        records = np.frombuffer(bytearray(b"".join(contents)), self.kind)
-        return records, np.array([each is not None for each in found], np.bool_)
+        for place, name in enumerate(names):
+            found = self.store.read(RESULTS, name)
+            there[place] = found is not None
+            own = slice(place * self.kind.itemsize, (place + 1) * self.kind.itemsize)
+            contents[own] = empty if found is None else found.arrays[0].tobytes()
+        return np.frombuffer(contents, self.kind), there
 
     @property
     def n_points_finished(self) -> int:

@@ -205,7 +205,9 @@ def _slabs(
         if not (there | (different == b"")).all():
             raise StorageError(completion.store.path, ValueError("a result is damaged"), "give the command again")
         records["outcome"][~there] = Outcome.NOT_COMPUTED
-        yield region, records[places]
+        # those in the order of the names are not held while the slab is written
+        records = records[places]
+        yield region, records
         first = last
 
 

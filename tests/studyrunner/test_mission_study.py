@@ -124,27 +124,6 @@ def test_a_study_without_missions_is_one_block(tmp_path):
 
 
 @pytest.mark.slow
-def test_blocks_of_gross_slip_wear_by_their_slip_in_any_order(tmp_path):
-    """V = k_w P s N with a constant normal force: the sum of the blocks, whatever their order."""
-    text = STEADY.replace("cycles = 1e5", "cycles = 3e3").replace("missions = 1\n", "missions = 2\n")
-    other = text.partition("[[mission]]")[2].replace("all", "soft").replace("14.0", "10.0").replace("3e3", "5e3")
-    first, second = text.partition("[[mission]]")[2], other
-    found = []
-    for order in ((first, second), (second, first)):
-        path = tmp_path / "order.toml"
-        path.write_text("[[mission]]".join((text.partition("[[mission]]")[0], *order)), encoding="utf-8")
-        found.append(run(path, overwrite=True).squeeze())
-    for name in ("all", "soft"):
-        volumes = [one.block_worn_volume.sel(block=name)[-1].item() for one in found]
-        assert volumes[0] == pytest.approx(volumes[1], rel=1e-6)
-        one = found[0].sel(block=name)
-        # the slip path is four amplitudes, but for higher harmonics
-        exact = 1.1e-11 * 10.0 * 4.0 * one.response_amplitude[-1].item() * 2.0 * one.block_cycles.item()
-        assert volumes[0] == pytest.approx(exact, rel=0.05)
-    assert found[0].worn_volume[-1].item() == pytest.approx(found[1].worn_volume[-1].item(), rel=1e-6)
-
-
-@pytest.mark.slow
 def test_an_interrupted_study_goes_on_to_the_last_bit(study_file, blocks, monkeypatch):
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", 0.0)
     few = {"axes.frequency": 160, "axes.sweep": "up", "axes.wear_coefficient": 1e-11}

@@ -113,7 +113,7 @@ def test_arrays_are_kept_to_the_last_bit(array):
 
 
 def test_objects_are_not_kept():
-    with pytest.raises(ValueError, match="Object arrays"):
+    with pytest.raises(TypeError, match="arrays of objects"):
         store.to_blob(Packed("", (np.array([{}], dtype=object),)))
 
 
