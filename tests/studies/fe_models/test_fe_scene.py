@@ -136,7 +136,9 @@ def test_pairs_on_cut_faces_and_planes_of_symmetry():
 def as_foreign_model(parameters):
     """The bundled sector as a deck gives it: pairs, cut faces and layers are found, not known."""
     model, joint = dovetail_sector.define_sector(parameters)
-    cut = find_cut_faces(model.coordinates, model.numbers, model.mesh.bodies, joint.cut.axis)
+    cut = find_cut_faces(
+        model.coordinates, model.numbers, model.mesh.bodies, joint.cut.axis, np.empty(0, dtype=np.int64)
+    )
     return replace(model, layers=None), replace(joint, pairs=None, cut=cut)
 
 

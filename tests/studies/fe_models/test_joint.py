@@ -21,6 +21,8 @@ from tests.studies.fe_models.solid_meshes import block, joined
 
 KINDS = tuple(ELEMENT_KINDS)
 
+NONE = np.empty(0, dtype=np.int64)
+
 
 def tube(points):
     """A quarter of a tube of radii 1 and 2, 0.5 long."""
@@ -185,7 +187,7 @@ def test_cut_faces_are_matched_and_found():
     turned = mesh.coordinates[cut.left] @ cut.rotation.T
     assert np.allclose(turned, mesh.coordinates[cut.right], atol=1e-10)
     assert np.array_equal(np.sort(cut.left), sector.left)
-    found = find_cut_faces(*sector.places, axis)
+    found = find_cut_faces(*sector.places, axis, NONE)
     assert dict(zip(found.left, found.right, strict=True)) == dict(zip(cut.left, cut.right, strict=True))
     # about another axis through another point
     frame = np.linalg.qr(np.random.default_rng(4).standard_normal((3, 3)))[0]
@@ -204,7 +206,7 @@ def test_wrong_cut_faces_are_named():
     with pytest.raises(SceneError, match=r"cut faces are 30 degrees apart, 47 sectors need 7\.66"):
         match_cut_faces(*sector.places, axis, sector.left, sector.right)
     with pytest.raises(SceneError, match=r"no node has an image under rotation by 7\.66 degrees"):
-        find_cut_faces(*sector.places, axis)
+        find_cut_faces(*sector.places, axis, NONE)
     axis = CyclicAxis(N_SECTORS, np.zeros(3), Z)
     coordinates = mesh.coordinates.copy()
     coordinates[sector.left[2]] += [1e-3, 0.0, 0.0]

@@ -2,14 +2,19 @@
 
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from studies.fe_models.from_files.model import find_files, load_model
+from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.nodal_matrices import order_by_nodes
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.finite_element.joint_model import ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
+from studies.scene_error import SceneError
+from studies.scenes import shrouded_sector
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
 from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, node_set, read_export, run_ccx
 
@@ -131,3 +136,63 @@ def test_matrices_of_calculix(kind, tmp_path):
         for name in ("stiffness", "mass", "load_static", "response"):
             ours, theirs = (getattr(each.model.linear[k], name) for each in (other, scene))
             assert np.abs(ours - theirs).max() <= 1e-7 * np.abs(theirs).max()
+
+
+SHROUDED = shrouded_sector.Parameters(
+    n_sectors=12, shroud_angle=20, blade_thickness=0.01, rim_radius=0.15, blade_length=0.08, rotation_speed=0.0
+)
+
+
+def shrouded_lines(model, joint):
+    """The sector with BORE, LEAD and TRAIL, and the nodes of its cut faces."""
+    numbers, (contact,) = model.mesh.numbers, joint.contacts
+    sets = {"BORE": np.flatnonzero(joint.held[:, 0]), "LEAD": contact.first.nodes, "TRAIL": contact.second.nodes}
+    sets |= {"L": joint.cut.left, "R": joint.cut.right}
+    return deck_lines(model.mesh) + [line for name, rows in sets.items() for line in node_set(name, numbers[rows])]
+
+
+def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
+    """The same matrices as the bundled scene; its shrouds, one sector apart, are no cut faces. The order of the names
+    does not matter.
+    """
+    model, joint = shrouded_sector.define_sector(SHROUDED)
+    (tmp_path / "s.inp").write_text("\n".join(shrouded_lines(model, joint)) + "\n", encoding="ascii")
+    given = {"units": "SI", "friction_coefficient": 0.3, "n_sectors": 12, "axis": {"direction": [0, 0, 1]}}
+    given |= {"clamp": ["BORE"], "load": {"set": "LEAD", "direction": [0, 1, 0]}}
+    expected = [glued_frequencies(prepare_model(model, joint), k, N_MODES) for k in (0, 3, 6)]
+    for change in ({"contact": [["LEAD", "TRAIL"]]}, {"contact": [["TRAIL", "LEAD"]]}):
+        parameters = Parameters(**given, **change, next_sector=True)
+        loaded = load_model(find_files(tmp_path, "s.inp", parameters), parameters)
+        assert sorted(loaded.joint.cut.left) == sorted(joint.cut.left)
+        prepared = prepare_model(loaded.model, loaded.joint)
+        found = [glued_frequencies(prepared, k, N_MODES) for k in (0, 3, 6)]
+        np.testing.assert_allclose(found, expected, rtol=1e-7)
+    for change, key in (({"next_sector": ["TIP"]}, "next_sector"), ({"n_sectors": None}, "n_sectors")):
+        parameters = Parameters(**given | {"contact": [["LEAD", "TRAIL"]], "next_sector": True} | change)
+        with pytest.raises(SceneError) as caught:
+            load_model(find_files(tmp_path, "s.inp", parameters), parameters)
+        assert caught.value.key == key
+
+
+def test_stuck_shrouds_are_those_of_calculix(tmp_path):
+    """With elements that are the same in both programs: incompatible modes of twisted elements are not."""
+    model, joint = shrouded_sector.define_sector(SHROUDED)
+    groups = tuple(replace(each, kind="C3D8") for each in model.mesh.groups)
+    model = replace(model, mesh=replace(model.mesh, groups=groups))
+    (contact,), numbers = joint.contacts, model.mesh.numbers
+    left = np.concatenate([joint.cut.left, contact.second.nodes])
+    right = np.concatenate([joint.cut.right, contact.first.nodes])
+    inner = np.setdiff1d(np.flatnonzero(joint.held[:, 0]), left)
+    lines = [
+        *[*deck_lines(model.mesh), *node_set("F", numbers[inner])],
+        *[*node_set("L", numbers[left]), *node_set("R", numbers[right])],
+        *["*SURFACE, NAME=LS, TYPE=NODE", "L", "*SURFACE, NAME=RS, TYPE=NODE", "R"],
+        *["*TIE, CYCLIC SYMMETRY, NAME=CYC, POSITION TOLERANCE=1.E-5", "LS, RS"],
+        *["*CYCLIC SYMMETRY MODEL, N=12, NGRAPH=1, TIE=CYC", "0., 0., 0., 0., 0., 1.", "*BOUNDARY", "F, 1, 3"],
+    ]
+    prepared = prepare_model(model, joint)
+    for k in (0, 1, 3, 5, 6):
+        select = f"*SELECT CYCLIC SYMMETRY MODES, NMIN={k}, NMAX={k}"
+        run_ccx(tmp_path, [*lines, "*STEP", "*FREQUENCY", "12", select, "*END STEP"], f"nd{k}")
+        expected = read_frequencies((tmp_path / f"nd{k}.dat").read_text(), N_MODES)
+        np.testing.assert_allclose(glued_frequencies(prepared, k, N_MODES), expected, rtol=2e-4)
