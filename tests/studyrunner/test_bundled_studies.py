@@ -25,6 +25,8 @@ SMALL = {
     "scatter": "scatter.samples=2 scene.mesh=1 axes.frequency=212.45 slow_time.cycles=3000 slow_time.outputs=3"
     " solver.harmonics=3 solver.samples=64",
     "sdof_slider": "axes.frequency=160.0 slow_time.cycles=4000 slow_time.outputs=5",
+    "shrouded": "axes.nodal_diameter=[2,4] slow_time.cycles=10000 slow_time.outputs=3 solver.harmonics=3"
+    " solver.samples=64",
     "two_masses": "axes.frequency=0.0954929658551372",
     "vibro_impact": "axes.frequency=[0.17,0.19,0.21,0.22]",
     "work_precision": "scene.mesh=1 axes.frequency=212.86 axes.step=[1000,2000] axes.harmonics=5 axes.samples=64"
@@ -87,11 +89,18 @@ def wears_in_run_up_and_dwells(result):
     assert worn.sel(block="coast-down") < 1e-3 * worn.sum()
 
 
+def resonates_at_each_nodal_diameter(result):
+    resonance = result.excitation_frequency.isel(cycle=0).squeeze()
+    assert resonance.sel(nodal_diameter=4) > 1.2 * resonance.sel(nodal_diameter=2)
+    assert (result.worn_volume.isel(cycle=-1) > 0.0).all()
+
+
 SHOWN: dict[str, Callable[[xr.Dataset], None]] = {
     "scatter": wears_in_each_sample_another_volume,
     "mission": wears_in_run_up_and_dwells,
     "modes": resonates_lower_the_more_it_is_worn,
     "dovetail": wears_near_its_resonance_only,
+    "shrouded": resonates_at_each_nodal_diameter,
     "vibro_impact": has_two_branches,
     "work_precision": agrees_better_with_smaller_steps,
     "work_precision_slider": agrees_better_with_smaller_steps,
