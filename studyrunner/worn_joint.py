@@ -93,7 +93,13 @@ def compute_worn_joint(
         if natural_frequencies:
             # nothing slips, and no state takes time
             asked = {**common, "axes.excitation_amplitude": 1e-9, "outputs.variables": ["natural_frequency", "mesh"]}
-            states = _run(result, asked, folder / "worn_joint_frequencies.nc", progress)
+            try:
+                states = _run(result, asked, folder / "worn_joint_frequencies.nc", progress)
+            except UserError as error:
+                if error.key != "outputs.variables":
+                    raise
+                model, remedy = result.study["scene"]["model"], "ask for none: this scene has none over nodal diameters"
+                raise UserError(str(path), "natural frequencies of scene.model", model, remedy) from None
             found["natural_frequencies"] = states[["natural_frequency"]].isel(cycle=0, drop=True)
     return {name: each.assign_attrs(title=title, how=_HOW) for name, each in found.items()}
 
