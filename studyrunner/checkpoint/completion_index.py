@@ -62,14 +62,18 @@ class CompletionIndex:
         Raises StorageError where the disk fails.
         """
         # one after the other into their places: a slab of results is in memory once
-        contents, there = bytearray(len(names) * self.kind.itemsize), np.zeros(len(names), np.bool_)
+        size, first = self.kind.itemsize, dict[str, int]()
+        contents, there = bytearray(len(names) * size), np.zeros(len(names), np.bool_)
         # the data type of a record is part of its name
         empty = empty_record(self.kind).tobytes()
         for place, name in enumerate(names):
-            found = self.store.read(RESULTS, name)
-            there[place] = found is not None
-            own = slice(place * self.kind.itemsize, (place + 1) * self.kind.itemsize)
-            contents[own] = empty if found is None else found.arrays[0].tobytes()
+            before = first.setdefault(name, place)
+            if before < place:
+                there[place], content = there[before], bytes(contents[before * size : (before + 1) * size])
+            else:
+                found = self.store.read(RESULTS, name)
+                there[place], content = found is not None, empty if found is None else found.arrays[0].tobytes()
+            contents[place * size : (place + 1) * size] = content
         return np.frombuffer(contents, self.kind), there
 
     @property

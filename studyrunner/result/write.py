@@ -200,14 +200,13 @@ def _slabs(
     first = 0
     for region in _regions(shape, slab):
         last = first + math.prod(at.stop - at.start for at in region)
-        different, places = np.unique(keys[first:last], return_inverse=True)
-        records, there = completion.read_results([key.decode() for key in different.tolist()])
-        if not (there | (different == b"")).all():
+        names = keys[first:last]
+        records, there = completion.read_results([name.decode() for name in names.tolist()])
+        if not (there | (names == b"")).all():
             raise StorageError(completion.store.path, ValueError("a result is damaged"), "give the command again")
         records["outcome"][~there] = Outcome.NOT_COMPUTED
-        # those in the order of the names are not held while the slab is written
-        records = records[places]
         yield region, records
+        del records
         first = last
 
 
