@@ -84,11 +84,14 @@ class Points:
 
         reduce: from values (n_points, ...) of the variable to (n_points,).
         """
-        found = []
-        for part in _in_slabs(self.dataset[name], self.axes):
+
+        def reduced(part: xr.DataArray) -> NDArray[np.float64]:
             values = np.asarray(part.transpose(*self.axes, ...).values, dtype=float)
-            found.append(reduce(values.reshape(-1, *values.shape[len(self.axes) :])))
-        return np.concatenate(found).reshape(self.computed.shape)
+            return reduce(values.reshape(-1, *values.shape[len(self.axes) :]))
+
+        # in a function of its own, so that no part is in memory while the next one is read; `map` holds none either
+        parts = map(reduced, _in_slabs(self.dataset[name], self.axes))
+        return np.concatenate(list(parts)).reshape(self.computed.shape)
 
     # --- how points ended, and how well they are known ---
 
