@@ -78,15 +78,7 @@ class _SceneHelp(argparse.Action):
         parser.exit()
 
 
-def parse_options(arguments: Sequence[str]) -> Options:
-    """Options from the command line. Raises UserError; SystemExit after --help, --new and the like."""
-    parser = _Parser(
-        prog="run-study",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "study",
         nargs="?",
@@ -134,6 +126,18 @@ def parse_options(arguments: Sequence[str]) -> Options:
         metavar="ISO",
         help="date_created of the result: a date, or now; without it equal runs have equal files",
     )
+
+
+def parse_options(arguments: Sequence[str]) -> Options:
+    """Options from the command line. Raises UserError; SystemExit after --help, --new and the like."""
+    parser = _Parser(
+        prog="run-study",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    _add_options(parser)
     found = vars(parser.parse_args(list(arguments)))
     new, deck = found.pop("new"), found.pop("deck")
     if deck is not None and new is None:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from studyrunner.kinds import missions, modes, wear_plan
-from studyrunner.kinds.task import Task, TaskPlan
+from studyrunner.kinds.task import Task
+from studyrunner.kinds.task_plan import TaskPlan
 from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.study.kinds import MISSIONS, MODES
 from studyrunner.study.study import Study

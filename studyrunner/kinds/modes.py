@@ -16,15 +16,14 @@ from studyrunner.kinds.task import (
     Keep,
     PointResult,
     Task,
-    TaskPlan,
     described,
     digest,
     joint_of,
     n_unknowns_of,
-    number_points,
     raise_fault,
     settings_at,
 )
+from studyrunner.kinds.task_plan import TaskPlan, number_points
 from studyrunner.mpi.cost_model import CostKeys
 from studyrunner.scene.drawn_contacts import ContactChange
 from studyrunner.scene.scene_set import SceneSet

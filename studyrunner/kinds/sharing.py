@@ -13,7 +13,8 @@ from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
-from studyrunner.kinds.task import EQUAL_POINTS, Index, LeftOut
+from studyrunner.kinds.task import Index
+from studyrunner.kinds.task_plan import EQUAL_POINTS, LeftOut
 from studyrunner.study.study import Study
 
 Choice = tuple[int, int, int]

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_history, iterations_of_sweep, seconds_an_iteration
 from studyrunner.kinds.sharing import EQUAL, IDLE_RTOL, Alike, ScaledHistory, describe_left_out, share_histories
-from studyrunner.kinds.task import Index, Joint, Task, TaskPlan, joint_of, n_unknowns_of, settings_at
+from studyrunner.kinds.task import Index, Joint, Task, joint_of, n_unknowns_of, settings_at
+from studyrunner.kinds.task_plan import TaskPlan
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.drawn_contacts import ContactChange
 from studyrunner.scene.scene_set import SceneSet

@@ -7,7 +7,7 @@ import math
 from studyrunner.coordinates import SCENE
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, memory_a_rank
 from studyrunner.kinds.kind import kind_of
-from studyrunner.kinds.task import TaskPlan
+from studyrunner.kinds.task_plan import TaskPlan
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.variables import loop_numbers
 from studyrunner.study.sections import AUTO

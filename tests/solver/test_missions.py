@@ -508,6 +508,10 @@ def test_the_reference_of_a_passage_takes_its_resolutions_and_estimates_no_error
     assert len({resolution for _, resolution in fine.like.resolutions}) > 1
     reference = run_passage(case, fine.like)
     assert reference.iterations < fine.iterations
+    known, estimated = (states_at(case, case.block.frequency, np.array([200.0]), like) for like in (fine.like, None))
+    assert known[0].start.response_error == known[0].start.wear_rate_error == 0.0
+    assert estimated[0].start.response_error > 0.0
+    assert estimated[0].start.wear_rate_error > 0.0
     assert reference.growth == pytest.approx(fine.growth, rel=settings.rtol)
     # at the ends both solve the same state
     np.testing.assert_allclose(reference.response, fine.response, rtol=1e-6)
