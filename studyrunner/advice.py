@@ -93,11 +93,6 @@ def advise_error(error: float, wear_rate_error: Sequence[float], used: Used) -> 
     return f"set solver.rtol = {_rounded_down(used.rtol**2 / error)}"
 
 
-def advise_steps(used: Used) -> str:
-    """What to do about explicit steps that are too long."""
-    return " or ".join(_other_steps(used))
-
-
 def _given(used: Used) -> tuple[str, ...]:
     """Harmonics and samples of a given number, which may be automatic instead."""
     return tuple(f'{key} = "auto"' for key in ("harmonics", "samples") if getattr(used, key) != "auto")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver.outcome import Outcome
-from studyrunner.advice import Used, advise, advise_error, advise_steps
+from studyrunner.advice import Used, advise, advise_error
 from studyrunner.percent import show_percent, show_rtol
 from studyrunner.result.certainty import settings_of
 from studyrunner.result.view import Result, as_history
@@ -335,7 +335,7 @@ ALL = [
 def texts_on(used):
     """All that may be advised on a point."""
     errors = [advise_error(error, rates, used) for error in (0.013, 0.5) for rates in ([], [0.01, 0.3], [0.0, 0.0])]
-    return [*(advise(outcome.meaning, used) for outcome in Outcome), *errors, advise_steps(used)]
+    return [*(advise(outcome.meaning, used) for outcome in Outcome), *errors]
 
 
 @pytest.mark.parametrize("used", ALL, ids=str)
