@@ -20,6 +20,7 @@ N_FREQUENCIES = 4
 """Natural frequencies that are shown."""
 
 _RPM = 30.0 / np.pi
+_NEIGHBOURS = {0: "", 1: " of the next sector", -1: " of the sector before"}
 _ROUND_OFF = 1e-9  # of the size of a facet, or of the largest force: a distance or a force that is none
 _FREE = 1e-9  # stiffness over the largest one of the relative displacements, below which nothing holds a motion
 
@@ -116,10 +117,11 @@ def _contacts(scene: FeScene) -> Iterator[str]:
     pairs = scene.pairs
     for place, (moving, opposite) in enumerate(zip(pairs.moving_name, pairs.opposite_name, strict=True)):
         own = pairs.surface == place
+        neighbour = _NEIGHBOURS[int(pairs.sector[own][0])] if own.any() else ""
         distance = pairs.distance[own]
         distance = np.where(np.abs(distance) < _ROUND_OFF * np.sqrt(pairs.area[own].max()), 0.0, distance)
         yield (
-            f"{own.sum()} nodes of {moving} on {opposite}, {1e6 * pairs.area[own].sum():.5g} mm2,"
+            f"{own.sum()} nodes of {moving} on {opposite}{neighbour}, {1e6 * pairs.area[own].sum():.5g} mm2,"
             f" distances {distance.min():.2g} to {distance.max():.2g} m"
         )
 

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.fe_models.from_files.check import describe_model
 from studies.fe_models.from_files.model import find_files, load_model
 from studies.fe_models.from_files.parameters import Parameters
+from studies.fe_models.from_files.scene import reduce_model
 from studies.fe_models.nodal_matrices import order_by_nodes
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.finite_element.joint_model import ReductionOptions
@@ -167,6 +169,8 @@ def test_a_deck_whose_shrouds_touch_the_next_sector(tmp_path):
         prepared = prepare_model(loaded.model, loaded.joint)
         found = [glued_frequencies(prepared, k, N_MODES) for k in (0, 3, 6)]
         np.testing.assert_allclose(found, expected, rtol=1e-7)
+    rows = dict(describe_model(loaded, reduce_model(loaded, parameters, 1), parameters))
+    assert "8 nodes of TRAIL on LEAD of the sector before" in rows["contact"]
     for change, key in (({"next_sector": ["TIP"]}, "next_sector"), ({"n_sectors": None}, "n_sectors")):
         parameters = Parameters(**given | {"contact": [["LEAD", "TRAIL"]], "next_sector": True} | change)
         with pytest.raises(SceneError) as caught:
