@@ -89,13 +89,12 @@ class SlowTime:
     def adaptive_to(self, reached: float) -> SlowTime:
         """The adaptive history with which one with given steps is compared, that has come to the count `reached`.
 
-        Equal for all histories with given steps to one last count; where a target ends them, no longer than needed.
+        Equal for all histories with given steps to one last count; to another end it is no longer than needed.
         """
-        whole = replace(self, scheme="adaptive", step=math.inf, largest_depth=None)
-        if self.until is None:
-            return whole
-        never = replace(self.until, value=math.inf)
-        return replace(whole, cycles=np.array([0.0, reached]), until=never)
+        known = self.end < math.inf and self.until is None
+        cycles = self.cycles if known else np.array([0.0, reached])
+        never = None if self.until is None else replace(self.until, value=math.inf)
+        return replace(self, scheme="adaptive", step=math.inf, largest_depth=None, cycles=cycles, until=never)
 
     def last_step_end(self, last: float) -> float:
         """Count beyond which no adaptive step goes; last: last count of the integration."""
