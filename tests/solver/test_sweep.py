@@ -10,7 +10,7 @@ from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.frequency_sweep import FIRST_ITERATIONS, FrequencySweep
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import find_origin
+from solver.loading_history.sweep_start import cell_of, find_origin
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.history import StartState
@@ -105,7 +105,7 @@ def test_progress_beyond_a_frequency_is_not_used_for_it():
 def test_a_sweep_begins_away_from_its_points_and_from_resonances(sweep):
     model = dovetail()
     for frequency in np.linspace(100.0, 500.0, 41):
-        origin = find_origin(model, float(frequency), sweep)
+        origin = find_origin(model, cell_of(float(frequency)), sweep)
         for start in origin.starts[:2]:
             ratio = start / frequency
             assert 0.49 < ratio <= 0.7001 if sweep == "up" else 1.2999 <= ratio < 1.86
