@@ -77,7 +77,6 @@ class FrequencySweep:
         self.run = Run(settings.tolerance)
         self.origin: Origin | None = None
         self.nodes: Sweep[State] | None = None
-        self._begun = False
 
     @property
     def n_iterations(self) -> int:
@@ -99,7 +98,6 @@ class FrequencySweep:
     def load(self, state: FrequencySweepState) -> None:
         """Go on from the saved state of another sweep."""
         self._new_sweep(state.origin, state.omega).load(state.nodes)
-        self._begun = True
 
     def go_on_from(self, case: Case, state: State, frequency: float) -> bool:
         """Begin at a known state; False where the state is rejected.
@@ -108,11 +106,10 @@ class FrequencySweep:
         its amplitude over that of the sweep. frequency: to which the sweep goes, Hz.
         """
         ramp, target = self.sweep == "ramp", 2.0 * np.pi * frequency
-        origin = replace(self._origin_of(frequency), penalty=case.penalty_omega / (2.0 * np.pi))
-        up = (1.0 if ramp else target) >= state.parameter
-        nodes = self._new_sweep(origin, target if ramp else None, case, 1.0 if up else -1.0)
-        self._begun = True
-        return nodes.begin(LoadingPath(case, self.excitation_amplitude, target if ramp else None), state)
+        origin = Origin((), case.penalty_omega / (2.0 * np.pi), cell_of(frequency))
+        nodes = self._new_sweep(origin, target if ramp else None)
+        nodes.direction = 1.0 if (1.0 if ramp else target) >= state.parameter else -1.0
+        return nodes.begin(replace(path_of(nodes), case=case), state)
 
     def advance(self, frequency: float) -> StartState:
         """State at the next frequency, Hz, with the harmonics that it needs. Raises OutOfTimeError."""
@@ -123,16 +120,16 @@ class FrequencySweep:
         nodes, target = self.sweep_to(frequency), 1.0 if ramp else omega
         nodes.advance_to(target)
         try:
-            case, reached = path_of(nodes).case, nodes.state_at(target, run.fresh())
+            path, reached = path_of(nodes), nodes.state_at(target, run.fresh())
             if isinstance(reached, Outcome):
                 run.budget.limit = run.budget.iterations + FIRST_ITERATIONS
-                first = self._first(nodes, target, run)
+                first = self._first(path, target, run)
                 if isinstance(first, Outcome):
                     return self.without_state(why_lost(nodes, first), _where_lost(nodes))
-                case, reached = first[0], Step(first[1])
-            refined = self._at_known(frequency, case, omega, reached.state)
+                path, reached = first[0], Step(first[1])
+            refined = self._at_known(frequency, path.case, omega, reached.state)
             if refined is None:
-                refined = refine(case, omega, self.excitation_amplitude, reached.state, run)
+                refined = refine(path.case, omega, self.excitation_amplitude, reached.state, run)
         except np.linalg.LinAlgError:
             return self.without_state(Outcome.SINGULAR)
         # folds of a ramp are load factors
@@ -157,81 +154,62 @@ class FrequencySweep:
             message=message,
         )
 
-    def sweep_to(self, frequency: float) -> Sweep[State]:
-        """The sweep that leads to a frequency, Hz, at its first node or beyond, but not beyond the frequency."""
-        origin, omega, nodes = self._origin_of(frequency), 2.0 * np.pi * frequency, self.nodes
+    def sweep_to(self, frequency: float, *, beyond: bool = False) -> Sweep[State]:
+        """The sweep that leads to a frequency, Hz, at its first node or farther on; without a state if none is found.
+
+        beyond: whether the present sweep will do although it has passed the frequency.
+        """
+        omega, cell, nodes = 2.0 * np.pi * frequency, cell_of(frequency), self.nodes
         ramp = omega if self.sweep == "ramp" else None
-        passed = nodes is not None and (path_of(nodes).omega != omega if ramp else nodes.has_passed(omega))
-        if nodes is None or passed or origin is not self.origin:
-            nodes = self._new_sweep(origin, ramp)
-        return self._at_begin(nodes, origin)
+        same_cell = self.origin is not None and self.origin.cell == cell
+        there = nodes is not None and same_cell and path_of(nodes).omega == ramp
+        if nodes is not None and there and (ramp or beyond or not nodes.has_passed(omega)):
+            return nodes
+        origin = find_origin(self.model, cell, self.sweep)
+        nodes = self._new_sweep(origin, ramp)
+        nodes.run.budget.limit = FIRST_ITERATIONS
+        places = [2.0 * np.pi * start for start in origin.starts] or [FREE_STEP]
+        any(self._begin_at(nodes, place) for place in places)
+        return nodes
 
-    def sweep_in_cell(self, frequency: float) -> Sweep[State]:
-        """The sweep that passes all frequencies in the quarter octave of a frequency, Hz, at its present node."""
-        origin = self._origin_of(frequency)
-        if self.nodes is None or origin is not self.origin:
-            return self.sweep_to(frequency)
-        return self._at_begin(self.nodes, origin)
-
-    def _origin_of(self, frequency: float) -> Origin:
-        """Origin of the sweep to a frequency, Hz; that of the present sweep where it leads there."""
-        cell = cell_of(frequency)
-        if self.origin is not None and self.origin.cell == cell:
-            return self.origin
-        return find_origin(self.model, cell, self.sweep)
-
-    def _new_sweep(
-        self, origin: Origin, omega: float | None, case: Case | None = None, direction: float | None = None
-    ) -> Sweep[State]:
+    def _new_sweep(self, origin: Origin, omega: float | None) -> Sweep[State]:
         """A sweep before its first node. omega: frequency of a ramp, rad/s, else None."""
-        case = case or build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
-        direction = direction or (-1.0 if self.sweep == "down" else 1.0)
+        case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
         path, of = LoadingPath(case, self.excitation_amplitude, omega), self.run.budget
-        self.origin, self._begun = origin, False
         budget = Budget(deadline=of.deadline, report=of.report)
-        self.nodes = Sweep(path, direction, budget, with_reference=not self.known)
+        self.origin = origin
+        self.nodes = Sweep(path, -1.0 if self.sweep == "down" else 1.0, budget, with_reference=not self.known)
         self.nodes.save = lambda: self.save()
         return self.nodes
 
-    def _at_begin(self, nodes: Sweep[State], origin: Origin) -> Sweep[State]:
-        """A sweep at its first node or beyond; without a state where none is found."""
-        if not self._begun:
-            self._begun = True
-            nodes.run.budget.limit = nodes.run.budget.iterations + FIRST_ITERATIONS
-            places = [2.0 * np.pi * start for start in origin.starts] or [FREE_STEP]
-            any(self._begin_at(nodes, place) for place in places)
-        return nodes
-
     def _begin_at(self, nodes: Sweep[State], place: float) -> bool:
         """Begin a sweep at a value of its parameter; False where there is no state."""
-        omega = path_of(nodes).omega or place
-        nodes.run.budget.report(f"first state at {omega / (2.0 * np.pi):.6g} Hz")
-        first: tuple[Case, State] | Outcome = Outcome.START_FAILED
+        nodes.run.budget.report(f"first state at {(path_of(nodes).omega or place) / (2.0 * np.pi):.6g} Hz")
+        first: tuple[LoadingPath, State] | Outcome = Outcome.START_FAILED
         with contextlib.suppress(np.linalg.LinAlgError):
-            first = self._first(nodes, place, nodes.run)
+            first = self._first(path_of(nodes), place, nodes.run)
             if not isinstance(first, Outcome):
-                return nodes.begin(replace(path_of(nodes), case=first[0]), first[1])
+                return nodes.begin(*first)
         nodes.state = replace(nodes.state, failure=first if isinstance(first, Outcome) else Outcome.START_FAILED)
         return False
 
-    def _first(self, nodes: Sweep[State], place: float, run: Run) -> tuple[Case, State] | Outcome:
-        """A state from the static one at a value of the parameter, with the harmonics of the sweep, or else with
-        others as far as the settings allow them, and its case; or the reason of the first attempt.
+    def _first(self, path: LoadingPath, place: float, run: Run) -> tuple[LoadingPath, State] | Outcome:
+        """A state from the static one at a value of the parameter, with the harmonics of a path, or else with others as
+        far as the settings allow them, and its path; or the reason of the first attempt.
         """
-        path, why = path_of(nodes), Outcome.START_FAILED
+        others = [Resolution(all_orders(highest), samples) for highest, samples in OTHER_STARTS]
+        allowed_others = [allowed(other, self.settings) for other in others if self.settings.automatic]
         omega, load = (place, 1.0) if path.omega is None else (path.omega, place)
-        unworn = np.zeros(self.model.contact.n_contact)
-        for attempt, other in enumerate((None, *(OTHER_STARTS if self.settings.automatic else ()))):
-            case = path.case
-            if other is not None:
-                case = case.at(allowed(Resolution(all_orders(other[0]), other[1]), self.settings))
-            found = solve_first_state(case, omega, load * self.excitation_amplitude, unworn, run.fresh())
+        unworn, why = np.zeros(self.model.contact.n_contact), list[Outcome]()
+        for resolution in (path.case.resolution, *allowed_others):
+            at = path.at(resolution)
+            found = solve_first_state(at.case, omega, load * self.excitation_amplitude, unworn, run.fresh())
             if isinstance(found, State):
-                return case, replace(found, parameter=place)
-            why = found if attempt == 0 or found.static else why
+                return at, replace(found, parameter=place)
+            why.append(found)
             if found.static or run.budget.exhausted:
                 break
-        return why
+        return why[-1] if why[-1].static else why[0]
 
     def _at_known(self, frequency: float, case: Case, omega: float, state: State) -> Refined | None:
         """The state with the known resolution; None where none is known, or where the state is not found with it."""

@@ -50,7 +50,7 @@ def _first_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
     before = None
     for near, far in _segments(follow, line.sweep == "down"):
         # the state at a frequency belongs to the sweep of its quarter octave
-        search = _Between(line, line.sweep_in_cell(0.5 * (near + far)))
+        search = _Between(line, line.sweep_to(0.5 * (near + far), beyond=True))
         nodes = search.nodes
         place, end = (2.0 * math.pi * frequency for frequency in (near, far))
         if nodes.here is not None and (nodes.here.parameter - place) * nodes.direction > 0.0:

@@ -6,11 +6,12 @@ only on the change of the vibration from node to node. A state between two nodes
 leaves the sweep unchanged. So the state of a point does not depend on the other points of the study.
 
 The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
-slip, up to one step too early. A reference sweep goes from every second node to the next but one, with harmonics one
-level lower where these are automatic. The difference of both sweeps is at least half the error of the finer one, and as
-a rule the error of the coarser one. There is no difference, and no reference, as long as nothing slips or opens, and
-where each pair slips or opens within the period: such a state follows from its parameter alone. Where the sweep jumps
-over a fold, its reference begins anew behind the jump: the place of a jump is no measure of the error by steps.
+slip, up to one step too early. A reference sweep has half the nodes, in the middle of every second step, and harmonics
+one level lower where these are automatic. So the difference of both sweeps is at least half the error of the finer one,
+and as a rule the error of the coarser one: with common nodes both might keep the same history too early. There is no
+difference, and no reference, as long as nothing slips or opens, and where each pair slips or opens within the period:
+such a state follows from its parameter alone. Where the sweep jumps over a fold, its reference begins anew behind the
+jump: the place of a jump is no measure of the error by steps.
 """
 
 from __future__ import annotations
@@ -318,7 +319,7 @@ class Sweep(Generic[S]):
             self._save()
 
     def _lead_reference(self, before: S, step: Step[S]) -> None:
-        """Lead the reference sweep over a step from the node `before`: to the present node, if it is the second one."""
+        """Lead the reference sweep over a step from the node `before`: to its middle, if it is a second step."""
         if step.folds or self.path.forgets(step.state):
             self.state = replace(self.state, reference=None, skipped=math.nan)
             return
@@ -326,11 +327,11 @@ class Sweep(Generic[S]):
             if self.path.rests(step.state):
                 return
             self._begin_reference(self.path, before)
-        skipped, reached = self.state.skipped, step.state.parameter
-        if math.isnan(skipped):
-            self.state = replace(self.state, skipped=reached)
+        if math.isnan(self.state.skipped):
+            self.state = replace(self.state, skipped=step.state.parameter)
             return
-        led = self._led((reached,)) or self._led((skipped, reached))
+        middle = 0.5 * (before.parameter + step.state.parameter)
+        led = self._led((middle,)) or self._led((self.state.skipped, middle))
         self.state = replace(self.state, reference=led, skipped=math.nan)
 
     def _led(self, targets: tuple[float, ...]) -> Nodes | None:

@@ -128,7 +128,7 @@ def test_a_joint_without_grip_ends_within_bounded_effort():
 
 def test_a_first_state_that_more_harmonics_refuse_begins_no_sweep(monkeypatch):
     monkeypatch.setattr(sweep_module.Sweep, "_choose_resolution", lambda _: 0.6)
-    nodes = FrequencySweep(scene("sdof_slider"), 0.3, 1.0, "up", AUTOMATIC).sweep_in_cell(100.0)
+    nodes = FrequencySweep(scene("sdof_slider"), 0.3, 1.0, "up", AUTOMATIC).sweep_to(100.0)
     assert nodes.here is None
     assert nodes.state.failure is Outcome.UNSETTLED
 
