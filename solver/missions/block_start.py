@@ -8,10 +8,10 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State, final_history, vibration_change
-from solver.loading_history.frequency_sweep import Found, FrequencySweep
+from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import follow_line
 from solver.loading_history.sweep_start import Direction
@@ -31,7 +31,7 @@ LARGEST_CHANGE = 2.0
 
 CHANGE_OF_A_WAY = 0.5
 """Change of the vibration behind such a sweep, after which the sweep chooses its nodes anew and its error is estimated
-again. A state without its way is left after `smooth_change`, as only the way tells on which branch it lies."""
+again. A state without its way is left after `SMOOTH_CHANGE`, as only the way tells on which branch it lies."""
 
 MOST_HALVINGS = 12
 """Most halvings of the distance of two such nodes in one sweep, to come past a corner at the resonance."""
@@ -72,7 +72,7 @@ def begin_block(
     if start.state is None or nodes is None:
         return start, None
     passed = tuple(nodes.passed) if nodes.here is not None and start.branch == 0 else ()
-    return start, Begun(start, passed, line.resolution)
+    return start, Begun(start, passed, nodes.state.nodes.resolution)
 
 
 def _again(line: FrequencySweep, begun: Begun, every_node: int) -> StartState | None:
@@ -95,7 +95,7 @@ def _again(line: FrequencySweep, begun: Begun, every_node: int) -> StartState | 
     at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
     before = State(at, state.start_history, target)
     try:
-        found, most = path.solve((before,), target, run) if path.forgets(before) else None, CONTINUATION.smooth_change
+        found, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
         if found is None or not path.forgets(found):
             found, most = _through_nodes(path, begun, target, every_node, run), CHANGE_OF_A_WAY
         if found is None or vibration_change(at, found.evaluation) > most:
@@ -182,23 +182,11 @@ def _gone(line: FrequencySweep, frequency: float, start: StartState) -> StartSta
     balance = _balance(case, before)
     at = balance.evaluate(balance.predict(before.displacement_h, before.contact_force_h))
     parameter = before.excitation_amplitude / amplitude if ramp else before.omega
-    found = Found(Outcome.UNSETTLED)
     if line.go_on_from(case, State(at, final_history(balance, at), parameter), frequency):
         found = line.advance(frequency)
-    return StartState(
-        outcome=found.outcome,
-        state=found.state,
-        penalty_omega=start.penalty_omega,
-        resolution=found.resolution or start.resolution,
-        response_error=found.estimate.response,
-        wear_rate_error=found.estimate.wear_rate,
-        newton_iterations=0,
-        run_time=0.0,
-        branch=start.branch + found.branch,
-        fold_frequency=found.fold / (2.0 * np.pi),
-        message=found.message,
-        reference=found.reference,
-    )
+    else:
+        found = line.without_state(Outcome.UNSETTLED)
+    return replace(found, newton_iterations=0, branch=start.branch + found.branch)
 
 
 def _balance(case: Case, state: PeriodicState) -> Balance:

@@ -12,7 +12,7 @@ from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.accuracy.reference import RTOL_RATIO, coarser
 from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray
@@ -312,5 +312,5 @@ def begin_reference(work: WearingJoint, start: StartState, step_limit: float) ->
     history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
     balance = Balance(work.at(begun), history, begun.depth)
     first = begun.point.evaluation.predicted_h
-    point = work.run.state(balance, first, most=CONTINUATION.near_iterations)
+    point = work.run.state(balance, first, most=NEAR_ITERATIONS)
     return begun if point is None else work.noted(replace(begun, point=point))
