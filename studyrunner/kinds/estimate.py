@@ -51,7 +51,7 @@ of 20 on a slider, 18 to 26 of thousands on a dovetail, 42 of a million on a sli
 
 WAYS_OF_ONE_PAIR = 0.25
 """Ramps and sweeps of a joint of one pair, which slips: 2 of 14 missions with 20 missions, 12 of 84 with a million
-(`solver.missions.block_start`)."""
+(`solver.missions.block_run`)."""
 
 WAYS = 0.5
 """Newton iterations of the way to a block in a later mission, over those of the first one (dovetail with 16 pairs: 150
