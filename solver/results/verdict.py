@@ -67,6 +67,6 @@ def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> s
 def describe_hold(cycle: float) -> str:
     """Sentence with the count from which on a joint that slides as a whole is held."""
     return (
-        f"from cycle {in_digits(cycle)} on every pair slips and only friction holds the joint in one direction: its mean"
-        f" position is held there, by at most {HELD_FORCE:g} of the friction"
+        f"from cycle {in_digits(cycle)} on every pair slips and only friction holds the joint in one direction: its"
+        f" mean position is held there, by at most {HELD_FORCE:g} of the friction"
     )
