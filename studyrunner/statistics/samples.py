@@ -64,11 +64,12 @@ def band_of(estimate: Estimate, values: SampleValues, inputs: Array | None = Non
     its bounds as each input, or its reverse, orders it. Without inputs the estimate rises or falls with every value.
     """
     cases = [values.low]
-    if not values.is_known.all():
+    known = values.is_known
+    if not known.all():
         cases.append(values.high)
-        known = values.is_known
+    if not known.all() and inputs is not None:
         typical = np.where(known | ~known.any(axis=-1, keepdims=True), 0.5 * (values.low + values.high), np.nan)
-        place = np.zeros((0, 0)) if inputs is None else (rankdata(inputs, axis=0) - 0.5).T / len(inputs)
+        place = (rankdata(inputs, axis=0) - 0.5).T / len(inputs)
         for order in (*place, *(1.0 - place)):
             ordered = np.moveaxis(np.nanquantile(typical, order, axis=-1), 0, -1)
             cases.append(np.clip(ordered, values.low, values.high))
