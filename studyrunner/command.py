@@ -180,8 +180,8 @@ def _show_plan(study: Study) -> int:
     before = largest_memory()
     planned = plan_scenes(study, _SlowSteps().say)
     built_with = largest_memory() - before
-    contacts = contact_changes(study, planned.scenes, [planned.facts[number] for number in planned.nearest])
-    plan = build_tasks(study, planned.n_displacements, contacts, planned.scenes)
+    contacts = contact_changes(study, planned.scenes, planned.facts)
+    plan = build_tasks(study, [each.n_displacements for each in planned.facts], contacts, planned.scenes)
     seconds = time.process_time() + planned.seconds_left
     lines = [format_plan(study, planned.largest, plan, built_with, seconds, planned.describe())]
     said = *remarks_of_study(study), *(("note", doubt) for doubt in doubts_of_study(study, planned.largest))

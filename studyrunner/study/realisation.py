@@ -106,7 +106,7 @@ def wrong_scatter(study: Study) -> Iterator[Wrong]:
     floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
     known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *floats, *study.wear.numbers]
     for name, scattered in section.inputs.items():
-        key, given, absolute = f"scatter.{name}", scattered.distribution, scattered.distribution.kind == "value"
+        key, given, absolute = f"scatter.{name}", scattered.distribution, scattered.distribution.is_absolute
         if name not in known:
             yield Wrong(key, None, f"unknown input, give {nearest_name(name, known)}")
         if name == "frequency" and study.follow is not None:
@@ -115,11 +115,11 @@ def wrong_scatter(study: Study) -> Iterator[Wrong]:
         several = name in NUMBERS and len(getattr(study.axes, name)) > 1
         if absolute and (several or any(axis.name == name for axis in study.scene_axes)):
             remedy = f"give one value of axes.{name}, or a distribution around the study's own values, as {{std = ...}}"
-            yield Wrong(key, given.model_dump(), remedy)
+            yield Wrong(key, given.model_dump(exclude_none=True), remedy)
         for block in study.mission:
             if block.gives(name) and (absolute or name == "frequency"):
                 other = "leave it out" if name == "frequency" else "give a distribution around own values"
-                yield Wrong(key, given.model_dump(), f"{other}: the block {block.name} gives a {name} of its own")
+                yield Wrong(key, given.model_dump(exclude_none=True), f"{other}: the block {block.name} gives a {name} of its own")
 
 
 def block_of_input(study: Study, name: str) -> MissionBlock | None:
@@ -138,7 +138,7 @@ def _own_value(study: Study, name: str, scattered: Scattered) -> ArrayLike:
     value = {**dict(study.scene.parameters), **study.wear.numbers}.get(name)
     if isinstance(value, float | int):
         return float(value)
-    if scattered.distribution.kind != "value" and not is_of_pairs(name, scattered):
+    if not scattered.distribution.is_absolute and not is_of_pairs(name, scattered):
         remedy = "give the middle of the distribution as well: the study has no value of its own"
         raise UserError(study.source, f"scatter.{name}", None, remedy)
     return 1.0
