@@ -139,7 +139,8 @@ def _find_model(model: str, parameters: BaseModel, given: Mapping[str, Any], ori
         _check_kept(parameters, origin, fixed, given)
         return _find_scene(model, origin)
     with scene_errors(origin.source, None):
-        return {"files": find_files(origin.path.parent, model, parameters), "offers": ("mesh",)}
+        files = find_files(origin.path.parent, model, parameters)
+    return {"files": files, "offers": ("mesh",) if files.has_faces else ()}
 
 
 def _check_kept(parameters: BaseModel, origin: Origin, fixed: tuple[str, ...], given: Mapping[str, Any]) -> None:

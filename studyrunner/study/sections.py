@@ -287,8 +287,8 @@ SECTIONS: dict[str, type[Section]] = {
 
 
 def names_model(model: str) -> bool:
-    """Whether the text under `scene.model` names a finite-element model: a deck or a mesh."""
-    return Path(model).suffix.lower() in (".inp", ".msh", ".cdb")
+    """Whether the text under `scene.model` names a finite-element model: a deck, a mesh or a table of nodes."""
+    return Path(model).suffix.lower() in (".inp", ".msh", ".cdb", ".csv")
 
 
 def names_file(model: str) -> bool:
