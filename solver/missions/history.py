@@ -97,9 +97,10 @@ def _errors(mission: Mission, counts: FloatArray, fine: MissionCourse, reference
     found = []
     for chosen in (list(blocks), *([place] for place in blocks)):
         outputs, steps = (
-            Both(rows, *(_of_blocks(*each, chosen, mission.area) for each in solutions)) for rows, *solutions in read
+            Both(rows, _of_blocks(*one, chosen, mission.area), _of_blocks(*other, chosen, mission.area))
+            for rows, one, other in read
         )
-        found.append(history_error(outputs, steps, mission.area, "adaptive"))
+        found.append(history_error(outputs, steps, mission.area))
     # where blocks adapt the pressures of the pairs against each other, two solutions may agree in a pair by chance
     by_steps = np.fmax(found[0].wear_depth, np.where(counts[:, None] > 0.0, read[0][1][1]["local"], 0.0))
     return [replace(found[0], wear_depth=by_steps), *found[1:]]
