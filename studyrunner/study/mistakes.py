@@ -121,7 +121,9 @@ def _wrong(kind: type[BaseModel], key: str, found: Sequence[Mapping[str, Any]], 
         return Wrong(key, details["input"], f"unknown key, give {_nearest(kind, names, others)}")
     if details["type"] == "missing":
         of_list = isinstance(details["loc"][-1], int)
-        return Wrong(key, details["input"] if of_list else None, f"{'give more' if of_list else 'missing: give it'}{unit}")
+        return Wrong(
+            key, details["input"] if of_list else None, f"{'give more' if of_list else 'missing: give it'}{unit}"
+        )
     cause = details.get("ctx", {}).get("error")
     if isinstance(cause, WrongValueError | SceneError):
         value = Verbatim(cause.value) if isinstance(cause, SceneError) else cause.value

@@ -119,7 +119,11 @@ def wrong_scatter(study: Study) -> Iterator[Wrong]:
         for block in study.mission:
             if block.gives(name) and (absolute or name == "frequency"):
                 other = "leave it out" if name == "frequency" else "give a distribution around own values"
-                yield Wrong(key, given.model_dump(exclude_none=True), f"{other}: the block {block.name} gives a {name} of its own")
+                yield Wrong(
+                    key,
+                    given.model_dump(exclude_none=True),
+                    f"{other}: the block {block.name} gives a {name} of its own",
+                )
 
 
 def block_of_input(study: Study, name: str) -> MissionBlock | None:
