@@ -37,6 +37,7 @@ BUNDLED = (
     "shrouded_sector",
     "sphere_on_flat",
     "two_masses",
+    "underplatform_damper",
     "vibro_impact",
 )
 

@@ -3,44 +3,32 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from math import cos, pi, radians, sin, tan
+from math import cos, radians, sin, tan
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from studies.contact_compliance import ContactStiffness
 from studies.scene_error import SceneError
+from studies.scenes.sector import SectorParameters
 
 TRAVELLING_RETAINER = 1e7
 """Retainer under a travelling wave, N/m: stiff against the slip of the flanks, soft against the flanks themselves."""
 
 
-class Parameters(BaseModel):
+class Parameters(SectorParameters):
     """x is the centre line of the sector, y the tangential direction, z the axis of rotation, to the trailing edge.
 
     Radii of the dovetail and of the blade are measured along the centre line.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient of the flanks, -")
-    contact_stiffness: ContactStiffness = None
     rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, which presses the flanks together, rpm")
-    nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites the blades, -")
-    loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")
+    n_sectors: int = Field(47, ge=12, le=200, description="number of blades, -")
     retention_stiffness: float | None = Field(
         None,
         ge=0,
         description="retainer along the slot; default 1e7 under a travelling wave and else 0, N/m",
     )
     mesh: int = Field(2, ge=1, le=8, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs, -")
-    stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")
-    stuck_modes: int = Field(20, ge=1, le=100, description="modes of the glued sector kept in the reduction, -")
-
-    n_sectors: int = Field(47, ge=12, le=200, description="number of blades, -")
-    young_modulus: float = Field(114e9, gt=0, description="Young's modulus of disk and blade, Pa")
-    poisson_ratio: float = Field(0.32, ge=0, lt=0.5, description="Poisson's ratio of disk and blade, -")
-    density: float = Field(4430.0, gt=0, description="density of disk and blade, kg/m3")
-
     bore_radius: float = Field(0.120, gt=0, description="radius of the clamped bore, m")
     hub_radius: float = Field(0.125, gt=0, description="outer radius of the hub, m")
     web_inner_radius: float = Field(0.146, gt=0, description="radius where the web has become thin, m")
@@ -84,16 +72,6 @@ class Parameters(BaseModel):
         return self.retention_stiffness
 
     @property
-    def half_pitch(self) -> float:
-        """Half the angle of a sector, rad."""
-        return pi / self.n_sectors
-
-    @property
-    def angular_speed(self) -> float:
-        """Speed of rotation, rad/s."""
-        return 2.0 * pi * self.rotation_speed / 60.0
-
-    @property
     def flank_bottom(self) -> tuple[float, float]:
         """Radius along the centre line and half width, m, at the inner end of the flanks."""
         angle = radians(self.flank_angle)
@@ -118,12 +96,7 @@ _ASCENDING = (
 
 def check_parameters(parameters: Parameters) -> None:
     """Raises SceneError where parameters that are fine one by one do not go together."""
-    if parameters.nodal_diameter > parameters.n_sectors // 2:
-        raise SceneError(
-            "nodal_diameter",
-            str(parameters.nodal_diameter),
-            f"use at most n_sectors // 2 = {parameters.n_sectors // 2}; more is the same wave turning the other way",
-        )
+    parameters.check_wave()
     for inner, outer in pairwise(_ASCENDING):
         if getattr(parameters, inner) >= getattr(parameters, outer):
             raise SceneError(

@@ -19,41 +19,25 @@ import numpy as np
 
 from solver.model import FloatArray, ReducedModel
 from studies.finite_element.elements.assembly import check_elements
-from studies.finite_element.elements.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
+from studies.finite_element.elements.solid_mesh import ElementGroup, SolidMesh
 from studies.finite_element.joint import surfaces
-from studies.finite_element.joint.cut_faces import CutFaces, CyclicAxis
+from studies.finite_element.joint.cut_faces import CutFaces
 from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
-from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, Retainer, SetMotion
-from studies.finite_element.reduced_joint import PreparedModel, build_fe_scene, prepare_model
-from studies.finite_element.reduced_joint import natural_frequencies as frequencies_of_all_waves
+from studies.finite_element.joint_model import JointDefinition, Retainer, SetMotion
 from studies.scene_answers import KeepFrequencies, NaturalFrequencies, SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scenes.dovetail_mesh import DovetailMesh, build_dovetail_mesh, chord_directions
 from studies.scenes.dovetail_parameters import Parameters, check_parameters
+from studies.scenes.sector import AXIS, Sector, frequencies_of_sector, reduce_sector
 
 __all__ = ["Parameters", "build"]
 
 SURFACES = ("intrados", "extrados")
 
-_AXIS = np.array([0.0, 0.0, 1.0])
-_ORIGIN = np.zeros(3)
-
 
 def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
-    """Reduced model of the sector for the harmonics 0..n_harmonics of a travelling wave of `nodal_diameter`.
-
-    The centrifugal load enters the static harmonic only, the unit force of 1 N at the tip nodal diameter d only.
-    Stress stiffening takes the stress of the linear elastic sector with its flanks glued at the given speed, the usual
-    reference state of a modal analysis with prestress: in the blade it follows from equilibrium alone, and how the
-    flanks share the load matters only beside them. With spin softening, `-Omega^2` times the mass that moves across
-    the axis, it is part of every stiffness, the static one included. Coriolis forces are left out. The damping is
-    `loss_factor / omega_1` times the elastic stiffness, omega_1 the first frequency of the glued sector, rad/s, at
-    the nodal diameter of the excitation.
-
-    Raises SceneError where the parameters do not go together.
-    """
-    options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
-    return build_fe_scene(*define_sector(parameters), options, n_harmonics).model
+    """As `sector.reduce_sector`. Raises SceneError where the parameters do not go together."""
+    return reduce_sector(define_sector(parameters), parameters, n_harmonics)
 
 
 def describe_mesh(parameters: Parameters) -> SurfaceMesh:
@@ -66,20 +50,11 @@ def describe_mesh(parameters: Parameters) -> SurfaceMesh:
 
 
 def natural_frequencies(parameters: Parameters, known: NaturalFrequencies, keep: KeepFrequencies) -> NaturalFrequencies:
-    """Lowest frequencies of the glued sector, with the effects of rotation if wanted, at all nodal diameters 0..N/2.
-
-    known: those of the first nodal diameters. keep: takes what is known, after each nodal diameter.
-
-    Raises SceneError where the parameters do not go together.
-    """
-
-    def prepare() -> PreparedModel:
-        return prepare_model(*define_sector(parameters), n_reductions=parameters.n_sectors // 2 + 1)
-
-    return frequencies_of_all_waves(prepare, parameters.n_sectors, known, keep)
+    """As `sector.frequencies_of_sector`. Raises SceneError where the parameters do not go together."""
+    return frequencies_of_sector(lambda: define_sector(parameters), parameters.n_sectors, known, keep)
 
 
-def define_sector(parameters: Parameters) -> tuple[MeshModel, JointDefinition]:
+def define_sector(parameters: Parameters) -> Sector:
     """The sector as a finite-element model, and what is done with it.
 
     The retainer is a spring on the mean axial relative displacement. A prismatic slot holds the root along its axis by
@@ -109,20 +84,18 @@ def define_sector(parameters: Parameters) -> tuple[MeshModel, JointDefinition]:
         held=held,
         load=tip,
         responses={"tip": tip},
-        cut=CutFaces(CyclicAxis(parameters.n_sectors, _ORIGIN, _AXIS), mesh.left_nodes, mesh.right_nodes),
-        retainer=Retainer(parameters.retainer, _AXIS),
-        pairs=_arranged(build_contact_pairs(solid.coordinates, solid.numbers, contacts, _AXIS), mesh),
+        cut=CutFaces(parameters.axis, mesh.left_nodes, mesh.right_nodes),
+        retainer=Retainer(parameters.retainer, AXIS),
+        pairs=_arranged(build_contact_pairs(solid.coordinates, solid.numbers, contacts, AXIS), mesh),
     )
-    rotation = Rotation(parameters.angular_speed**2, _ORIGIN, _AXIS)
-    return MeshModel(solid, rotation, parameters.stress_stiffening, layers=mesh.stations), joint
+    return parameters.model_of(solid, mesh.stations), joint
 
 
 def build_solid_mesh(parameters: Parameters, mesh: DovetailMesh) -> SolidMesh:
     """Disk and blade in hexahedra with incompatible modes."""
-    material = Material(parameters.young_modulus, parameters.poisson_ratio, parameters.density)
     elements = mesh.mesh.elements
     groups = tuple(
-        ElementGroup("C3D8I", elements[own], np.flatnonzero(own) + 1, material, part)
+        ElementGroup("C3D8I", elements[own], np.flatnonzero(own) + 1, parameters.material, part)
         for part, own in (("disk", ~mesh.blade_elements), ("blade", mesh.blade_elements))
     )
     return SolidMesh(mesh.mesh.nodes, np.arange(len(mesh.mesh.nodes)) + 1, groups)
