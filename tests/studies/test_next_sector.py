@@ -4,6 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from solver import SolverSettings
 from solver.contact.coulomb import SLIP
@@ -15,7 +16,7 @@ from solver.structure.joint import build_case
 from solver.structure.penalty import Penalty
 from studies.finite_element.reduced_joint import glued_frequencies, prepare_model
 from studies.scene_error import SceneError
-from studies.scenes import shrouded_sector
+from studies.scenes import shrouded_sector, underplatform_damper
 from tests.studies.shrouded_ring import reduced_ring, whole_ring
 
 N = 6
@@ -24,16 +25,23 @@ STUBBY = shrouded_sector.Parameters(
 )
 
 
-def frequencies_of_sector(joint_of=lambda joint: joint):
-    model, joint = shrouded_sector.define_sector(STUBBY)
-    prepared = prepare_model(model, joint_of(joint), n_reductions=N // 2 + 1)
+DAMPED = underplatform_damper.Parameters(
+    n_sectors=N, tip_angle=0, rim_radius=0.15, platform_radius=0.165, blade_length=0.08, retention_stiffness=0
+)
+SECTORS = [shrouded_sector.define_sector(STUBBY), underplatform_damper.define_sector(DAMPED)]
+
+
+def frequencies_of_sector(sector=SECTORS[0], joint_of=lambda joint: joint):
+    model, joint = sector
+    prepared = prepare_model(replace(model, rotation=None), joint_of(joint), n_reductions=N // 2 + 1)
     return [glued_frequencies(prepared, k, 4) for k in range(N // 2 + 1)]
 
 
-def test_stuck_frequencies_of_all_waves_are_those_of_the_ring():
-    sector = frequencies_of_sector()
-    twice = [each for k, each in enumerate(sector) for _ in range(1 if k in (0, N // 2) else 2)]
-    ring = glued_frequencies(prepare_model(*whole_ring(*shrouded_sector.define_sector(STUBBY))), 0, 14)
+@pytest.mark.parametrize("sector", SECTORS, ids=["shroud", "damper"])
+def test_stuck_frequencies_of_all_waves_are_those_of_the_ring(sector):
+    found = frequencies_of_sector(sector)
+    twice = [each for k, each in enumerate(found) for _ in range(1 if k in (0, N // 2) else 2)]
+    ring = glued_frequencies(prepare_model(*whole_ring(*sector)), 0, 14)
     np.testing.assert_allclose(np.sort(np.concatenate(twice))[:14], ring, rtol=1e-9)
 
 
@@ -41,7 +49,7 @@ def test_the_order_of_the_surfaces_does_not_matter():
     def other(joint):
         return replace(joint, contacts=tuple(each.turned_round for each in joint.contacts))
 
-    np.testing.assert_allclose(frequencies_of_sector(other), frequencies_of_sector(), rtol=1e-9)
+    np.testing.assert_allclose(frequencies_of_sector(joint_of=other), frequencies_of_sector(), rtol=1e-9)
 
 
 def test_a_ring_that_only_its_shrouds_join():
@@ -53,17 +61,52 @@ def test_a_ring_that_only_its_shrouds_join():
 
     model, joint = shrouded_sector.define_sector(STUBBY)
     ring = glued_frequencies(prepare_model(*whole_ring(model, apart(joint))), 0, 10)
-    sector = frequencies_of_sector(apart)
+    sector = frequencies_of_sector(joint_of=apart)
     twice = [each for k, each in enumerate(sector) for _ in range(1 if k in (0, N // 2) else 2)]
     np.testing.assert_allclose(np.sort(np.concatenate(twice))[:10], ring, rtol=1e-9)
 
 
-@pytest.mark.parametrize("change", [{"nodal_diameter": 4}, {"blade_thickness": 0.2}, {"rim_radius": 0.1}])
-def test_impossible_sectors_are_refused(change):
-    key = next(iter(change))
-    with pytest.raises(SceneError) as caught:
-        shrouded_sector.define_sector(STUBBY.model_copy(update=change))
-    assert caught.value.key == key
+@pytest.mark.parametrize(
+    ("scene", "usual", "changes"),
+    [
+        (shrouded_sector, STUBBY, {"nodal_diameter": 4, "blade_thickness": 0.2, "rim_radius": 0.1}),
+        (
+            underplatform_damper,
+            DAMPED,
+            {"nodal_diameter": 4, "rim_radius": 0.1, "platform_gap": 0.02, "damper_half_width": 0.1}
+            | {"platform_thickness": 0.002, "damper_height": 0.02},
+        ),
+    ],
+)
+def test_impossible_sectors_are_refused(scene, usual, changes):
+    for key, value in changes.items():
+        with pytest.raises(SceneError) as caught:
+            scene.define_sector(usual.model_copy(update={key: value}))
+        assert caught.value.key == key
+
+
+def wedge_force(parameters):
+    """Centrifugal force of the wedge, N: of its elements, which are parallelepipeds but for the curvature."""
+    model, _ = underplatform_damper.define_sector(parameters)
+    corners = model.mesh.coordinates[model.mesh.groups[-1].nodes]
+    volume = np.array([ConvexHull(each).volume for each in corners])
+    radius = np.linalg.norm(volume @ corners.mean(axis=1)[:, :2]) / volume.sum()
+    return parameters.damper_density * volume.sum() * radius * parameters.angular_speed**2
+
+
+@pytest.mark.parametrize("friction", [1e-6, 0.3])
+def test_a_wedge_is_pressed_by_its_centrifugal_force(friction):
+    """Between what the platforms carry while the wedge slides in and out; both alike."""
+    parameters = underplatform_damper.Parameters()
+    model, settings = underplatform_damper.build(parameters, 1), SolverSettings(harmonics=1, samples=16)
+    ((_, start),) = follow_branch(model, friction, 1e-6, np.array([100.0]), "ramp", settings)
+    normal = start.state.contact_force_h[:, 0, 0]
+    sides = normal.reshape(2, -1).sum(axis=1)
+    assert sides[0] == pytest.approx(sides[1], rel=1e-4)
+    force, roof = wedge_force(parameters), np.radians(parameters.roof_angle)
+    # 1 %: the sides are turned to each other by the angle of the pitch
+    least, most = (0.5 * force / (np.cos(roof) + sign * friction * np.sin(roof)) for sign in (1.0, -1.0))
+    assert 0.99 * least < sides[0] < 1.01 * most
 
 
 def test_faces_that_do_not_meet_after_a_turn_are_said():
