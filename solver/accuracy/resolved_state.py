@@ -202,7 +202,7 @@ class ResolvedState:
         most = FAR_UNKNOWNS
         if self.may_solve(shifted(self.case.resolution, 2), most):
             reaching = levels_to_reach(
-                self.case.resolution, reach(self.case.model, self.joint.omega, self.case.resolution.highest), 2
+                self.case.resolution, reach(self.case.model, self.case.penalty_omega, self.case.resolution.highest), 2
             )
             while not self.may_solve(shifted(self.case.resolution, reaching), most):
                 reaching -= 1
