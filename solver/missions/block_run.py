@@ -12,7 +12,7 @@ from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.options import ACCURACY
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
@@ -251,7 +251,7 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
     if start.state is None or nodes is None or way == "continue":
         return start, None
     passed = tuple(nodes.passed) if nodes.here is not None and start.branch == 0 else ()
-    return start, Begun(passed, start, line.resolution)
+    return start, Begun(passed, start, nodes.state.nodes.resolution)
 
 
 def _again(case: BlockCase, begun: Begun) -> StartState | None:
@@ -270,7 +270,7 @@ def _again(case: BlockCase, begun: Begun) -> StartState | None:
     at, target = begins.point.evaluation, 1.0 if ramp else omega
     before = State(at, start.state.start_history, target)
     try:
-        found, most = path.solve((before,), target, run) if path.forgets(before) else None, CONTINUATION.smooth_change
+        found, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
         if found is None or not path.forgets(found):
             every_node = 1 if case.like is None else NODES_OF_A_REFERENCE_STEP
             found, most = _through_nodes(path, begun, target, every_node, run), CHANGE_OF_A_WAY

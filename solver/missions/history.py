@@ -91,10 +91,10 @@ def _errors(mission: Mission, counts: FloatArray, fine: MissionCourse, reference
     found = []
     for chosen in (blocks, *([place] for place in blocks)):
         outputs, steps = (
-            Both(rows, *(_values_of(chosen, mission.area, each, rows) for each in (fine, reference)))
+            Both(rows, _values_of(chosen, mission.area, fine, rows), _values_of(chosen, mission.area, reference, rows))
             for rows in (counts, fine.ends)
         )
-        found.append(history_error(outputs, steps, mission.area, "adaptive"))
+        found.append(history_error(outputs, steps, mission.area))
     # where blocks adapt the pressures of the pairs against each other, two solutions may agree in a pair by chance
     local = np.where(counts[:, None] > 0.0, fine.values_at(counts)["local"], 0.0)
     return [replace(found[0], wear_depth=np.fmax(found[0].wear_depth, local)), *found[1:]]

@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.contact.coulomb import STICK
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.state import State, final_history, history_at_rest
 from solver.loading_history.path import FREE_STEP, choose_resolution, largest_change
-from solver.loading_history.path_of_states import Step
+from solver.loading_history.sweep import Step
 from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, modal_model
@@ -134,7 +134,7 @@ class NonlinearMode:
             ratio = (target - here.parameter) / (here.parameter - states[-2].parameter)
             change = last - states[-2].evaluation.predicted_h
             starts.insert(0, (last + ratio * change, here.values + ratio * (here.values - states[-2].values)))
-        found = (self.find(target, *start, history, run, CONTINUATION.near_iterations) for start in starts)
+        found = (self.find(target, *start, history, run, NEAR_ITERATIONS) for start in starts)
         return next((state for state in found if state is not None), None)
 
     def rescue(self, _: ModeState, __: float, ___: Run) -> Step[ModeState] | Outcome:

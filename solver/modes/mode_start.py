@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, friction_limit
-from solver.continuation.first_state import relieved_history
-from solver.continuation.options import CONTINUATION
+from solver.continuation.first_state import RELIEF, relieved_history
 from solver.continuation.static_state import predicted_at_rest, solve_static_state
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State
@@ -65,7 +64,7 @@ class Rest:
         start = self.state.evaluation.predicted_h.copy()
         start[:, 1:] = joint.structure.force_h()[:, 1:]
         values = np.array([linear.omega, linear.damping_ratio, amplitude])
-        for fraction in (0.0, *CONTINUATION.relief):
+        for fraction in (0.0, *RELIEF):
             history = relieved_history(joint, self.state, fraction)
             found = self.mode.find(amplitude, start, values, history, run.fresh())
             if found is not None:

@@ -20,8 +20,7 @@ from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.path_of_states import Step
-from solver.loading_history.sweep import Sweep
+from solver.loading_history.sweep import Path, Step, Sweep
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.mode import ModeState, NonlinearMode
 from solver.modes.mode_start import TOP_BASE, Rest, find_rest
@@ -165,8 +164,6 @@ class _Way:
             return Failure(Outcome.BRANCH_LOST, describe_loss(self.up))
         sweep.set_deadline(deadline)
         sweep.advance_to(amplitude)
-        # the reference sweep as well, so that its iterations do not depend on the points before
-        sweep.reference_node(amplitude)
         self.spent = sweep.n_iterations
         return solve_point(sweep, amplitude, run)
 
@@ -193,7 +190,7 @@ class _Way:
                 first = rest.sliding(top, Run(mode.case.settings.tolerance, budget))
             elif (raised := self._raised_to(rest, top, deadline)) is not None:
                 first = raised.last if raised.ahead is None else raised.ahead.state
-                mode, budget.iterations = mode_of(raised), raised.n_iterations
+                mode, budget.iterations = mode_of(raised.path), raised.n_iterations
             self.down, self.top = None if first is None else _begun(mode, first, -1.0, budget), top
         return self.down
 
@@ -205,25 +202,28 @@ def _begun(mode: NonlinearMode, first: ModeState, direction: float, budget: Budg
     return sweep
 
 
-def mode_of(sweep: Sweep[ModeState]) -> NonlinearMode:
-    """The mode along which a sweep goes, with its present harmonics."""
-    assert isinstance(sweep.path, NonlinearMode)
-    return sweep.path
+def mode_of(path: Path[ModeState]) -> NonlinearMode:
+    """The mode along which a sweep goes."""
+    assert isinstance(path, NonlinearMode)
+    return path
 
 
 def solve_point(sweep: Sweep[ModeState], amplitude: float, run: Run) -> ModePoint | Failure:
     """The point of a mode at an amplitude, m sqrt(kg), to which a sweep was advanced."""
     if sweep.here is None:
         return Failure(Outcome.BRANCH_LOST, describe_loss(sweep))
-    found, mode = sweep.state_at(amplitude, run.fresh()), mode_of(sweep)
+    found, mode = sweep.state_at(amplitude, run.fresh()), mode_of(sweep.path)
     if not isinstance(found, Step):
         ahead = sweep.here if sweep.ahead is None else sweep.ahead.state
         ends = f"{sweep.here.parameter:.4g} and {ahead.parameter:.4g}"
         said = f"no state was found between the amplitudes {ends} m sqrt(kg), where the mode has states"
         return Failure(Outcome.BRANCH_LOST, said)
-    reference = sweep.reference_at(amplitude, run.fresh())
-    other = None if reference is None or sweep.reference is None else (mode_of(sweep.reference), reference)
-    return judge_point(mode, found.state, other, run)
+    reference = None
+    if sweep.reference is not None:
+        path, states = sweep.reference
+        other = path.solve(states, amplitude, run.fresh())
+        reference = None if other is None else (mode_of(path), other)
+    return judge_point(mode, found.state, reference, run)
 
 
 def judge_point(
