@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
@@ -42,6 +42,7 @@ _OF_VALUES = {
     "response_peak_begin": ("block response", "m"),
     "response_peak_end": ("block response", "m"),
     "amplitude": ("", "m kg^0.5"),
+    "excitation_amplitude": ("", "N"),
 }
 """Dimensions after the first one, and unit; of all others no dimension and "1"."""
 
@@ -52,6 +53,10 @@ _OF_MISSIONS = {
     "steps": ("step",),
 }
 """All dimensions of values that belong to blocks or steps of missions."""
+
+
+NOT_IN_DATASETS = {"dataset": False}
+"""Metadata of a field that is no array of numbers or words."""
 
 
 class Presented:
@@ -73,7 +78,7 @@ class Presented:
         points = getattr(self, name)
         data: dict[str, Any] = {}
         for field in fields(self):  # type: ignore[arg-type]
-            if field.name == name:
+            if field.name == name or not field.metadata.get("dataset", True):
                 continue
             value = getattr(self, field.name)
             others, units = _OF_VALUES.get(field.name, ("", "1"))
@@ -91,10 +96,7 @@ class Presented:
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draws the main values over the dimension, into new axes of matplotlib if none are given. Returns the axes."""
-        if axes is None:
-            from matplotlib import pyplot
-
-            axes = pyplot.subplots()[1]
+        axes = axes or _new_axes()
         at = getattr(self, self.OVER[0])
         order = np.argsort(at)
         for number, name in enumerate(self.DRAWN):
@@ -113,11 +115,20 @@ class Presented:
         own: Any = self
         points, outcomes = getattr(self, self.OVER[0]), own.outcome
         ends, messages = (each if isinstance(each, tuple) else (each,) for each in (outcomes, own.message))
-        words = ", ".join(f"{number} {outcome}" for outcome, number in Counter(ends).items())
+        counts = Counter(ends)
+        words = ", ".join(
+            f"{number} {outcome}" if len(ends) > 1 else str(outcome) for outcome, number in counts.items()
+        )
         rows = [(name, _span(getattr(self, name), _OF_VALUES.get(name, ("", "1"))[1])) for name in self.SHOWN]
         rows.append(("message", next((text for text in messages if text), "none")))
         first = f"{type(self).__name__}: {self.OVER[1]} {_span(points, '')}: {words}"
         return "\n".join((first, *(f"  {name:<18} {text}" for name, text in rows)))
+
+
+def _new_axes() -> Axes:
+    from matplotlib import pyplot
+
+    return cast("Axes", pyplot.subplots()[1])
 
 
 def _span(values: Any, unit: str) -> str:
@@ -143,6 +154,25 @@ class PresentedResponse(Presented):
     OVER = ("frequency", "frequency")
     SHOWN = ("response", "response_error", "fold_frequency")
     DRAWN = ("response",)
+
+
+class PresentedCurve(Presented):
+    """A response curve through folds, over its points; solid where it is stable."""
+
+    OVER = ("point", "point")
+    SHOWN = ("frequency", "excitation_amplitude", "response")
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """As for other results, over the parameter that changes along the curve."""
+        own: Any = self
+        axes = axes or _new_axes()
+        at, stable = getattr(self, own.parameter), np.array(own.stability) == "stable"
+        for size in np.abs(own.response).T:
+            (line,) = axes.plot(at, size, ":")
+            axes.plot(at, np.where(stable, size, np.nan), color=line.get_color())
+        label = f"{own.parameter.replace('_', ' ')} in {_OF_VALUES[own.parameter][1]}"
+        axes.set(xlabel=label, ylabel="response in m", title="solid where stable")
+        return axes
 
 
 class PresentedMode(Presented):
