@@ -1,9 +1,19 @@
 """One case: a joint that vibrates and wears. Input: arrays. Output: frozen results. No files, MPI, xarray or studies.
 
-For use in Python, from this package itself: a model by `build_model` and `with_contact_stiffness`; `frequency_response`
-and `response_curve` (with folds and unstable parts), `backbone` and `modal_response` (nonlinear modes), `march_wear`
-and `integrate_mission` (wear), each with a result of its own; `balance_of`, the equations of a periodic state;
-`SolverSettings`, resolution and accuracy; `Outcome`, how a computation ended.
+For use in Python, from this package itself:
+
+- `build_model`: a `ReducedModel` from mass, damping, stiffness and contact pairs;
+- `with_contact_stiffness`: the model with a spring in series with each pair, as rough surfaces are;
+- `frequency_response`: the joint over frequency, a `FrequencyResponse`;
+- `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
+- `modal_response`: the response near a resonance from a nonlinear mode alone, a `ModalResponse`;
+- `march_wear`: wear of the joint over the cycles at one frequency, a `WearHistory`;
+- `integrate_mission`: wear over missions, each a list of `Block`, steady or a `Passage`, a `MissionHistory`;
+- `response_curve`: a whole curve over frequency or excitation amplitude, with folds, unstable parts and Floquet
+  multipliers, a `ResponseCurve`;
+- `balance_of`: the equations of a periodic state, a `HarmonicBalance`, with residual, exact Jacobian, and all Fourier
+  coefficients and time signals of a state as a `PeriodicMotion`;
+- `SolverSettings`: resolution and accuracy; `Outcome`: how a computation ended.
 
 `CONTRIBUTING.md` has a map of the rooms. `PHYSICS.md` has the equations in one sign convention, the misprints of the
 paper, and measurements.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -128,7 +128,8 @@ class Presented:
 def _new_axes() -> Axes:
     from matplotlib import pyplot
 
-    return cast("Axes", pyplot.subplots()[1])
+    axes: Axes = pyplot.subplots()[1]
+    return axes
 
 
 def _span(values: Any, unit: str) -> str:
