@@ -23,8 +23,8 @@ _OFFERED = {"mesh": "describe_mesh", "exact": "exact_answer"}
 
 
 def _names_model(model: str) -> bool:
-    """Whether the text under `scene.model` names a finite-element model: a deck or a mesh."""
-    return Path(model).suffix.lower() in (".inp", ".msh", ".cdb")
+    """Whether the text under `scene.model` names a finite-element model: a deck, a mesh or a table of nodes."""
+    return Path(model).suffix.lower() in (".inp", ".msh", ".cdb", ".csv")
 
 
 def _names_file(model: str) -> bool:
@@ -154,7 +154,8 @@ def _find_scene(model: str, parameters: BaseModel, given: Mapping[str, Any], ori
 
     assert isinstance(parameters, Parameters)
     with scene_errors(origin.source, None):
-        return {"files": find_files(origin.path.parent, model, parameters), "offers": ("mesh",)}
+        files = find_files(origin.path.parent, model, parameters)
+    return {"files": files, "offers": ("mesh",) if files.has_faces else ()}
 
 
 def _in_file(path: Path, group: str, origin: Origin) -> dict[str, Any]:
