@@ -12,7 +12,6 @@ from studies.finite_element.joint.pairing import ContactSurfaces
 from studies.finite_element.joint.surfaces import surface_of_nodes
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
 from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
-from studies.scenes.structured_mesh import graded
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, wedge_shape
 from tests.studies.fe_models.solid_meshes import STEEL, block, joined
 
@@ -32,10 +31,6 @@ def test_bending_does_not_lock():
         deflections.append(solved @ load.ravel()[free])
     assert deflections[0] == pytest.approx(beam, rel=0.005)
     assert deflections[1] < 0.6 * beam
-
-
-def test_graded_stations():
-    assert np.allclose(graded([0.0, 1.0, 4.0], [2, 3]), [0.0, 0.5, 1.0, 2.0, 3.0, 4.0])
 
 
 def merged(coordinates, elements):

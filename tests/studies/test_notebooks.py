@@ -89,10 +89,6 @@ def test_a_notebook_runs_without_a_warning_and_draws_its_figures(small_result, t
     assert count_figures(cells) == FIGURES[path.stem]
 
 
-def test_all_notebooks_are_here():
-    assert {path.stem for path in NOTEBOOKS} == set(FIGURES)
-
-
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_holds_its_outputs_and_nothing_of_the_machine(path):
     assert path.stat().st_size < LARGEST
@@ -117,24 +113,3 @@ def test_notebook_holds_its_outputs_and_nothing_of_the_machine(path):
     assert settle(nbformat.read(path, as_version=4)) == notebook
     told = [output.get("text") or "".join(map(str, output.data.values())) for output in outputs(code)]
     assert not re.search(r"(?<![\w.])/(tmp|home|root|work|usr|Users)\b|\bat 0x", "\n".join(told))
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_notebook_uses_what_users_have(path):
-    """A notebook of results reads result files only; the others use the packages by their doors."""
-    imported = set()
-    for node in ast.walk(ast.parse("\n".join(cell.source for cell in code_of(path)))):
-        if isinstance(node, ast.Import):
-            imported |= {alias.name for alias in node.names}
-        if isinstance(node, ast.ImportFrom):
-            imported.add(node.module)
-    own = {name for name in imported if name.split(".")[0] in ("solver", "studies", "studyrunner", "tests")}
-    doors = {"solver", "studies"} if path.stem in ("python_api", "modes", "followed_resonance") else set()
-    doors |= set() if path.stem in ("read_a_result", "wear_maps") else {"studyrunner"}
-    assert all(
-        name in doors
-        or name == "studyrunner.accessor"
-        or name.startswith(("studyrunner.report.", "studyrunner.result."))
-        for name in own
-    ), own
-    assert own

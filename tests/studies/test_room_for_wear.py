@@ -84,19 +84,6 @@ def test_a_stroke_slides_where_the_approach_under_the_load_says():
     assert point_stick_under_stroke(1e-9, 0.0, 100.0, A_POINT, 200e9, 0.3) == 0.0
 
 
-@pytest.mark.parametrize("name", ["cylinder_on_flat", "sphere_on_flat"])
-def test_what_needs_no_room_stays_as_it_is(name):
-    much = ExpectedWear(1.0, 1e-9)
-    assert room(name, much) is None
-    assert room(name, much, Q=10.0) is None
-    assert room(name, much, stroke=1e-8) is None
-    assert room(name, ExpectedWear(1.0, 0.0), stroke=1e-5) is None
-    assert room(name, ExpectedWear(1.0, math.inf), stroke=1e-5) is None
-    assert room(name, much, stroke=1e-5, half_width=2e-4) == 2e-4
-    slider = scene_parameters("sdof_slider")()
-    assert scene_with_room("sdof_slider", slider, much) is slider
-
-
 def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears():
     stroke = 2.15e-6
     stick = line_stick_under_stroke(stroke, 0.6, 1.2e5, A_LINE, MODULUS, 6e-3)

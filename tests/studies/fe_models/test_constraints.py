@@ -9,9 +9,7 @@ from studies.finite_element.reduced_joint import glued_frequencies
 from studies.scene_error import SceneError
 from tests.studies.fe_models.constrained_decks import (
     BLOCKS,
-    FULL_MODEL,
     SECTORS,
-    flat_full_model,
     frequencies,
     of_calculix,
     prepared_deck,
@@ -46,18 +44,6 @@ BOTH_READ = {
 def test_as_calculix(name, tmp_path):
     text = BLOCKS + BOTH_READ[name]
     np.testing.assert_allclose(frequencies(tmp_path, text), of_calculix(tmp_path, text), rtol=1e-6)
-
-
-@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
-def test_rigid_body_whose_surface_would_move(tmp_path):
-    """Of meshes that are alike the nodes of the other surface move."""
-    text = BLOCKS.replace("1, 6, 11, 16, 21, 26", "1, 6, 11, 2, 7, 12")
-    text += f"{REFERENCE}*RIGID BODY, ELSET=EUP, REF NODE=900\n"
-    expected = of_calculix(tmp_path, text.replace("\nSUP, SLOW\n", "\nSLOW, SUP\n"))
-    prepared, loaded = prepared_deck(tmp_path, text)
-    assert prepared.pairs.moving_name == ("SLOW",)
-    assert loaded.joint.contacts[0].name == "SUP-SLOW"
-    np.testing.assert_allclose(glued_frequencies(prepared, 0, 4), expected, rtol=1e-6)
 
 
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
@@ -157,15 +143,6 @@ def test_cylindrical_directions_on_cut_faces_as_calculix(dofs, tmp_path):
     step = "*STEP\n*FREQUENCY\n8\n*SELECT CYCLIC SYMMETRY MODES, NMIN=3, NMAX=3\n*END STEP\n"
     own = frequencies(tmp_path, text("BORE"), 3)
     np.testing.assert_allclose(own, of_calculix(tmp_path, text("INSIDE"), step, every=2), rtol=1e-6)
-
-
-@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
-def test_full_model_as_calculix(tmp_path):
-    """Two instances, a coupling, equations, cylindrical directions and cyclic symmetry, with prestress."""
-    static = "*STEP, NLGEOM\n*STATIC\n*DLOAD\nEALL1, CENTRIF, 1.E6, 0., 0., 0., 0., 0., 1.\n*END STEP\n"
-    select = "*STEP, PERTURBATION\n*FREQUENCY\n12\n*SELECT CYCLIC SYMMETRY MODES, NMIN=2, NMAX=2\n*END STEP\n"
-    expected = of_calculix(tmp_path, flat_full_model(), static + select, every=2)
-    np.testing.assert_allclose(frequencies(tmp_path, FULL_MODEL.read_text(), 2), expected, rtol=2e-5)
 
 
 def test_moving_nodes_that_are_held_obliquely(tmp_path):

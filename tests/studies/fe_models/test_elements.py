@@ -197,22 +197,3 @@ def test_inverted_element_is_named():
     check_elements(mesh)
     with pytest.raises(SceneError, match=r"element 4 \(C3D10\) is turned inside out"):
         check_elements(wrong)
-
-
-def test_elements_without_matrices_are_named():
-    mesh, _ = block("C3D8R", (1, 1, 1))
-    with pytest.raises(SceneError, match=r"element 1 is a C3D8R, .*; give matrices, or use one of C3D4, "):
-        check_elements(mesh)
-
-
-@pytest.mark.parametrize("kind", ELEMENT_KINDS)
-def test_faces_point_outwards_and_hold_their_mid_side_nodes(kind):
-    reference = ELEMENT_KINDS[kind].reference
-    nodes, centre = reference.nodes, reference.corners.mean(axis=0)
-    for loop in ELEMENT_KINDS[kind].faces:
-        n = {3: 3, 6: 3, 4: 4, 8: 4}[len(loop)]
-        corners = nodes[list(loop[:n])]
-        normal = np.cross(corners[1] - corners[0], corners[2] - corners[1])
-        assert normal @ (corners.mean(axis=0) - centre) > 0.0
-        for place, middle in enumerate(loop[n:]):
-            assert np.allclose(nodes[middle], 0.5 * (corners[place] + corners[(place + 1) % n]))
