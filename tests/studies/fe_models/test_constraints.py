@@ -71,10 +71,6 @@ SAME = {
     ),
     "BEAM keeps a distance": ("*MPC\nBEAM, 5, 18\n", "*EQUATION\n4\n5,1,20.,5,3,-5.,18,1,-20.,18,3,5.\n"),
     "BEAM of a set": ("*MPC\nBEAM, XM, 3\n", "*RIGID BODY, NSET=XM, REF NODE=3\n"),
-    "sets in an equation": (
-        "*NSET, NSET=P\n4, 5\n*NSET, NSET=Q\n14, 15\n*EQUATION\n2\nP,1,1.,Q,1,-1.\n",
-        "*EQUATION\n2\n4,1,1.,14,1,-1.\n2\n5,1,1.,15,1,-1.\n",
-    ),
     "KINEMATIC COUPLING": (
         f"{REFERENCE}*KINEMATIC COUPLING, REF NODE=900\nXM, 1, 6\n",
         f"{REFERENCE}*RIGID BODY, NSET=XM, REF NODE=900\n",
@@ -90,10 +86,6 @@ SAME = {
     "axes that are turned": (
         "*TRANSFORM, NSET=XE, TYPE=R\n0, 1, 0, -1, 0, 0\n*BOUNDARY\nXE, 1\n",
         "*BOUNDARY\nXE, 2\n",
-    ),
-    "all directions": (
-        "*TRANSFORM, NSET=XE, TYPE=C\n-20, -30, 0, 0, 0, 1\n*BOUNDARY\nXE, 1, 3\n",
-        "*BOUNDARY\nXE, 1, 3\n",
     ),
 }
 
@@ -174,22 +166,12 @@ def test_moving_nodes_that_are_held_obliquely(tmp_path):
         ),
         ("*EQUATION\n2\n1,1,1.,15,1,-1.\n", r"\*EQUATION: displacement 1 of node 1 depends on others and is held"),
         (
-            "*EQUATION\n2\n5,1,1.,15,1,-1.\n2\n15,1,1.,5,1,1.\n",
-            r"\*EQUATION: displacements depend on each other in a circle",
-        ),
-        (
             "*EQUATION\n2\n105,1,1.,15,1,-1.\n2\n20,1,1.,15,1,-1.\n",
             r"\*EQUATION: node 105 depends on others and moves in a contact pair",
         ),
-        ("*EQUATION\n2\n5,4,1.,15,1,-1.\n", r"\*EQUATION: node 5 has no dof 4"),
         ("*TRANSFORM, NSET=XM, TYPE=C\n40,0,0,40,0,1\n*BOUNDARY\nXM,1\n", r"\*TRANSFORM: node 5 is on the axis"),
         ("*BOUNDARY\nXM, 1, 1, 0.1\n", r"\*BOUNDARY moves XM by 0.1"),
         ("*STEP\n*STATIC\n*DLOAD\nELOW, BX, 1.\n*END STEP\n", r"\*DLOAD of type BX is not read"),
-        ("*MPC\nPLANE, 5, 10, 15, 20, 30\n", r"\*MPC PLANE of 5 nodes is not read"),
-        (
-            "*TRANSFORM, NSET=XM, TYPE=R\n1,1,0,-1,1,0\n*BOUNDARY\nXM,1\n*RIGID BODY, NSET=XM, REF NODE=3\n",
-            r"\*RIGID BODY: displacement 1 of node 5 depends on others and is held",
-        ),
     ],
 )
 def test_conflicts_are_refused(text, sentence, tmp_path):

@@ -46,9 +46,6 @@ ALL_OF_THEM = "*ELGEN, ELSET=E\n1, 2, 1, 1, 2, 3, 2, 2, 9, 4\n"
 COPIED = "*ELGEN, ELSET=E\n1, 2, 1, 1, 2, 3, 2\n*ELCOPY, ELEMENT SHIFT=4, OLD SET=E, SHIFT NODES=9, NEW SET=E\n"
 
 
-COUPLING = "*COUPLING, REF NODE=5, SURFACE=SE, CONSTRAINT NAME=C\n"
-
-
 @pytest.mark.parametrize("made", [ALL_OF_THEM, COPIED], ids=["ELGEN", "ELCOPY"])
 def test_nodes_and_elements_of_others(made, tmp_path):
     whole, deck = (read_deck(write(tmp_path, text)) for text in (GRID + CELLS, MADE_NODES + made))
@@ -167,8 +164,6 @@ def test_removed_elements_and_pairs(tmp_path):
     ("friction", "law"),
     [
         ("*FRICTION, TAUMAX=100.\n0.4", "with TAUMAX"),
-        ("*FRICTION, EXPONENTIAL DECAY\n0.6, 0.3, 0.01", "with EXPONENTIALDECAY"),
-        ("*FRICTION, ROUGH", "with ROUGH"),
         ("*FRICTION\n0.4, 0.\n0.3, 1.", "of several coefficients"),
     ],
 )
@@ -184,16 +179,12 @@ def test_friction_that_is_not_one_coefficient(friction, law, tmp_path):
     ("text", "sentence"),
     [
         ("*CONTACT\n", r"\*CONTACT is not read, and may change the model; give \*CONTACT PAIR for"),
-        (COUPLING, r"\*COUPLING: no \*KINEMATIC below it; write it there"),
         (
             "*NONSENSE\n",
             r"\*NONSENSE is not read, and may change the model; remove it if the model is right without it",
         ),
-        ("*SURFACE INTERACTION, NAME=X\n*SURFACE BEHAVIOR, NO SEPARATION\n", r"\*SURFACE BEHAVIOR with NOSEPARATION"),
-        ("*BOUNDARY\n1, 3, 1\n", "dofs from 3 to 1"),
         ("*MATERIAL, NAME=STEEL\n*ELASTIC\n7e4, 0.3\n", r"\*ELASTIC of one material again \(before: deck.inp"),
         ("*INITIAL CONDITIONS, TYPE=STRESS\n", r"\*INITIAL CONDITIONS: TYPE=STRESS is not read"),
-        ("*STEP\n*STATIC\n*CLOAD, AMPLITUDE=A\n5, 1, 1.\n", r"\*CLOAD: a load with AMPLITUDE is not read"),
     ],
 )
 def test_what_may_change_the_model_is_refused(text, sentence, tmp_path):

@@ -5,9 +5,6 @@ import pytest
 from scipy import linalg, sparse
 
 from studies.fe_models.from_files.check import describe_rest
-from studies.fe_models.matrices.matrices import Matrices
-from studies.fe_models.nodal_matrices import order_by_nodes
-from studies.fe_models.units import find_units
 from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness, spin_softening
 from studies.finite_element.elements.solid_mesh import Material, Rotation
 from studies.finite_element.joint import ordering, reduction
@@ -259,29 +256,6 @@ def test_matrices_with_nodes_that_have_no_place():
     assert np.allclose(ours.summary.glued_frequencies[0], reference.summary.glued_frequencies[0], rtol=1e-9)
     assert ours.summary.mass == pytest.approx(reference.summary.mass, rel=1e-12)
     assert np.isfinite(ours.model.linear[0].load_static).all()
-
-
-def test_matrices_are_put_in_the_order_of_the_nodes():
-    model, _ = plates()
-    stiffness, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
-    n = model.mesh.n_nodes
-    rows = np.random.default_rng(5).permutation(3 * n)
-    left_out = rows == 17
-    rows = rows[~left_out]
-    # and a node that the mesh does not have
-    more = sparse.block_diag([stiffness[rows][:, rows], sparse.eye(3)], format="csr")
-    node = np.append(model.numbers[rows // 3], [-4, -4, -4])
-    direction = np.append(rows % 3, [2, 0, 1])
-    heavy = sparse.block_diag([mass[rows][:, rows], sparse.diags([1.0, 2.0, 3.0])], format="csr")
-    given = Matrices(sparse.csr_array(more), sparse.csr_array(heavy), node, direction, ("job",), "table")
-    ordered = order_by_nodes(given, find_units("SI"), model.numbers, model.coordinates)
-    assert np.array_equal(np.argwhere(ordered.missing), [[17 // 3, 17 % 3]])
-    found = ordered.model
-    assert found.numbers[-1] == -4
-    assert np.isnan(found.coordinates[-1]).all()
-    kept = np.setdiff1d(np.arange(3 * n), [17])
-    assert np.abs(found.stiffness[kept][:, kept] - stiffness[kept][:, kept]).max() == 0.0
-    assert np.array_equal(found.mass.diagonal()[-3:], [2.0, 3.0, 1.0])
 
 
 @pytest.mark.parametrize("small", [0, 900])
