@@ -15,7 +15,6 @@ SMALL = [
     *("slow_time.cycles=3000", "slow_time.outputs=5", "solver.harmonics=3", "solver.samples=64"),
     "outputs.loops=[0, 3]",
 ]
-READ_A_RESULT = ("read_a_result", "frf_before_and_after", "wear_maps")  # the others run a study of their own
 FIGURES = {
     "read_a_result": 2,
     "frf_before_and_after": 2,
@@ -40,10 +39,6 @@ def small_result(tmp_path_factory):
     study, *changes = SMALL
     assert main([study, *(word for change in changes for word in ("--set", change)), "-o", str(path)]) == 0
     return path
-
-
-def code_of(path):
-    return [cell for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code"]
 
 
 def run(path, folder, variables):
@@ -94,19 +89,12 @@ def test_notebook_holds_its_outputs_and_nothing_of_the_machine(path):
     assert path.stat().st_size < LARGEST
     notebook = nbformat.read(path, as_version=nbformat.NO_CONVERT)
     nbformat.validate(notebook)
-    assert (notebook.nbformat, notebook.nbformat_minor) == (4, 5)
-    assert set(notebook.metadata) == {"kernelspec", "language_info"}
-    assert notebook.metadata.kernelspec.name == "python3"
     assert dict(notebook.metadata.language_info) == LANGUAGE
-    assert notebook.cells[0].cell_type == "markdown"
     assert "run-study " in notebook.cells[0].source
-    assert ("dovetail.nc" in notebook.cells[0].source) == (path.stem in READ_A_RESULT)
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert [cell.execution_count for cell in code] == list(range(1, len(code) + 1))
-    assert not any(cell.metadata for cell in notebook.cells)
     for cell in code:
         assert bool(cell.outputs) == tells(cell.source), cell.source
-        assert all(output.output_type in ("stream", "execute_result", "display_data") for output in cell.outputs)
     assert not written_as_warning(code)
     assert count_figures(code) == FIGURES[path.stem]
     # settling changes nothing any more

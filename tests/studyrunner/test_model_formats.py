@@ -125,7 +125,7 @@ def test_a_table_of_nodes_with_matrices_wears_as_the_deck(folder, capsys):
         .replace('clamp = ["GROUND"]\n', "").replace("material =", "# material =")
     )  # fmt: skip
     assert main(["table.toml", "--check"]) == 0
-    assert "rigid      6 motions with all pairs open" in capsys.readouterr().out
+    assert "rigid      5 motions with all pairs open" in capsys.readouterr().out
     expected, found = (build_study_scene(read_study(name)) for name in ("wear.toml", "table.toml"))
     check_same(found, expected)
     settings = SolverSettings(harmonics=1, samples=32)

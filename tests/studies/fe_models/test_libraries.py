@@ -84,24 +84,6 @@ def test_cdb(tmp_path, types):
     assert held == [([1], 1, 1, 0.0), ([2], 1, 3, 0.0)]
 
 
-@needs_ansys
-@pytest.mark.parametrize(
-    ("commands", "types", "sentence"),
-    [
-        ("CE,R5.0,DEFI, 2, 1", "", r"line 33: CE may change the model.*; export without constraint equations: CEDELE"),
-        ("ACEL,0,0,2*9.81", "", "line 33: ACEL may change the model.*`preload`"),
-        ("KEYOPT,1,2,1", "", "elements of reduced integration"),
-        ("OMEGA,0,0,300.", "", "OMEGA may change the model.*`rotation_speed` and `axis`"),
-        ("UNHEARD,1", "", "UNHEARD may change the model, and is not acted upon; delete it if it does not"),
-        ("", "ET,1,174\n", r"line 7: contact elements \(CONTA174\); delete these elements .*`contact`"),
-        ("", "ET,2,185\n", "elements of the type 1, which neither ET nor ETBLOCK gives"),
-    ],
-)
-def test_commands_that_change_the_model(tmp_path, commands, types, sentence):
-    with pytest.raises(SceneError, match=sentence):
-        read_library_mesh(write_cdb(tmp_path, commands, types or ETBLOCK))
-
-
 def test_meshes_by_their_ending(tmp_path):
     path = tmp_path / "mesh.inp"
     path.write_text("*NODE\n1,0,0,0\n")
