@@ -25,6 +25,7 @@ _OF_VALUES = {
     "open_fraction": ("contact", "1"),
     "slip_fraction": ("contact", "1"),
     "response": ("response", "m"),
+    "response_mean": ("response", "m"),
     "response_peak": ("response", "m"),
     "shape": ("displacement", "m"),
     "loop_displacement": ("loop phase component", "m"),
