@@ -25,7 +25,7 @@ import numpy as np
 from scipy.linalg import eigvals
 
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.model import ComplexArray, FloatArray
+from solver.model import ComplexArray
 from solver.newton.run import Run
 from solver.structure.condensation import relative_indices
 from solver.structure.fourier import build_basis, derivative
@@ -74,7 +74,7 @@ def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
         for part, power in ((linear.mass, 2), (linear.damping, 1), (linear.stiffness, 0))
     )
     rate = derivative(np.eye(m), np.array(fine.basis.orders, np.float64)).T
-    force, motion = (_dense(fine, part) for part in (tangent.force_tangent, tangent.motion_tangent))
+    motion, force = tangent.matrices(np.arange(joint.contact.n_contact)).reshape(2, n_rel * m, n_rel * m)
     select = np.kron(np.eye(n)[relative_indices(joint.contact)[0]], np.eye(m))
     eye, left = np.eye(n * m), np.zeros((2 * n * m + n_rel * m, 2 * n * m + n_rel * m))
     right, one = left.copy(), np.eye(m)
@@ -86,17 +86,6 @@ def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     left[p, x], left[p, p] = select, -size * motion
     right[v, v] = np.kron(mass, one)
     return _chosen(eigvals(left, right), 2 * int(np.linalg.matrix_rank(mass)))
-
-
-def _dense(joint: Joint, blocks: FloatArray) -> FloatArray:
-    """Matrix (n_rel m, n_rel m) of the blocks (n_contact, 3m, 3m) of the pairs."""
-    n_contact, m = joint.contact.n_contact, len(joint.basis.synthesis)
-    spread = np.zeros((3 * n_contact, m, 3 * n_contact, m))
-    for pair, block in enumerate(blocks):
-        own = slice(3 * pair, 3 * pair + 3)
-        spread[own, :, own] = block.reshape(3, m, 3, m)
-    rows = joint.component_index
-    return spread[rows][:, :, rows].reshape(rows.size * m, rows.size * m)
 
 
 def _chosen(exponents: ComplexArray, number: int) -> ComplexArray:

@@ -103,9 +103,8 @@ def build_structure(
     still = model.linear[0]
     first = model.harmonic_structure(1) if orders else still
     n, n_rel = len(still.mass), relative.size
-    # bytes that a product with a `SharedStiffness` reads: many where much lies behind the joint
-    shared_bytes = 24 * (2 * n - n_rel) * n_rel + 16 * len(orders) * (n - n_rel) ** 2
-    shares = 16 * len(orders) * n_rel**2 > max(DENSE_BYTES, shared_bytes)
+    # not where much lies behind the joint: a `SharedStiffness` has to read that, too
+    shares = 16 * len(orders) * n_rel**2 > DENSE_BYTES and n <= 2 * n_rel
     real = not any(np.iscomplexobj(part) for part in (still.mass, still.damping, still.stiffness, still.response))
     if shares and first is still and real and not model.nodal_diameter:
         moving = _condense_shared(still, relative, omega * np.array(orders, np.float64), excitation_amplitude)

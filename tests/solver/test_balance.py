@@ -131,20 +131,6 @@ def test_jacobian_of_a_mass_on_a_slider(name, wear, resolution):
     assert np.abs(dense - differences).max() < 1e-7 * np.abs(differences).max()
 
 
-def test_residual_is_that_of_the_stiffness_matrices():
-    balance, predicted = case("mixed", 8, wear=True)
-    at = balance.evaluate(predicted)
-    structure = balance.joint.structure
-    moved, force = balance.joint.to_relative(at.displacement_h), balance.joint.to_relative(at.force_h)
-    static = structure.static_stiffness @ moved[:, 0] + force[:, 0] - structure.static_force
-    assert at.residual[:, 0] == pytest.approx(static, abs=1e-10)
-    for n in (1, 2, 3):
-        amplitude = moved[:, 2 * n - 1] - 1j * moved[:, 2 * n]
-        taken = force[:, 2 * n - 1] - 1j * force[:, 2 * n]
-        left = structure.dynamic_stiffness[n - 1] @ amplitude + taken - structure.harmonic_force * (n == 1)
-        assert at.residual[:, 2 * n - 1] - 1j * at.residual[:, 2 * n] == pytest.approx(left, abs=1e-10)
-
-
 def test_the_scaled_residual_shows_an_error_of_the_vibration_beside_a_large_preload():
     balance, predicted = case("3d", 9, wear=False)
     at = balance.evaluate(predicted)

@@ -123,10 +123,9 @@ def series(row, omega):
 
 def marched(case):
     """Complex harmonics 0, 1, 2, 3 of the friction force of the one pair, and its slip work."""
-    force_t, _, _, _, slip_work, _ = run_masses(case, case.predicted_h)
-    line = int(case.line[0])
-    force_h = (force_t @ case.basis.analysis)[0, 1 + line] / case.step_share
-    return np.concatenate([[force_h[0]], to_complex(force_h)]), float(slip_work[0])
+    found, line = run_masses(case, case.predicted_h), int(case.line[0])
+    force_h = (found.force_t @ case.basis.analysis)[0, 1 + line] / case.step_share
+    return np.concatenate([[force_h[0]], to_complex(force_h)]), float(found.slip_work[0])
 
 
 @pytest.mark.parametrize(("seed", "signs"), [(0, 3), (2, 2), (3, 3), (4, 3), (8, 3), (14, 3), (15, 3)])
@@ -165,8 +164,8 @@ def plane_case(seed, n_samples):
 
 def plane_result(seed, n_samples):
     case = plane_case(seed, n_samples)
-    force_t, _, _, _, slip_work, _ = run_masses(case, case.predicted_h)
-    return (force_t @ case.basis.analysis)[0, 1:] / case.step_share, float(slip_work[0])
+    found = run_masses(case, case.predicted_h)
+    return (found.force_t @ case.basis.analysis)[0, 1:] / case.step_share, float(found.slip_work[0])
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -195,8 +194,8 @@ def test_a_stuck_mass_is_exactly_at_rest_and_wears_exactly_zero():
     held = case.predicted_h.copy()
     held[:, 0] = 0.0
     held[:, 0, 0] = 1e3
-    force_t, velocity_t, place_t, status_t, slip_work, error = run_masses(case, held)
-    assert (status_t == STICK).all()
-    for exactly_zero in (velocity_t, place_t, slip_work, error):
+    found = run_masses(case, held)
+    assert (found.status_t == STICK).all()
+    for exactly_zero in (found.start, found.state_t, found.slip_work, found.change):
         assert not exactly_zero.any()
-    assert force_t == pytest.approx(case.predicted_t(held), rel=1e-14)
+    assert found.force_t == pytest.approx(case.predicted_t(held), rel=1e-14)
