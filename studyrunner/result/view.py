@@ -46,7 +46,7 @@ class Result(Points):
     of several, and how many the file has. blocks: of a result of missions what belongs to single blocks; in `dataset`
     missions then have the name of the cycles that they replace. chosen: values of axes of the point that figures of a
     single point show. measured: a worn profile to compare with. again: what was computed anew of the worn joint of the
-    shown point, see `studyrunner.worn_joint`.
+    shown point, see `studyrunner.worn_joint`. no_worn_response: why its response curve is not among them.
     """
 
     path: Path
@@ -56,6 +56,7 @@ class Result(Points):
     chosen: Mapping[str, float | str] = field(default_factory=dict)
     measured: Profile | None = None
     again: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    no_worn_response: str = ""
 
     # --- the file ---
 
@@ -220,8 +221,15 @@ def as_sentences(*parts: str) -> str:
 def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
     """The dataset with missions as cycles and without what belongs to single blocks, and these variables.
 
-    Of a result without missions the dataset as it is, and None.
+    Of a result without missions the dataset as it is, and None. Responses with a unit of their own in their name, as
+    root stress [MPa], are left out: the others are displacements, which share a scale.
     """
+    if "response" in dataset.coords:
+        own = np.char.endswith(dataset["response"].values.astype(str), "]")
+        if own.any() and not own.all():
+            close = dataset.close
+            dataset = dataset.isel(response=np.flatnonzero(~own))
+            dataset.set_close(close)
     if "block" not in dataset.dims:
         return dataset, None
     renamed = dataset.rename({name: new for name, new in _LIKE_CYCLES.items() if name in dataset.variables})
