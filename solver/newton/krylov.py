@@ -53,8 +53,8 @@ def solve_gmres(
         def enough(hessenberg: FloatArray, first: float = first, null: FloatArray = null) -> bool:
             # the residual is the part of `first` along the left null vector of the Hessenberg matrix
             k = hessenberg.shape[1]
-            below = hessenberg[k, -1]
-            null[k] = -(null[:k] @ hessenberg[:k, -1]) / below if below else np.nan
+            along, below = float(null[:k] @ hessenberg[:k, -1]), float(hessenberg[k, -1])
+            null[k] = -along / below if below else along * math.inf
             norms.append(first / math.sqrt(null[: k + 1] @ null[: k + 1]))
             return norms[-1] <= wanted or _stagnates(norms)
 
