@@ -11,13 +11,13 @@ the print has the opposite sign in the normal test). With x' the state at the sa
 - stick, `|p_T - x'| < mu p_N`: `lambda_T = p_T - x'`, `x = x'`;
 - slip otherwise: `lambda_T = mu p_N n` along `n = (p_T - x') / |p_T - x'|`, `x = p_T - lambda_T`.
 
-So the friction force is the projection of a trial force on a disc of radius `mu p_N`, for elastic pairs and for masses
-on sliders. The derivative of the friction force of a slipping pair is
+So the friction force is the projection of a trial force on a disc of radius `mu p_N`, also for masses on sliders. Its
+derivative during slip is
 
     d lambda_T = mu n d p_N + (mu p_N / |p_T - x'|) (1 - n n^T) (d p_T - d x').
 
-The law takes the normal force at the sample. The harmonics of the normal force, Eqs. (11), (12), are computed from its
-means around each sample (`closed_fraction`).
+The law takes the normal force at the sample; its harmonics, Eqs. (11), (12), are those of its means around each sample
+(`closed_fraction`).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The contact law of all pairs of a joint through one period, its exact derivative, and the motion that goes with it.
 
 Alternating frequency-time method: predicted force to samples, contact law, contact force back to harmonics. Two kinds
-of pairs stand behind the methods of `ContactLaw`. `solver.structure.penalty` chooses the kind, no other room asks:
+of pairs stand behind the methods of `ContactLaw`; `solver.structure.penalty` chooses the kind:
 
 - *elastic* pairs, at displacement level: Eqs. (9)-(15), motion `(p - lambda) / eps` (`period_march`);
 - *inertial* pairs, masses that sit directly on rigid ground: motion by Newton's law (`rigid_slider`). Their tangential
@@ -66,15 +66,9 @@ class Marched:
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """The law of the pairs of a joint at one frequency: predicted force to contact force, motion and history.
+    """The law of the pairs of a joint at one frequency omega, rad/s: predicted force to contact force, motion, history.
 
-    - penalty: penalties and masses of the pairs.
-    - friction_coefficient (n_contact,): for each pair.
-    - contact: the pairs.
-    - basis: Fourier basis.
-    - omega: rad/s.
-
-    Harmonics are on the axis of length m = 2H+1.
+    friction_coefficient: (n_contact,). Harmonics are on the axis of length m = 2H+1.
     """
 
     penalty: Penalty
@@ -189,8 +183,7 @@ class ContactLaw:
         1 / eps for elastic pairs; for inertial pairs exactly as in the steps of the march.
         """
         penalty, masses, orders = self.penalty, self.penalty.inertial, np.array(self.basis.orders, np.float64)
-        own = 1.0 / np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)
-        found = np.repeat(own[:, :, None].astype(complex), orders.size + 1, axis=2)
+        found = np.repeat(1.0 / penalty.stiffness[:, :, None].astype(complex), orders.size + 1, axis=2)
         if masses.any() and orders.size:
             angle = np.pi * orders / self.basis.n_samples
             mass, drag, mean = (part[masses, None] for part in (penalty.mass, penalty.drag, penalty.mean))
@@ -254,7 +247,7 @@ class ContactLaw:
         changed = np.where(masses[:, None], mean, last)
         return np.where((other.inertial == masses)[:, None], history, changed)
 
-    # --- what masses on rigid ground have beside a periodic motion: ratcheting, and harmonics above the highest one ---
+    # --- masses on rigid ground: ratcheting, and harmonics above the highest one ---
 
     def drift(self, at: Marched) -> FloatArray:
         """Distance (n_contact, 2), m, by which the inertial pairs move on in a period; 0 for elastic pairs."""

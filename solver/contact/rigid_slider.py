@@ -1,17 +1,15 @@
 """Friction of a mass that sits directly on a slider, through one period. Floats and arrays only.
 
-A rigid Coulomb force jumps where the mass turns. So the harmonics of the force fall as 1/n, and the harmonics of the
-motion as 1/n^3: a balance of a few harmonics is wrong by some per cent. Above the highest harmonic H, however, the
-structure acts by its mass alone. So the motion of such a pair is marched through the period,
+A rigid Coulomb force jumps where the mass turns, so that its harmonics fall as 1/n only and a balance of a few
+harmonics is wrong by some per cent. Above the highest harmonic H, however, the structure acts by its mass alone. So
+the motion of such a pair is marched through the period,
 
     m v' + c v = p - lambda,                       lambda = projection on the friction disc, against the motion,   (*)
 
-where p is the predicted force of the pair. The harmonics of p up to H are the unknowns of the balance. Equation (*)
-defines their motion, `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`, without truncation. The harmonics of lambda
-above H act on the mass m in the march, as in the structure, up to a relative error of `k / (n w)^2 m`.
-So p corresponds to the paper's `F_r - Z_r u + eps u` with `eps -> (i n w)^2 m + i n w c`, and the march supplies the
-harmonics above H. The drag c removes the influence of the start of the period. The drag is part of p and of the
-march, and cancels up to H.
+where p is the predicted force of the pair, whose harmonics up to H are the unknowns of the balance. Equation (*) gives
+their motion, `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`: p is the paper's `F_r - Z_r u + eps u` with
+`eps -> (i n w)^2 m + i n w c`. The harmonics of lambda above H act on the mass m in the march, as in the structure, up
+to a relative error of `k / (n w)^2 m`. The drag c, in p and in the march alike, removes the influence of the start.
 
 In a step of length dt the force p (mean over the step) and the friction limit are constant. The instant in the step at
 which the mass turns or comes to rest is resolved, so that the residual is smooth and the error of second order in dt.

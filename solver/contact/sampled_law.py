@@ -66,7 +66,7 @@ def sampled_law(law: ContactLaw, at: Marched, pairs: IntArray) -> SampledLaw:
     """Derivative of the contact law of the switching pairs (p,) of a state."""
     n, penalty = at.status_t.shape[1], law.penalty
     own, carried = sample_tangents(law, at)
-    eps = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)[pairs, None, :]
+    eps = penalty.stiffness[pairs, None, :]
     there = law.contact.dofs[pairs] >= 0
     # a displacement that does not exist has no disturbance of the force
     passed = np.where(there[:, :, None] & there[:, None, :], own[:, pairs], -np.eye(3) * ~there[:, :, None])
