@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, relieved_history
 from solver.continuation.natural import NEAR_ITERATIONS
@@ -14,7 +15,7 @@ from solver.continuation.static_state import predicted_at_rest, solve_static_sta
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, history_at_rest
 from solver.loading_history.path import FREE_STEP, choose_resolution, largest_change
-from solver.loading_history.sweep import Step
+from solver.loading_history.path_of_states import Step
 from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import FloatArray, ReducedModel
 from solver.modes.modal_model import linear_mode, modal_model
@@ -110,16 +111,16 @@ class ModePath:
         """As in Path."""
         return self.problem.move(state, other.problem, run)
 
-    def choose(self, state: ModeState, run: Run) -> tuple[ModePath, ModeState, bool, float]:
+    def choose(self, state: ModeState, run: Run) -> tuple[ModePath, ModeState, Estimate]:
         """As in Path."""
         joint = self.problem.joint_of(state.values)
         chosen = choose_resolution(self.problem.case_of(state.values), joint, state.state, run)
         other = self.at(chosen.case.resolution)
         moved = state if chosen.case.resolution == self.case.resolution else self.move(state, other, run)
         # the error of the first response is judged in a sweep of the frequency only
-        return (self, state, False, 0.0) if moved is None else (other, moved, chosen.accurate, 0.0)
+        return (self, state, NOTHING) if moved is None else (other, moved, NOTHING)
 
-    def suffices(self, _: ModeState, __: bool, ___: Run) -> bool:
+    def suffices(self, _: ModeState, __: float, ___: ModeState) -> bool:
         """As in Path: harmonics are chosen anew."""
         return False
 

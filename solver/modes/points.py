@@ -22,7 +22,8 @@ from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.sweep import Path, Step, Sweep
+from solver.loading_history.path_of_states import Path, Step
+from solver.loading_history.sweep import Sweep
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import natural_frequencies
 from solver.modes.mode_balance import ModeProblem, ModeState
