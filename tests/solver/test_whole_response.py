@@ -91,18 +91,6 @@ def exact_orbit(curve, index):
     return found
 
 
-def multipliers_of(orbit):
-    """Multipliers of an exact motion, by differences of its period map."""
-    y, name, system = orbit.segments[0].start, orbit.segments[0].phase, orbit.system
-    columns = []
-    for place in range(2):
-        step = 1e-7 * np.eye(y.size)[place]
-        ends = [system.advance(system.phase_at(name, y + s), y + s, system.period)[1] for s in (step, -step)]
-        columns.append((ends[0] - ends[1])[:2] / 2e-7)
-    found = np.linalg.eigvals(np.array(columns).T)
-    return found[np.lexsort((-found.imag, -abs(found)))]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("unstable", [False, True])
 def test_motions_and_multipliers_are_the_exact_ones_also_of_an_unstable_branch(unstable):
@@ -111,7 +99,7 @@ def test_motions_and_multipliers_are_the_exact_ones_also_of_an_unstable_branch(u
     index = (upper + lower) // 2 if unstable else 0
     orbit = exact_orbit(curve, index)
     assert abs(curve.response[index, 0]) == pytest.approx(abs(orbit.harmonic(0)), rel=5e-3)
-    np.testing.assert_allclose(curve.multipliers[index], multipliers_of(orbit), atol=0.03)
+    np.testing.assert_allclose(curve.multipliers[index], orbit.multipliers(), atol=0.03)
     assert curve.stability[index] == ("fold" if unstable else "stable")
     np.testing.assert_allclose(
         np.exp(curve.exponents[index] / curve.frequency[index]), curve.multipliers[index], rtol=1e-12
