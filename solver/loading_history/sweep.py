@@ -304,6 +304,7 @@ class Sweep(Generic[S]):
         self.state = replace(self.state, nodes=Nodes(path.case.resolution, (state,)))
         if before is not None and not self._begin_reference(before[0], before[1][-1]):
             self._begin_reference(path, state)
+            self.state = replace(self.state, skipped=())
 
     def _save(self) -> None:
         """Save the current node, and drop all that a resumed sweep would not have."""
