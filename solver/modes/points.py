@@ -1,7 +1,7 @@
 """The points of a nonlinear mode at given amplitudes, each with its errors, or the reason where there is none.
 
 The errors of frequency and damping are, as those of a start state, the change with more harmonics and samples, times a
-safety factor, and the difference to the reference sweep, whose steps in amplitude are twice as long.
+safety factor, and the difference to the reference sweep, whose steps in amplitude are three times as long.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.sweep import Path, Step, Sweep
+from solver.loading_history.path_of_states import Path, Step
+from solver.loading_history.sweep import Sweep
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.mode import ModeState, NonlinearMode
 from solver.modes.mode_start import TOP_BASE, Rest, find_rest
