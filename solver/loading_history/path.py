@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.accuracy.harmonic_levels import shifted
-from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens
-from solver.accuracy.refinement import NODE_UNKNOWNS, Refined, refine
+from solver.accuracy.refinement import KEPT_FRACTION, NODE_UNKNOWNS, TWO_LEVELS_SAFETY, Refined, refine
 from solver.accuracy.resolved_state import ResolvedState
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
@@ -218,8 +217,8 @@ class LoadingPath:
         if not case.model.holds(above.highest):
             return False
         better = _moved(case, joint, state, above, run, 1)
-        error = ResolvedState(case, joint, state).difference(better).times(ACCURACY.two_levels_safety).largest
-        least = 0.0 if fewest else ACCURACY.kept_fraction**2 * settings.rtol
+        error = ResolvedState(case, joint, state).difference(better).times(TWO_LEVELS_SAFETY).largest
+        least = 0.0 if fewest else KEPT_FRACTION**2 * settings.rtol
         return bool(error >= least and (at_limit or error <= settings.rtol))
 
     def describe(self, state: State) -> str:

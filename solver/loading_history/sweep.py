@@ -24,7 +24,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from solver.accuracy.harmonic_levels import fewer
-from solver.accuracy.options import ACCURACY
+from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.harmonic_balance.state import Failure
 from solver.march.steps import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.newton.run import Budget, Run
@@ -319,7 +319,7 @@ class Sweep(Generic[S]):
         )
         if self.with_reference:
             self._lead_reference(before, step)
-        if self.path.differs(self.state.checked, step.state) > ACCURACY.vibration_recheck:
+        if self.path.differs(self.state.checked, step.state) > VIBRATION_RECHECK:
             if self.path.suffices(step.state, self.state.at_limit, self.run):
                 self.state = replace(self.state, checked=step.state)
             else:
