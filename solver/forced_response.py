@@ -9,18 +9,18 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solver.harmonic_balance.response_peak import largest_responses
 from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import Direction
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
-from solver.outcome import Outcome
+from solver.outcome import Outcome, known_to
 from solver.presentation import PresentedResponse
-from solver.results.history import WearHistory
+from solver.results.cut_off import describe_cut_off, first_cut_off
+from solver.results.history import StartState
+from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
-from solver.structure.joint import friction_of_pairs
-from solver.wear.history import integrate_wear
-from solver.wear.solutions import SlowTime
-
-_START = np.zeros(1)  # the only cycle count
+from solver.structure.fourier import to_complex
+from solver.structure.joint import build_case, friction_of_pairs
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,22 +91,40 @@ def frequency_response(
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     model = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
-    found: dict[int, WearHistory] = {}
-    branch = follow_branch(model, friction, load, ascending, sweep, settings)
-    for index, start in branch:
-        # a state is a wear history with cycle 0 alone
-        found[index] = integrate_wear(model, friction, settings, start, SlowTime(0.0, "implicit", _START, 1.0))
-    points = [found[index] for index in place.tolist()]
+    found = dict(follow_branch(model, friction, load, ascending, sweep, settings))
+    starts = [found[index] for index in place.tolist()]
+    response, peak, outcome, message = zip(*(_read(model, friction, settings, start) for start in starts), strict=True)
     return FrequencyResponse(
         frequency=wanted,
-        response=np.array([point.response[0] for point in points]),
-        response_peak=np.array([point.response_peak[0] for point in points]),
-        response_error=np.array([point.response_error[0] for point in points]),
-        outcome=tuple(point.outcome for point in points),
-        message=tuple(point.message for point in points),
-        branch=np.array([point.branch for point in points], np.int64),
-        fold_frequency=np.array([point.fold_frequency for point in points]),
+        response=np.array(response),
+        response_peak=np.array(peak),
+        response_error=np.array([math.nan if start.state is None else start.response_error for start in starts]),
+        outcome=outcome,
+        message=message,
+        branch=np.array([start.branch for start in starts], np.int64),
+        fold_frequency=np.array([start.fold_frequency for start in starts]),
     )
+
+
+def _read(
+    model: ReducedModel, friction: float | FloatArray | None, settings: SolverSettings, start: StartState
+) -> tuple[ComplexArray, FloatArray, Outcome, str]:
+    """Response, peak, outcome and message of a point, as in `FrequencyResponse`."""
+    state, outcome, message = start.state, start.outcome, start.message
+    if state is None:
+        nothing = np.full(len(model.response_names), np.nan)
+        return nothing.astype(np.complex128), nothing, outcome, message
+    case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
+    joint = case.joint(state.omega, state.excitation_amplitude)
+    at = evaluated(joint, state)[1]
+    pressure = state.contact_force_h[:, 0, 0] / model.contact.area
+    if not math.isnan(first_cut_off(model.contact, np.zeros(1), pressure[None], state.wear_depth[None])):
+        outcome, message = Outcome.CONTACT_CUT_OFF, describe_cut_off(0.0)
+    elif outcome is Outcome.INACCURATE:
+        error, name = max((start.wear_rate_error, "wear rate"), (start.response_error, "response"))
+        message = f"the {name} {known_to(error, settings.rtol)}"
+    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
+    return response, largest_responses(joint, at), outcome, message
 
 
 def check_case(

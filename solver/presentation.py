@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from solver.model import FloatArray
 from solver.outcome import Outcome
 
 if TYPE_CHECKING:
@@ -27,6 +25,7 @@ _OF_VALUES = {
     "open_fraction": ("contact", "1"),
     "slip_fraction": ("contact", "1"),
     "response": ("response", "m"),
+    "response_mean": ("response", "m"),
     "response_peak": ("response", "m"),
     "shape": ("displacement", "m"),
     "loop_displacement": ("loop phase component", "m"),
@@ -44,6 +43,7 @@ _OF_VALUES = {
     "response_peak_begin": ("block response", "m"),
     "response_peak_end": ("block response", "m"),
     "amplitude": ("", "m kg^0.5"),
+    "excitation_amplitude": ("", "N"),
 }
 """Dimensions after the first one, and unit; of all others no dimension and "1"."""
 
@@ -56,13 +56,20 @@ _OF_MISSIONS = {
 """All dimensions of values that belong to blocks or steps of missions."""
 
 
+NOT_IN_DATASETS = {"dataset": False}
+"""Metadata of a field that is no array of numbers or words."""
+
+
 class Presented:
     """A result over one dimension.
 
-    OVER: attribute with the values of this dimension, and name of the dimension in a Dataset.
+    OVER: name of the attribute with the values of this dimension, and name of the dimension in a Dataset.
+    SHOWN: three attributes that the text shows. DRAWN: attributes that the picture shows, each on an axis of its own.
     """
 
     OVER: ClassVar[tuple[str, str]]
+    SHOWN: ClassVar[tuple[str, str, str]]
+    DRAWN: ClassVar[tuple[str, ...]]
 
     def to_xarray(self) -> xr.Dataset:
         """All values, named as here, in SI units; `outcome` as words. Responses stay complex."""
@@ -72,7 +79,7 @@ class Presented:
         points = getattr(self, name)
         data: dict[str, Any] = {}
         for field in fields(self):  # type: ignore[arg-type]
-            if field.name == name:
+            if field.name == name or not field.metadata.get("dataset", True):
                 continue
             value = getattr(self, field.name)
             others, units = _OF_VALUES.get(field.name, ("", "1"))
@@ -89,135 +96,90 @@ class Presented:
         return xr.Dataset(data, {over: (over, points, {"units": _OF_VALUES.get(name, ("", "1"))[1]})})
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draws the main value over the dimension, into new axes of matplotlib if none are given. Returns the axes."""
-        if axes is None:
-            from matplotlib import pyplot
-
-            axes = pyplot.subplots()[1]
-        self._draw(axes)
+        """Draws the main values over the dimension, into new axes of matplotlib if none are given. Returns the axes."""
+        axes = axes or _new_axes()
+        at = getattr(self, self.OVER[0])
+        order = np.argsort(at)
+        for number, name in enumerate(self.DRAWN):
+            panel, values = axes.twinx() if number else axes, np.abs(getattr(self, name))[order]
+            panel.plot(at[order], values, f"C{number}" if number else "", marker=".")
+            if name == "worn_volume":
+                error = getattr(self, f"{name}_error")[order] * values
+                panel.fill_between(at[order], values - error, values + error, alpha=0.2)
+            panel.set_ylabel(f"{name.replace('_', ' ')} in {_OF_VALUES.get(name, ('', '1'))[1]}")
+        axes.set_xlabel(self.OVER[1].replace("_", " "))
         axes.grid(alpha=0.3)
         return axes
 
     def __repr__(self) -> str:
-        """Five lines."""
-        (_, first), *rows = self._rows()
-        return "\n".join((f"{type(self).__name__}: {first}", *(f"  {label:<12} {text}" for label, text in rows)))
+        """Five lines: points and outcomes, the ranges of three values, a message."""
+        own: Any = self
+        points, outcomes = getattr(self, self.OVER[0]), own.outcome
+        ends, messages = (each if isinstance(each, tuple) else (each,) for each in (outcomes, own.message))
+        counts = Counter(ends)
+        words = ", ".join(
+            f"{number} {outcome}" if len(ends) > 1 else str(outcome) for outcome, number in counts.items()
+        )
+        rows = [(name, _span(getattr(self, name), _OF_VALUES.get(name, ("", "1"))[1])) for name in self.SHOWN]
+        rows.append(("message", next((text for text in messages if text), "none")))
+        first = f"{type(self).__name__}: {self.OVER[1]} {_span(points, '')}: {words}"
+        return "\n".join((first, *(f"  {name:<18} {text}" for name, text in rows)))
 
-    def _rows(self) -> Sequence[tuple[str, str]]:
-        raise NotImplementedError
 
-    def _draw(self, axes: Axes) -> None:
-        raise NotImplementedError
+def _new_axes() -> Axes:
+    from matplotlib import pyplot
+
+    axes: Axes = pyplot.subplots()[1]
+    return axes
+
+
+def _span(values: Any, unit: str) -> str:
+    """Smallest and largest magnitude."""
+    known = np.abs(values)[~np.isnan(values)]
+    if not known.size:
+        return "none"
+    lowest, highest = float(known.min()), float(known.max())
+    words = f"{lowest:.6g}" if lowest == highest else f"{lowest:.6g} to {highest:.6g}"
+    return words if unit in ("", "1") else f"{words} {unit}"
 
 
 class PresentedHistory(Presented):
     """A wear history or a mission history."""
 
-    def _rows(self) -> Sequence[tuple[str, str]]:
-        own: Any = self
-        name, over = self.OVER
-        missions = over == "mission"
-        known = np.flatnonzero(np.isfinite(own.worn_volume))
-        reached = own.last_mission if missions else own.last_cycle
-        n_pairs = own.wear_depth.shape[1]
-        pairs = f"{n_pairs} contact pair" + "s" * (n_pairs != 1)
-        first = f"{own.outcome}, {reached:g} of {getattr(self, name)[-1]:g} {name}, {pairs}"
-        computed = ("computed", f"{own.newton_iterations} Newton iterations, {own.run_time:.3g} CPU s")
-        last = ("message", own.message) if own.message else computed
-        if not known.size:
-            return [("", first), ("worn volume", "none"), ("deepest", "none"), ("response", "none"), last]
-        end = known[-1]
-        depth = own.wear_depth[end]
-        response = own.response_end[:, -1] if missions else own.response
-        largest = np.abs(response[[known[0], end]]).max(axis=1)
-        within = f"within {100.0 * own.worn_volume_error[end]:.2g} %"
-        return [
-            ("", first),
-            ("worn volume", f"{1e9 * own.worn_volume[end]:.4g} mm3, {within}"),
-            ("deepest", f"{1e6 * depth.max():.4g} um, contact pair {depth.argmax()}"),
-            ("response", f"{largest[0]:.4g} m at first, {largest[1]:.4g} m at last (first harmonic)"),
-            last,
-        ]
-
-    def _draw(self, axes: Axes) -> None:
-        own: Any = self
-        name, _ = self.OVER
-        counts, volume = getattr(self, name), 1e9 * own.worn_volume
-        error = own.worn_volume_error * volume
-        (line,) = axes.plot(counts, volume)
-        axes.fill_between(counts, volume - error, volume + error, color=line.get_color(), alpha=0.2, label="error")
-        axes.set(xlabel=name, ylabel="worn volume in mm3", title=str(own.outcome))
+    SHOWN = ("worn_volume", "worn_volume_error", "wear_depth")
+    DRAWN = ("worn_volume",)
 
 
-class PresentedPoints(Presented):
-    """Independent points, each with an outcome of its own: a frequency response or a nonlinear mode."""
-
-    def _outcomes(self) -> str:
-        own: Any = self
-        counts = Counter(own.outcome)
-        return ", ".join(f"{number} {outcome}" for outcome, number in counts.items())
-
-    def _message(self) -> tuple[str, str]:
-        own: Any = self
-        return ("message", next((text for text in own.message if text), "none"))
-
-
-class PresentedResponse(PresentedPoints):
-    """A frequency response."""
+class PresentedResponse(Presented):
+    """A frequency response; each point has an outcome of its own."""
 
     OVER = ("frequency", "frequency")
+    SHOWN = ("response", "response_error", "fold_frequency")
+    DRAWN = ("response",)
 
-    def _rows(self) -> Sequence[tuple[str, str]]:
+
+class PresentedCurve(Presented):
+    """A response curve through folds, over its points; solid where it is stable."""
+
+    OVER = ("point", "point")
+    SHOWN = ("frequency", "excitation_amplitude", "response")
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """As for other results, over the parameter that changes along the curve."""
         own: Any = self
-        size = np.abs(own.response)
-        known = np.isfinite(size).any()
-        point, place = np.unravel_index(np.nanargmax(size), size.shape) if known else (0, 0)
-        largest = f"{size[point, place]:.4g} m at {own.frequency[point]:.6g} Hz, response {place} (first harmonic)"
-        return [
-            ("", f"{size.shape[0]} points, {_span(own.frequency)} Hz, {size.shape[1]} responses"),
-            ("outcome", self._outcomes()),
-            ("largest", largest if known else "none"),
-            ("error", f"within {100.0 * np.nanmax(own.response_error):.2g} %" if known else "unknown"),
-            self._message(),
-        ]
-
-    def _draw(self, axes: Axes) -> None:
-        own: Any = self
-        order = np.argsort(own.frequency)
-        lines = axes.plot(own.frequency[order], np.abs(own.response[order]), marker=".")
-        if len(lines) > 1:
-            axes.legend(lines, [f"response {place}" for place in range(len(lines))])
-        axes.set(xlabel="frequency in Hz", ylabel="response in m (first harmonic)")
+        axes = axes or _new_axes()
+        at, stable = getattr(self, own.parameter), np.array(own.stability) == "stable"
+        for size in np.abs(own.response).T:
+            (line,) = axes.plot(at, size, ":")
+            axes.plot(at, np.where(stable, size, np.nan), color=line.get_color())
+        label = f"{own.parameter.replace('_', ' ')} in {_OF_VALUES[own.parameter][1]}"
+        axes.set(xlabel=label, ylabel="response in m", title="solid where stable")
+        return axes
 
 
-class PresentedMode(PresentedPoints):
-    """A nonlinear mode over its amplitude."""
+class PresentedMode(Presented):
+    """A nonlinear mode over its amplitude; each point has an outcome of its own."""
 
     OVER = ("amplitude", "modal_amplitude")
-
-    def _rows(self) -> Sequence[tuple[str, str]]:
-        own: Any = self
-        known = np.isfinite(own.frequency)
-        errors = (np.max(own.frequency_error[known], initial=0.0), np.max(own.damping_error[known], initial=0.0))
-        return [
-            ("", f"{known.size} points, {_span(own.amplitude)} m sqrt(kg), {self._outcomes()}"),
-            ("frequency", f"{_span(own.frequency[known])} Hz" if known.any() else "none"),
-            ("damping", f"{_span(100.0 * own.damping_ratio[known])} %" if known.any() else "none"),
-            ("error", f"within {errors[0]:.2g} Hz, {100.0 * errors[1]:.2g} % of critical damping"),
-            self._message(),
-        ]
-
-    def _draw(self, axes: Axes) -> None:
-        own: Any = self
-        order = np.argsort(own.amplitude)
-        amplitude, other = own.amplitude[order], axes.twinx()
-        axes.plot(amplitude, own.frequency[order], "C0", marker=".")
-        other.plot(amplitude, 100.0 * own.damping_ratio[order], "C1", marker=".")
-        axes.set_xlabel("modal amplitude in m sqrt(kg)")
-        axes.set_ylabel("natural frequency in Hz", color="C0")
-        other.set_ylabel("damping ratio in %", color="C1")
-
-
-def _span(values: FloatArray) -> str:
-    lowest, highest = float(values.min()), float(values.max())
-    return f"{lowest:.6g}" if lowest == highest else f"{lowest:.6g} to {highest:.6g}"
+    SHOWN = ("frequency", "damping_ratio", "damping_error")
+    DRAWN = ("frequency", "damping_ratio")

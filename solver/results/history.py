@@ -82,6 +82,7 @@ class WearHistory(PresentedHistory):
     - slip_range (n_output, n_contact): m.
     - open_fraction (n_output, n_contact): fraction of the period.
     - response (n_output, n_response): complex first harmonic, m.
+    - response_mean (n_output, n_response): mean over a period, m.
     - response_peak (n_output, n_response): m.
     - excitation_frequency (n_output,): frequency of the excitation, Hz; one value where the frequency follows nothing.
     - excitation_frequency_error (n_output,): its estimated absolute error, Hz; 0 for a given frequency.
@@ -131,6 +132,7 @@ class WearHistory(PresentedHistory):
     slip_range: FloatArray
     open_fraction: FloatArray
     response: ComplexArray
+    response_mean: FloatArray
     response_peak: FloatArray
     loop_displacement: FloatArray
     loop_force: FloatArray

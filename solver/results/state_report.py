@@ -9,15 +9,15 @@ from numba import njit
 
 from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
-from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.harmonic_balance.state import State
 from solver.model import ComplexArray, FloatArray
 from solver.packing import packable
 from solver.results.history import PeriodicState
 from solver.results.loops import contact_loops
-from solver.results.resonance import resonance_frequency
 from solver.settings import Resolution
+from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Joint
 
@@ -35,6 +35,12 @@ def periodic_state(joint: Joint, point: State) -> PeriodicState:
     )
 
 
+def evaluated(joint: Joint, state: PeriodicState) -> tuple[Balance, Evaluation]:
+    """The balance of a state of a joint whose gaps hold the wear, and its evaluation."""
+    balance = Balance(joint, state.start_history, np.zeros_like(state.wear_depth))
+    return balance, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
+
+
 @packable
 @dataclass(frozen=True)
 class StateReport:
@@ -50,6 +56,7 @@ class StateReport:
     slip_range: FloatArray
     open_fraction: FloatArray
     response: ComplexArray
+    response_mean: FloatArray
     response_peak: FloatArray
     loop_displacement: FloatArray
     loop_force: FloatArray
@@ -71,14 +78,7 @@ def report_state(
 ) -> StateReport:
     """Pressures, slip and responses of a converged state.
 
-    Parameters
-    ----------
-    joint, evaluation, certificate
-        The joint, its state, and the certificate of the state.
-    loops
-        Pairs with reported fretting loops.
-    with_resonance
-        Whether the resonance of the vibration is reported.
+    loops: pairs with reported fretting loops. with_resonance: whether the resonance of the vibration is reported.
     """
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
@@ -89,6 +89,7 @@ def report_state(
         slip_range=largest_distance(evaluation.state_t) / joint.law.state_stiffness,
         open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),
         response=to_complex(response_h)[:, 0],
+        response_mean=response_h[:, 0],
         response_peak=largest_responses(joint, evaluation),
         loop_displacement=loop_displacement,
         loop_force=loop_force,
@@ -98,6 +99,27 @@ def report_state(
         resonance=resonance,
         resonance_error=slope * certificate.response_error,
     )
+
+
+def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, float]:
+    """Resonance w_r of the vibration, rad/s, and its relative change per relative change of the motion at most.
+
+    With x and F, the first harmonics of all displacements and of the excitation, `x^H` times Eq. (1) is
+    `w^2 x^H M x = Re x^H (K x + lambda) - Re x^H F`. At the resonance x with its contact forces needs no part of F in
+    phase with x: `w_r^2 = w^2 + Re (x^H F) / (x^H M x)`. For a linear oscillator w_r is the natural frequency, whatever
+    w is; for a joint that slips and opens a Rayleigh quotient with the contact forces of the state. The change is
+    `|x^H F| / (2 w_r^2 x^H M x)`. Both are NaN where no mass moves, or where w_r^2 is not positive.
+    """
+    linear = joint.model.harmonic_structure(1)
+    relative, _ = relative_indices(joint.contact)
+    force = joint.excitation_amplitude * linear.load_harmonic
+    first = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
+    moved = whole_motion(linear, 1j * joint.omega, relative, force, first)
+    inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
+    if not inertia > 0.0:
+        return float("nan"), float("nan")
+    square = joint.omega**2 + work.real / inertia
+    return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2
 
 
 @njit(cache=True)

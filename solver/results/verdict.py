@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from solver.model import IntArray
-from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
+from solver.outcome import SENSITIVE_ERROR, Outcome, in_digits, known_to
 from solver.results.cut_off import describe_cut_off
 from solver.results.history import WearHistory
 
@@ -17,17 +17,9 @@ this fraction at most, far below any rtol. Dovetail, friction 0.3, 1 N: 5e-7 to 
 def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0) -> tuple[Outcome, str]:
     """Outcome of a complete history, judged at some of its counts, and a sentence about the outcome.
 
-    Parameters
-    ----------
-    history
-        The history that was integrated.
-    rows
-        Indices of the judged counts, ascending: all counts, or those of another history that is read from this one.
-    rtol
-        Wanted relative error.
-    slower
-        Ratio of the wear coefficients of the other and the integrated history: counts of the integrated history are
-        so many times larger.
+    rows: indices of the judged counts, ascending: all counts, or those of another history that is read from this one.
+    rtol: wanted relative error. slower: ratio of the wear coefficients of the other and the integrated history: counts
+    of the integrated history are so many times larger.
     """
     if not rows.size:
         return Outcome.CONVERGED, ""
@@ -38,7 +30,9 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
         return Outcome.CONTACT_CUT_OFF, describe_cut_off(history.cut_off_cycle / slower)
     error = float(history.worn_volume_error[last])
     if error > SENSITIVE_ERROR:
-        return Outcome.SENSITIVE, "; ".join((_two_volumes(history, last, error, rtol), *remarks))
+        volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
+        coarser = "with longer steps, fewer harmonics and a coarser sweep"
+        return Outcome.SENSITIVE, "; ".join((describe_uncertain(*volumes, error, rtol, coarser), *remarks))
     # inf means "never", but is the count of a final state, too
     if math.inf > history.inaccurate_from <= history.cycles[last]:
         begin = f"from cycle {history.inaccurate_from / slower:,.0f} on ".replace(",", " ")
@@ -60,21 +54,23 @@ def last_error(history: WearHistory, rows: IntArray, last: float) -> float:
     return float(history.worn_volume_error[rows[-1]])
 
 
-def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> str:
-    """Sentence about an uncertain worn volume: the values of the history and of its reference solution."""
-    volume, other = 1e9 * history.worn_volume[row], 1e9 * history.reference_volume[row]
+def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:
+    """Sentence about an uncertain worn volume, m3, beside that of the reference solution; NaN where that ended before.
+
+    coarser: what the reference solution is, in words.
+    """
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
-    coarser = "with longer steps, fewer harmonics and a coarser sweep"
+    own, its = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
     if not math.isfinite(other):
-        return f"worn volume {volume:.3g} mm3, {known}: {coarser} the history does not go so far"
+        return f"{own}, {known}: {coarser} the history does not go so far"
     if abs(volume - other) < 0.5 * error * volume:
-        return f"worn volume {volume:.3g} mm3, {known}: {other:.3g} mm3 {coarser}, but worn at other pairs or counts"
-    return f"worn volume {volume:.3g} mm3, but {other:.3g} mm3 {coarser}: {known}"
+        return f"{own}, {known}: {its}, but worn at other pairs or counts"
+    return f"{own}, but {its}: {known}"
 
 
 def describe_hold(cycle: float) -> str:
     """Sentence with the count from which on a joint that slides as a whole is held."""
     return (
-        f"from cycle {cycle:.6g} on every pair slips and only friction holds the joint in one direction: its mean"
-        f" position is held there, by at most {HELD_FORCE:g} of the friction"
+        f"from cycle {in_digits(cycle)} on every pair slips and only friction holds the joint in one direction: its"
+        f" mean position is held there, by at most {HELD_FORCE:g} of the friction"
     )

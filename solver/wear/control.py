@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.continuation.natural import follow_naturally
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import SMOOTH_CHANGE, follow_naturally
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
 from solver.march.steps import Lengths, take_step
@@ -272,7 +271,7 @@ def step_across(work: WearingJoint, state: WearState, shortest: float, end: floa
 
 def is_smooth(state: WearState, step: Step) -> bool:
     """Whether the vibration changes so little over a step that the branch does not end within the step."""
-    return vibration_change(state.point.evaluation, step.state.point.evaluation) < CONTINUATION.smooth_change
+    return vibration_change(state.point.evaluation, step.state.point.evaluation) < SMOOTH_CHANGE
 
 
 def allowed_error(share: float, before: float, after: float, count: float, length: float) -> float:

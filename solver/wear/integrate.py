@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.state import Failure
 from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, describe_error
@@ -96,7 +96,7 @@ class Integration:
         saved = budget.iterations
         while (ended := self._ended(state)) is None:
             n_steps += 1
-            if budget.iterations > self.most_iterations + CONTINUATION.near_iterations * n_steps:
+            if budget.iterations > self.most_iterations + NEAR_ITERATIONS * n_steps:
                 return state, Failure(Outcome.MARCH_FAILED)
             after = guarded(partial(self._one, state))
             if isinstance(after, Failure):

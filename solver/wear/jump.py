@@ -24,8 +24,7 @@ import numpy as np
 
 from solver.contact.coulomb import STICK
 from solver.continuation.natural import follow_naturally
-from solver.continuation.options import CONTINUATION
-from solver.continuation.transient import relax_to_periodic
+from solver.continuation.transient import SEARCH_ITERATIONS, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import BalanceAt, Failure, State, final_history, vibration_change
 from solver.model import FloatArray
@@ -44,7 +43,7 @@ def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -
 
     worn (n_contact,): depth of the new state, m. cycle: its count.
     """
-    work.run.budget.limit = work.run.budget.iterations + CONTINUATION.search_iterations
+    work.run.budget.limit = work.run.budget.iterations + SEARCH_ITERATIONS
     reached = _held(work, state, worn) or _on_another_branch(work, state, worn)
     work.run.budget.limit = float("inf")
     if isinstance(reached, Failure):

@@ -27,6 +27,7 @@ INTERPOLATED = (
     "slip_range",
     "open_fraction",
     "response",
+    "response_mean",
     "response_peak",
     "excitation_frequency",
     "excitation_frequency_error",
@@ -289,7 +290,7 @@ def no_output(n_outputs: int, n_contact: int, n_response: int, n_loops: int) -> 
     found: dict[str, Any] = dict.fromkeys(
         ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "depth_rate"), of_pairs
     )
-    found |= {"response": of_responses.astype(complex), "response_peak": of_responses}
+    found |= {"response": of_responses.astype(complex), "response_mean": of_responses, "response_peak": of_responses}
     found |= dict.fromkeys(("loop_displacement", "loop_force"), loops)
     frequencies = "excitation_frequency", "excitation_frequency_error"
     found |= dict.fromkeys((*CERTIFIED, *frequencies, "wear_rate", "local"), np.full(n_outputs, np.nan))

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
-from solver.accuracy.reference import RTOL_RATIO, coarser, finer
+from solver.accuracy.reference import RTOL_RATIO, coarser
 from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray
 from solver.outcome import Outcome
-from solver.packing import Packed, pack, packable
+from solver.packing import packable
 from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution, Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case
@@ -80,6 +80,22 @@ class SlowTime:
             return LargestDepth(*given, self.largest_depth)
         return Given(*given)
 
+    @property
+    def name(self) -> str:
+        """Tells apart histories from one start state with one wear coefficient and law."""
+        target = None if self.until is None else astuple(self.until)
+        return f"{self.scheme} {self.step!r} {self.largest_depth!r} {self.end!r} {target!r}"
+
+    def adaptive_to(self, reached: float) -> SlowTime:
+        """The adaptive history with which one with given steps is compared, that has come to the count `reached`.
+
+        Equal for all histories with given steps to one last count; to another end it is no longer than needed.
+        """
+        known = self.end < math.inf and self.until is None
+        cycles = self.cycles if known else np.array([0.0, reached])
+        never = None if self.until is None else replace(self.until, value=math.inf)
+        return replace(self, scheme="adaptive", step=math.inf, largest_depth=None, cycles=cycles, until=never)
+
     def last_step_end(self, last: float) -> float:
         """Count beyond which no adaptive step goes; last: last count of the integration."""
         return last if self.ends_at_last else math.inf
@@ -120,7 +136,7 @@ class Like:
 @packable
 @dataclass(frozen=True)
 class Saved:
-    """The progress of the computation of a history, from which the computation goes on.
+    """The progress of a history and its reference solution, from which both go on.
 
     state, n_steps, output, iterations: of the present integration.
     fine: the finished history, while its reference solution is integrated; else None.
@@ -137,10 +153,10 @@ class Saved:
 
 @dataclass
 class Solutions:
-    """Integrates a history and its reference solution, one after the other.
+    """Integrates a history and, where its steps are adaptive, its reference solution, one after the other.
 
     case, start, asked: as in `history.integrate_wear`; the start state exists.
-    keep: called from time to time with the packed progress; None for no calls.
+    keep: called from time to time with the progress; None for no calls.
     saved: progress to go on from; None to begin.
     began: CPU time, s, at which the computation would have begun without an interruption.
     """
@@ -148,7 +164,7 @@ class Solutions:
     case: Case
     start: StartState
     asked: SlowTime
-    keep: Callable[[Packed], None] | None = None
+    keep: Callable[[Saved], None] | None = None
     saved: Saved | None = None
     fine: Ended | None = field(init=False, default=None)
     began: float = field(init=False)
@@ -190,7 +206,7 @@ class Solutions:
         return replace(ended, failure=unstable or ended.failure, iterations=work.run.budget.iterations)
 
     def reference(self, fine: Ended) -> Ended:
-        """Integrate the reference solution of a history, for all counts at which both are compared or read."""
+        """Integrate the reference solution of an adaptive history, for all counts at which both are read."""
         assert fine.state is not None
         like = Like(fine.output.course.resolutions, fine.state.step_limit, fine.iterations)
         reached = min(fine.output.course.ends[-1], self.asked.end)
@@ -199,18 +215,17 @@ class Solutions:
         return self.follow(like, np.unique(counts[counts <= reached]), fine)
 
     def follow(self, like: Like, compared: FloatArray, fine: Ended | None = None) -> Ended:
-        """Integrate the reference solution of a history of which the start state may be another one.
+        """Integrate the reference solution of an adaptive history of which the start state may be another one.
 
         compared (n,): ascending counts at which it is read, the first 0.
         fine: the history, to be saved with the progress.
         """
         work, asked, end = self._joint(), self.asked, float(compared[-1])
-        other, ratio = (coarser, RTOL_RATIO) if asked.scheme == "adaptive" else (finer, 1.0)
-        resolutions = tuple((count, other(resolution, self.case.model)) for count, resolution in like.resolutions)
+        resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in like.resolutions)
         # a short history may consist of its first steps, which do not depend on rtol
         first = 2.0 if asked.ends_at_last else 1.0
         integration = Integration(
-            Adaptive(work, ratio * self.case.settings.rtol, asked.last_step_end(end), first, bounded=False),
+            Adaptive(work, RTOL_RATIO * self.case.settings.rtol, asked.last_step_end(end), first, bounded=False),
             PlainCheck(resolutions, with_resonance=self._shifts),
             DenseOutput(work.area, smooth=True, counts=compared),
             lambda state, n_steps: self._save(integration, state, n_steps, fine),
@@ -278,7 +293,7 @@ class Solutions:
         """Pass the progress of an integration to `keep`."""
         if self.keep is not None:
             iterations = integration.steps.work.run.budget.iterations
-            self.keep(pack(Saved(state, n_steps, integration.output.taken, iterations, fine, self.spent)))
+            self.keep(Saved(state, n_steps, integration.output.taken, iterations, fine, self.spent))
 
 
 def begin_reference(work: WearingJoint, start: StartState, step_limit: float) -> WearState:
@@ -297,5 +312,5 @@ def begin_reference(work: WearingJoint, start: StartState, step_limit: float) ->
     history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
     balance = Balance(work.at(begun), history, begun.depth)
     first = begun.point.evaluation.predicted_h
-    point = work.run.state(balance, first, most=CONTINUATION.near_iterations)
+    point = work.run.state(balance, first, most=NEAR_ITERATIONS)
     return begun if point is None else work.noted(replace(begun, point=point))

@@ -92,11 +92,10 @@ class Study(Section):
     @property
     def files(self) -> tuple[Path, ...]:
         """Files that a run of the study reads."""
-        found = [self.folder / Path(self.source).name]
-        found += [] if self.scene.path is None else [self.scene.path]
-        found += [] if self.scene.files is None else self.scene.files.all
-        found += [self.folder / self.scene.worn.result] if self.scene.worn and self.scene.worn.result else []
-        return tuple(found)
+        scene = self.scene
+        worn = scene.worn.result if scene.worn else ""
+        found = [self.folder / Path(self.source).name, *(scene.files.all if scene.files else ())]
+        return (*found, *([scene.path] if scene.path else ()), *([self.folder / worn] if worn else ()))
 
     @property
     def friction_coefficient(self) -> float | None:
@@ -129,7 +128,7 @@ class Study(Section):
         if isinstance(outputs, tuple):
             return outputs
         if self.to_the_end:
-            return tuple(float(number) for number in range(outputs))
+            return tuple(map(float, range(outputs)))
         if cycles == 0.0:
             return (0.0,)
         return (*(cycles * position / (outputs - 1) for position in range(outputs - 1)), cycles)
@@ -137,32 +136,31 @@ class Study(Section):
     @property
     def missions_kept(self) -> tuple[int, ...]:
         """Numbers of missions of the result, ascending; equally spaced, rounded to whole numbers."""
-        missions, outputs = self.slow_time.missions, self.slow_time.outputs
-        assert missions is not None
+        missions, outputs = self.slow_time.missions or 0, self.slow_time.outputs
         if isinstance(outputs, tuple):
-            return tuple(int(count) for count in outputs)
+            return tuple(map(int, outputs))
         spaced = (round(missions * position / max(1, outputs - 1)) for position in range(outputs))
         return tuple(sorted({*spaced, missions}))
 
     @property
     def harmonics(self) -> tuple[int | Automatic, ...]:
-        """Values of `harmonics`, from its axis or the one under [solver]; so for the other solver keys."""
-        return self.axes.harmonics or (self.solver.harmonics,)
+        """Values of `harmonics`, under [axes] or [solver]; so for the other solver keys."""
+        return self.axes.harmonics or self.solver.harmonics
 
     @property
     def samples(self) -> tuple[int | Automatic, ...]:
         """Values of `samples`."""
-        return self.axes.samples or (self.solver.samples,)
+        return self.axes.samples or self.solver.samples
 
     @property
     def tolerance(self) -> tuple[float, ...]:
         """Values of `tolerance`."""
-        return self.axes.tolerance or (self.solver.tolerance,)
+        return self.axes.tolerance or self.solver.tolerance
 
     @property
     def rtol(self) -> tuple[float, ...]:
         """Values of `rtol`."""
-        return self.axes.rtol or (self.solver.rtol,)
+        return self.axes.rtol or self.solver.rtol
 
     @property
     def given_harmonics(self) -> tuple[int, ...]:
@@ -173,7 +171,8 @@ class Study(Section):
     def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
         names = {} if self.axes.frequency_ratio is None else {"frequency": "frequency_ratio"}
-        found = {names.get(name, name): getattr(self.axes, name) for name in self.own_axes} | self.axes_of_parts
+        own = {names.get(name, name): self if name in SOLVER_AXES else self.axes for name in self.own_axes}
+        found = {name: getattr(table, name) or () for name, table in own.items()} | self.axes_of_parts
         if self.axes.modal_amplitude is None:
             return found
         worn = found.pop("cycle", (0.0,))
@@ -187,8 +186,7 @@ class Study(Section):
 
     def units(self, name: str) -> str:
         """Unit of an axis; "1" where it has none."""
-        of_scene = {axis.name: axis.units for axis in self.scene_axes}
-        return of_scene[name] if name in of_scene else COORDINATES[name].units
+        return {axis.name: axis.units for axis in self.scene_axes}.get(name) or COORDINATES[name].units
 
     @property
     def idle_axes(self) -> tuple[str, ...]:
@@ -199,4 +197,5 @@ class Study(Section):
     def own_axes(self) -> tuple[str, ...]:
         """Names of the axes that are neither keys of [scene] or [wear] nor samples."""
         used = (name for name in self.kind.axes if name not in self.idle_axes)
-        return (*used, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
+        several = [key for key in SOLVER_AXES if getattr(self.axes, key) or len(getattr(self.solver, key)) > 1]
+        return (*used, *several)

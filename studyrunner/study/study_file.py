@@ -6,29 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from pydantic import BaseModel
 
+from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter.section import flat_table
-from studyrunner.study.kinds import (
-    IDLE_FREQUENCY,
-    MODES,
-    Tables,
-    kind_of,
-    take_followed,
-    take_ratio,
-    take_unused,
-    with_idle_values,
-    without_idle_values,
-)
+from studyrunner.study.kinds import MISSIONS, MODES
 from studyrunner.study.mission import OWN_AXES, MissionBlock, check_used_axes, engine_frequency, read_blocks
-from studyrunner.study.mistakes import Mistakes, check_table, nearest_name
+from studyrunner.study.mistakes import Mistakes, check_table, close_name, nearest_name
 from studyrunner.study.overrides import override
-from studyrunner.study.realisation import check_draws, wrong_scatter
-from studyrunner.study.room_for_wear import with_room_for_wear, with_room_of_all
-from studyrunner.study.rules import check_rules, size_of_result
+from studyrunner.study.room_for_wear import with_room_for_wear
+from studyrunner.study.rules import check_rules, size_of_result, wrong_scatter
 from studyrunner.study.scene_axes import (
     SceneAxis,
     as_checked,
@@ -45,7 +35,7 @@ from studyrunner.study.sections import (
     SOLVER_AXES,
     VARIABLES,
     AxesSection,
-    OutputsSection,
+    SlowTimeSection,
     WearSection,
 )
 from studyrunner.study.study import Study
@@ -54,33 +44,24 @@ from studyrunner.study.toml_text import format_toml, read_toml, read_toml_file
 from studyrunner.study.worn import AXIS as WORN_AXIS
 from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError
+from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
-_MOST_WRONG_PARTS = 20
+Tables = dict[str, Any]
+
+_IDLE_FREQUENCY = 1.0  # Hz, where no point has a frequency of the axis
 _ON_REQUEST = ("scatter", "loading", "mission")
 _TABLES = ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", *_ON_REQUEST)
 
 
 def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Study:
-    """Read and check a study.
+    """Read and check a study; every default is filled in.
 
-    Parameters
-    ----------
-    study
-        Path of a TOML file or of a result file, or the name of a bundled study.
-    overrides
-        Values of keys by their dotted names, as `{"slow_time.cycles": 1e4, "axes.frequency": [210.0, 210.5]}`; numpy
-        arrays and tuples stand for lists. Or texts KEY=VALUE; VALUE is TOML or a bare word.
+    study: path of a TOML file or of a result file, or the name of a bundled study. overrides: values of keys by their
+    dotted names, as `{"slow_time.cycles": 1e4, "axes.frequency": [210.0, 210.5]}`, where numpy arrays and tuples stand
+    for lists; or texts KEY=VALUE, where VALUE is TOML or a bare word.
 
-    Returns
-    -------
-    Study
-        Every default filled in.
-
-    Raises
-    ------
-    UserError
-        Where there is no such study or something in it is wrong: for each mistake a line that says what would be right.
+    Raises UserError where there is no such study or something in it is wrong: a line for each mistake.
     """
     argument = str(study)
     path = _study_path(argument)
@@ -105,20 +86,19 @@ def bundled_studies() -> tuple[str, ...]:
 
 
 def _study_path(argument: str) -> Path:
-    path, names = Path(argument), bundled_studies()
+    path, names, remedy = Path(argument), bundled_studies(), ""
     try:
         if path.is_file():
             return path
         remedy = "give a TOML file: this is a folder" if path.is_dir() else ""
     except OSError as error:
         remedy = f"give a file that can be read: {error.strerror}"
-    if not remedy and (path.suffix == ".toml" or "/" in argument or "\\" in argument):
-        remedy = "there is no such file: give a TOML file or a bundled study"
-    if not remedy and argument not in names:
-        remedy = f"there is none of this name: give a TOML file or one of {', '.join(names)}"
-    if remedy:
-        raise UserError(argument, "the study", None, remedy)
-    return Path(str(resources.files("studies").joinpath(f"{argument}.toml")))
+    if not remedy and argument in names:
+        return Path(str(resources.files("studies").joinpath(f"{argument}.toml")))
+    is_file = path.suffix == ".toml" or "/" in argument or "\\" in argument
+    what = "no such file" if is_file else "none of this name"
+    remedy = remedy or f"there is {what}: give a TOML file or one of the bundled studies {', '.join(names)}"
+    raise UserError(argument, "the study", None, remedy)
 
 
 def _dict(table: Mapping[str, object], name: str) -> dict[str, Any]:
@@ -130,21 +110,17 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     """The study in a table as TOML has it, every default filled in. Raises UserError with all that is wrong."""
     found = Mistakes(origin.source)
     tables = _known_tables(table, found)
-    take_unused(tables, found)
-    moved = take_ratio(tables, found)
     _take_worn(tables, origin, found)
-    moved |= _move_solver_axes(tables, found)
     axes, blocks = _axes_and_blocks(tables, origin, found)
-    parts, renamed = [], {**moved, **keys_below_axes(axes)}
-    for number, part in enumerate(combinations(tables, axes) if axes else [tables]):
+    parts, renamed = [], keys_below_axes(axes)
+    for part in combinations(tables, axes):
         with found.collecting(renamed):
-            parts.append(_check_part(part, origin, blocks, found))
-        if number - len(parts) > _MOST_WRONG_PARTS:
-            break
+            checked = _check_part(part, origin, blocks, found)
+            parts.append(checked if found else _complete(checked))
     found.raise_any(table)
     study = parts[0]
     if axes:
-        study = study.model_copy(update={"scene_axes": as_checked(axes, parts), "variants": tuple(parts)})
+        study = study.model_copy(update={"scene_axes": as_checked(axes, study), "variants": tuple(parts)})
         for wrong in (*size_of_result(study), *wrong_scatter(study)):
             found.add(*wrong)
         found.raise_any()
@@ -159,7 +135,10 @@ def _known_tables(table: Mapping[str, object], found: Mistakes) -> Tables:
         if name not in _TABLES:
             meant = nearest_name(name, _TABLES)
             found.add(name, section, f"unknown table, give {meant}")
-            needed = [each for each in needed if each != meant]
+            if meant in tables and meant not in table and isinstance(section, dict):
+                # what it holds may be wrong as well
+                tables[meant] = dict(section)
+                needed = [each for each in needed if each != meant]
         elif name == "mission":
             tables[name] = section
         elif not isinstance(section, dict):
@@ -179,28 +158,13 @@ def _take_worn(tables: Tables, origin: Origin, found: Mistakes) -> None:
         return
     with found.collecting():
         tables["scene"]["worn"] = read_worn(worn, origin.source, origin.path.parent)
-        if kind_of(tables) is MODES and not tables["scene"]["worn"]["cycle"]:
+        if "modal_amplitude" in tables["axes"] and not tables["scene"]["worn"]["cycle"]:
             remedy = "missing: give the cycle count of each depth, which is the coordinate cycle of the modes"
             found.add("scene.worn.cycle", None, remedy)
 
 
-def _move_solver_axes(tables: Tables, found: Mistakes) -> dict[str, str]:
-    """Makes axes of the solver keys with several values. Returns for each of these axes the key that was given."""
-    solver, axes, moved = tables["solver"], tables["axes"], {}
-    for key in SOLVER_AXES:
-        value = solver.get(key)
-        if key in solver and key in axes:
-            found.add(f"solver.{key}", solver.pop(key), f"give it once, here or as axes.{key}")
-        elif isinstance(value, list) and len(value) == 1:
-            solver[key] = value[0]
-        elif isinstance(value, list | dict):
-            axes[key] = solver.pop(key)
-            moved[f"axes.{key}"] = f"solver.{key}"
-    return moved
-
-
 def _scene_kind(tables: Tables, origin: Origin) -> type[BaseModel] | None:
-    """What [scene] consists of; None where its model is wrong, which is said where the scene is checked."""
+    """What [scene] consists of; None where its model is wrong, which is a mistake where the scene is checked."""
     try:
         return parameters_of(tables["scene"].get("model"), origin.source)
     except UserError:
@@ -213,94 +177,99 @@ def _axes_and_blocks(
     """Axes that are keys of [scene] or [wear], taken out of the tables, and the blocks of a study of missions."""
     kind = _scene_kind(tables, origin)
     if kind is None:
-        for name in tables["axes"].keys() - AxesSection.model_fields.keys():
+        # of other names, which may be keys of the scene, nothing is known
+        for name in [name for name in tables["axes"] if not close_name(name, [*AxesSection.model_fields])]:
             del tables["axes"][name]
         return (), ()
     own = [name for name in tables["axes"] if name in OWN_AXES]
-    axes = take_scene_axes(tables, kind, WearSection, found)
+    axes = take_scene_axes(tables, kind, found)
     blocks: tuple[MissionBlock, ...] = ()
     if "mission" in tables:
         blocks = read_blocks(tables["mission"], tables["axes"], kind, found)
         check_used_axes([*own, *(axis.name for axis in axes)], blocks, found)
-    name = "cycle" if kind_of(tables) is MODES else WORN_AXIS
+    name = "cycle" if "modal_amplitude" in tables["axes"] else WORN_AXIS
     return (*axes, *worn_axis(tables["scene"].get("worn", {}), name)), blocks
 
 
-def _check_part(
-    tables: Tables, origin: Origin, blocks: tuple[MissionBlock, ...], before: Mistakes, *, room: bool = True
-) -> Study:
-    """A study without axes that are keys of [scene] or [wear].
+def _check_part(tables: Tables, origin: Origin, blocks: tuple[MissionBlock, ...], before: Mistakes) -> Study:
+    """A study without axes that are keys of [scene] or [wear], of tables that are right. Raises UserError.
 
-    before: mistakes because of which the study is not complete. room: whether scenes get room for what wears. Raises
-    UserError.
+    before: mistakes because of which tables are missing.
     """
     found, tables = Mistakes(origin.source), dict(tables)
     parts: dict[str, Any] = {"source": origin.source, "folder": origin.path.parent, "archived": origin.archived}
     if "scene" not in before:
         with found.collecting():
             parts["scene"] = check_scene(tables["scene"], origin)
-    if "mission" in tables and (of_blocks := _block_studies(tables, blocks, origin, before, found)):
-        parts |= {"mission": blocks, "block_studies": of_blocks}
-    parts["follow"] = take_followed(tables, found)
-    filled = with_idle_values(tables)
+    if "mission" not in tables or (of_blocks := _block_studies(tables, blocks, origin, before, found)):
+        parts |= {"mission": blocks, "block_studies": of_blocks if "mission" in tables else ()}
+    if _follows(tables):
+        tables.setdefault("loading", {})
+    scene = _scene_kind(tables, origin)
     for name, kind in SECTIONS.items():
-        if name in filled and name not in before:
-            scene = _scene_kind(tables, origin) if name == "axes" else None
-            others = () if scene is None else (*scene.model_fields, *WearSection.AXES)
+        if name in tables and name not in before:
+            others = (*scene.model_fields, *WearSection.AXES) if scene and name == "axes" else ()
             with found.collecting():
-                parts[name] = check_table(kind, filled[name], origin.source, name, others)
-    if "outputs" in parts:
-        parts["outputs"] = _with_usual_variables(parts, tables)
+                parts[name] = check_table(kind, tables[name], origin.source, name, others)
     study = Study.model_construct(**parts)
-    wrong = [name for name in filled if name not in parts]
+    wrong = [name for name in (*tables, "mission") if name not in parts]
     for name in wrong:
         # a rule that asks for it is left out
         vars(study).pop(name, None)
     check_rules(study, found, complete=not wrong)
     found.raise_any()
-    if before:
-        return study
-    if "mission" in tables:
-        outputs = {"outputs": study.outputs}
-        same = tuple(each.model_copy(update=outputs) for each in study.block_studies)
-        study = study.model_copy(update={"block_studies": same})
-    if room:
-        study = with_room_of_all(study) if study.mission else with_room_for_wear(study)
-    check_draws(study)
     return study
+
+
+def _follows(tables: Tables) -> bool:
+    return any(each in FOLLOWED for each in listed(tables["axes"].get("frequency")))
+
+
+def _complete(study: Study) -> Study:
+    """A right study with frequencies in numbers, variables by name, and scenes that have room for wear.
+
+    Ratios stand for frequencies until the natural frequencies of the scenes are known (`scene_set.at_ratios`).
+    """
+    axes, kind, names = study.axes, study.kind, set(study.outputs.variables)
+    frequency = axes.frequency_ratio or axes.frequency or (_IDLE_FREQUENCY,)
+    update: dict[str, object] = {}
+    if study.loading is not None:
+        low, high = study.loading.between
+        update["follow"] = FollowedFrequency(cast("Followed", frequency[0]), low, high)
+        frequency = (0.5 * low + 0.5 * high,)
+    if DEFAULT in names:
+        names |= {*(kind.usual if study.scatter is None else kind.of_samples)}
+        names |= {*(FOLLOWED_FREQUENCY if study.loading is not None else ())}
+        names |= {"mesh"} & {*study.scene.offers}
+    outputs = study.outputs.model_copy(update={"variables": tuple(name for name in VARIABLES if name in names)})
+    update |= {"axes": axes.model_copy(update={"frequency": frequency}), "outputs": outputs}
+    update |= {"slow_time": SlowTimeSection(cycles=0.0)} if kind is MODES else {}
+    update["block_studies"] = tuple(each.model_copy(update={"outputs": outputs}) for each in study.block_studies)
+    return with_room_for_wear(study.model_copy(update=update))
 
 
 def _block_studies(
     tables: Tables, blocks: Sequence[MissionBlock], origin: Origin, before: Mistakes, found: Mistakes
 ) -> tuple[Study, ...]:
-    """For each block a study of this block alone, without room for wear; none where a parameter of a block is wrong."""
+    """For each block a study of this block alone; none where a parameter of a block is wrong."""
     studies: list[Study] = []
     for block in blocks:
         own = {name: getattr(block, name) for name in OWN_AXES if isinstance(getattr(block, name), float)}
-        alone = {name: table for name, table in tables.items() if name != "mission"}
+        alone = {name: table for name, table in tables.items() if name not in ("mission", "loading")}
         alone["scene"] = {**tables["scene"], **block.parameters}
-        alone["axes"] = {"frequency": IDLE_FREQUENCY, **tables["axes"], **own}
+        unused = (*MISSIONS.unused["axes"], *(["frequency"] if _follows(tables) else []))
+        given = {key: value for key, value in tables["axes"].items() if key not in unused}
+        alone["axes"] = {"frequency": _IDLE_FREQUENCY, **given, **own}
         alone["slow_time"] = {}
         alone["outputs"] = {key: value for key, value in tables["outputs"].items() if key == "scene"}
         renamed = {f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}
         with found.collecting(renamed):
-            study = _check_part(alone, origin, (), before, room=False)
+            study = _check_part(alone, origin, (), before)
             if block.engine_order is not None:
                 frequency = engine_frequency(block, study.scene.parameters, origin.source)
                 study = study.model_copy(update={"axes": study.axes.model_copy(update={"frequency": (frequency,)})})
             studies.append(study)
     return tuple(studies) if len(studies) == len(blocks) else ()
-
-
-def _with_usual_variables(parts: Mapping[str, Any], tables: Tables) -> OutputsSection:
-    """[outputs] with variables in their order, the usual ones of such a study for the word that stands for them."""
-    outputs: OutputsSection = parts["outputs"]
-    names, kind = set(outputs.variables), kind_of(tables)
-    if DEFAULT in names:
-        names |= {*(kind.usual if tables.get("scatter") is None else kind.of_samples)}
-        names |= {*(FOLLOWED_FREQUENCY if parts["follow"] is not None else ())}
-        names |= {"mesh"} & {*(parts["scene"].offers if "scene" in parts else ())}
-    return outputs.model_copy(update={"variables": tuple(name for name in VARIABLES if name in names)})
 
 
 def format_study(study: Study) -> str:
@@ -315,8 +284,9 @@ def format_study(study: Study) -> str:
     tables["scene"] = {"model": scene["model"], **kept, "worn": _worn_states(study)}
     if study.follow is not None:
         axes["frequency"] = study.follow.of
-    if axes["frequency_ratio"] is not None:
-        del axes["frequency"]
+    used = {*study.own_axes, "modal_amplitude", "frequency_ratio"}
+    used -= set() if axes["frequency_ratio"] is None else {"frequency"}
+    axes = tables["axes"] = {name: values for name, values in axes.items() if name in used}
     for axis in study.scene_axes:
         if axis.key == ("worn",):
             continue
@@ -325,12 +295,14 @@ def format_study(study: Study) -> str:
             given, place = only_table(given[name]), place.setdefault(name, {})
         del given[axis.key[-1]]
         place[axis.key[-1]] = list(axis.values)
-    for key in SOLVER_AXES:
-        if axes[key] is not None:
-            del tables["solver"][key]
-    if study.mission:
-        tables["mission"] = [block.as_table() for block in study.mission]
-    return format_toml(without_idle_values(tables, study.kind, study.idle_axes))
+    solver = {key: value[0] if key in SOLVER_AXES else value for key, value in tables["solver"].items()}
+    tables["solver"] = {key: value for key, value in solver.items() if key not in study.own_axes}
+    axes |= {key: list(getattr(study, key)) for key in SOLVER_AXES if key in study.own_axes}
+    for table in ("slow_time", "wear"):
+        for key in study.kind.unused.get(table, ()):
+            del tables[table][key]
+    tables["mission"] = [block.as_table() for block in study.mission]
+    return format_toml(tables)
 
 
 def _worn_states(study: Study) -> dict[str, object] | None:

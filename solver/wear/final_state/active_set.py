@@ -34,8 +34,7 @@ import numpy as np
 
 from solver.accuracy.options import ACCURACY
 from solver.contact.coulomb import SEPARATED
-from solver.continuation.natural import follow_naturally
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import ATTEMPTS, follow_naturally
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, final_history
 from solver.model import BoolArray, FloatArray
@@ -118,7 +117,7 @@ def without(work: WearingJoint, state: WearState, unworn: FloatArray, off: BoolA
     joint, last = work.at(state), state.point
     margin = _margin(joint, last.evaluation, unworn, off)
     force_h = np.where(off[:, None, None], 0.0, last.evaluation.force_h)
-    for _ in range(CONTINUATION.attempts):
+    for _ in range(ATTEMPTS):
         depth = grazing_depth(joint, last.evaluation, unworn, off) + np.where(off, margin, 0.0)
         balance = Balance(joint, last.history, depth)
         found = work.run.solve(balance, balance.predict(last.evaluation.displacement_h, force_h))

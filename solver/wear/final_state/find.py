@@ -22,7 +22,7 @@ import numpy as np
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.reference import coarser
 from solver.clock import computing_time
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import ATTEMPTS
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import OutOfTimeError
@@ -126,7 +126,7 @@ def _solved(work: WearingJoint, state: WearState, check: FullCheck, share: float
     final = wear_off(work, unworn, unworn.depth, np.zeros(unworn.depth.size, bool), share)
     reason = not_cooperative(work, unworn, final, share)
     last = check(work, final.state)
-    for _ in range(CONTINUATION.attempts):
+    for _ in range(ATTEMPTS):
         if isinstance(last, Failure) or last[0].resolution == final.state.resolution:
             break
         # with other harmonics the pairs graze at other depths
