@@ -44,6 +44,8 @@ def draw_responses(result: Result) -> Drawn:
         return f"{result.no_worn_response or said}."
     if course is not None and result.cycles[0] != 0.0:
         return "The file holds no new joint: add 0 to slow_time.outputs."
+    if again is not None:
+        again = again.sel(response=list(result.responses))
     n_panels = min(len(result.responses), _MOST_RESPONSES)
     figure, panels = new_panels(n_panels, 1, 0.5 + 3.1 * n_panels, sharex=True)
     unit, told = str(result.dataset["response_amplitude"].attrs.get("units", "m")), ("", "")
