@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from studyrunner.result.units import show_cycles
 from studyrunner.result.view import Result, as_sentences
 from studyrunner.variables import CERTIFICATE
 
-_MOST_ROWS, _MOST_CELLS = 24, 400
+_MOST_ROWS, _MOST_CELLS, _LABEL_WIDTH = 24, 400, 20
 # what was computed to the end is light, so that what failed stands out
 _CONVERGED_COLOUR, _OTHERS = "#dfe7ef", (COLOURS[1], COLOURS[0], *COLOURS[2:], "#7f7f7f", "#F0E442")
 
@@ -32,7 +33,10 @@ def draw_outcomes(result: Result) -> Drawn:
     special = [number for number in present.tolist() if number != CONVERGED]
     colours = {number: _OTHERS[place % len(_OTHERS)] for place, number in enumerate(special)}
     cells = [colours.get(number, _CONVERGED_COLOUR) for number in present.tolist()]
+    labels = [textwrap.fill(label, _LABEL_WIDTH) if is_narrow() else label for label in choice.labels]
+    n_lines = sum(label.count("\n") for label in labels)
     figure, panel = new_panel(1.4 + 0.32 * len(field))
+    figure.set_figheight(1.4 + 0.32 * len(field) + 0.15 * n_lines)
     norm = BoundaryNorm([*(present - 0.5), present[-1] + 0.5], len(present))
     look: dict[str, Any] = {"edgecolors": "white", "linewidth": 0.8} if field.size <= _MOST_CELLS else {}
     across, down = (np.arange(size + 1) - 0.5 for size in field.shape[::-1])
@@ -41,7 +45,7 @@ def draw_outcomes(result: Result) -> Drawn:
     kept = np.arange(0, course.values.size, -(-course.values.size // (4 if is_narrow() else 9)))
     panel.set_xticks(kept, [f"{course.values[index]:.6g}" for index in kept])
     panel.set_xlabel(course.label)
-    panel.set_yticks(np.arange(len(choice.labels)), choice.labels)
+    panel.set_yticks(np.arange(len(labels)), labels)
     panel.tick_params(length=0)
     panel.spines[:].set_visible(False)
     words = {number: result.endings[number].word.replace("_", " ") for number in present.tolist()}
