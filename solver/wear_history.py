@@ -25,7 +25,6 @@ from solver.settings import (
     WearTarget,
 )
 from solver.structure.joint import friction_of_pairs
-from solver.wear.final_state.find import find_final_state
 from solver.wear.history import integrate_wear
 from solver.wear.solutions import SlowTime
 
@@ -72,8 +71,7 @@ def march_wear(
         `outputs`.
     scheme, step
         "adaptive" chooses its steps by `settings.rtol`. "implicit" and "explicit" take steps of `step` cycles, Eqs.
-        (23), (24). "final" seeks the final state, in which nothing wears any more, if possible without integration over
-        the slow time; it needs `cycles` = inf, and `final_method` of the history names the method.
+        (23), (24). "final" is "adaptive" to the final state, in which nothing wears any more; it needs `cycles` = inf.
     sweep
         Way to the unworn state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
     settings
@@ -139,8 +137,7 @@ def march_wear(
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
     stepping: Scheme = "adaptive" if scheme == "final" else scheme
     asked = SlowTime(per_pressure, stepping, read_at, length, law=law, until=until, follow=follow)
-    solve = find_final_state if scheme == "final" else integrate_wear
-    return solve(model, friction, settings, start, asked)
+    return integrate_wear(model, friction, settings, start, asked)
 
 
 def _check_frequency(

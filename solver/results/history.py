@@ -105,9 +105,6 @@ class WearHistory(PresentedHistory):
     - branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
     - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.rate_slope`); inf if
       there is no limit.
-    - final_method: method by which the scheme "final" has found the final state: "active_set" or "march"; empty for the
-      other schemes. A final state of an active set has the count inf, and no state between the unworn one and the
-      final one is known.
     - cut_off_cycle: first count at which a pair at an edge of the modelled contact (`ContactInterface.edge`) carries
       load or has worn, NaN if never.
     - reference_volume (n_output,): m3, worn volume of the reference solution; NaN beyond the end of this solution.
@@ -156,7 +153,6 @@ class WearHistory(PresentedHistory):
     branch: int = 0
     fold_frequency: float = math.nan
     step_limit: float = math.inf
-    final_method: str = ""
     cut_off_cycle: float = math.nan
     message: str = ""
     excitation_frequency: FloatArray = field(default_factory=lambda: np.array([math.nan]))

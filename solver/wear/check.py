@@ -146,9 +146,7 @@ def _vibrates_otherwise(state: WearState) -> bool:
 def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
     """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
     work.at(state)
-    refined = refine(
-        work.case, state.omega, work.excitation_amplitude, state.point, work.run, usual_work=work.usual_work
-    )
+    refined = refine(work.case, state.omega, work.excitation_amplitude, state.point, work.run)
     resolution = refined.case.resolution
     choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
     change = state.change if resolution == state.resolution else None

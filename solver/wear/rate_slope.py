@@ -40,7 +40,6 @@ def rate_changes(
     wearing: WearingWork,
     depths: FloatArray,
     run: Run,
-    rtol: float = FORCING,
 ) -> FloatArray:
     """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths.
 
@@ -48,7 +47,7 @@ def rate_changes(
     gain (n_contact,): growth of the depth over wearing work in one cycle, m/J.
     wearing: part of the slip work that wears.
     depths (k, n_contact): changes of the depths, m.
-    run, rtol: solves with the Jacobian of the state, and their relative residual.
+    run: solves with the Jacobian of the state, to the relative residual of a Newton direction.
     """
     balance = Balance(joint, at.history, at.wear_depth)
     growth = replace(balance, wear_gain=gain, wearing=replace(wearing, depth_held=True)).linearise(at).growth_tangent
@@ -59,7 +58,7 @@ def rate_changes(
     if acting.any():
         rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
         rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
-        steps = run.solver.solve_all(balance.linearise(at), rights, rtol)
+        steps = run.solver.solve_all(balance.linearise(at), rights, FORCING)
         moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
         found[acting] += (growth * moved).sum(axis=2)
     return found

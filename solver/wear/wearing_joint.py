@@ -34,7 +34,6 @@ class WearingJoint:
     wearing: part of the slip work that wears.
     where: at which frequency.
     run: counts the iterations, limits the time, and keeps a factorisation from one solve to the next.
-    usual_work: N m, lower bound of the slip work to which errors are relative in the choice of harmonics.
     """
 
     case: Case
@@ -43,7 +42,6 @@ class WearingJoint:
     wearing: WearingWork
     where: Fixed
     run: Run = field(init=False)
-    usual_work: float = 0.0
     _joint: Joint | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:

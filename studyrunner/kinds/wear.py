@@ -234,7 +234,6 @@ class History(JointTask):
 
     def integrate(self, model: ReducedModel, keep: Keep) -> WearHistory:
         """The integrated history, at all counts at which one of the histories is read."""
-        from solver.wear.final_state.find import find_final_state
         from solver.wear.history import integrate_wear
         from solver.wear.solutions import SlowTime
 
@@ -247,10 +246,9 @@ class History(JointTask):
             # a history begins at cycle 0, whether that count is kept or not
             read = (self.counts(scaled) for scaled in self.histories)
             counts = np.unique([0.0, *itertools.chain.from_iterable(read)])
-        final = self.scheme == "final"
         asked = SlowTime(
             self.wear_coefficient,
-            cast("Literal['explicit', 'implicit', 'adaptive']", "adaptive" if final else self.scheme),
+            cast("Literal['explicit', 'implicit', 'adaptive']", "adaptive" if self.scheme == "final" else self.scheme),
             counts,
             self.step,
             largest_depth=self.largest_depth,
@@ -259,9 +257,8 @@ class History(JointTask):
             loops=self.loops,
             follow=self.follow,
         )
-        solve = find_final_state if final and isinstance(counts, ToTheEnd) else integrate_wear
         friction = self.joint.friction_coefficient
-        history = solve(model, friction, self.settings, unpack(self.start), asked, keep, self.resume)
+        history = integrate_wear(model, friction, self.settings, unpack(self.start), asked, keep, self.resume)
         raise_fault(history.outcome, history.message)
         return history
 

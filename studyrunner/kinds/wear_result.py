@@ -18,7 +18,6 @@ from studyrunner.percent import describe_reach, show_count
 from studyrunner.variables import KEPT
 
 _ROUND_OFF = 1e-10
-_METHODS = KEPT["final_method"].flags
 
 
 def build_result(task: History, history: WearHistory, place: int = 0) -> PointResult:
@@ -34,8 +33,6 @@ def build_result(task: History, history: WearHistory, place: int = 0) -> PointRe
     counts = history.cycles if endless else np.array(task.counts(scaled))
     rows = np.arange(counts.size) if endless else np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
-    if endless and history.final_method == "active_set":
-        reached = np.isfinite(history.worn_volume)
     known = rows[reached]
     jump = history.jump_cycle
     if place:
@@ -72,7 +69,6 @@ def build_result(task: History, history: WearHistory, place: int = 0) -> PointRe
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
-        "final_method": _METHODS.index(history.final_method or "none"),
         "message": message or _of_target(task, history, known, target, life_error, whole=whole),
     }
     of_task = {name: getattr(history, name) for name in KEPT if name not in of_its_own}

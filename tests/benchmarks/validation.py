@@ -2,7 +2,6 @@
 
 A: a cylinder in partial slip, worn to the end (Ciavarella and Hills). B: a sphere, the same (method of dimensionality
 reduction). C: a cylinder in gross slip, measured and computed by McColl, Ding and Leen, Wear 256 (2004) 1114.
-E: the final state by the scheme "final" against that of a march to the end, and what both take.
 """
 
 import sys
@@ -18,7 +17,6 @@ from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.settings import SolverSettings, ToTheEnd
-from solver.wear.final_state.find import find_final_state
 from solver.wear.solutions import SlowTime
 from studies import build_scene
 from studies.scenes.closed_forms.hertz import (
@@ -134,45 +132,6 @@ def truth_c(strips: int, settings: SolverSettings) -> tuple[WearHistory, FloatAr
     return history, share * history.wear_depth[1:].max(axis=1), share * history.worn_volume[1:] / 0.01, seconds
 
 
-FINAL = {
-    "A, 60 strips": ("cylinder_on_flat", {"strips": 60}, 0.6, 20.0, 1.0, WEAR),
-    "A, 100 strips": ("cylinder_on_flat", {"strips": 100}, 0.6, 20.0, 1.0, WEAR),
-    "B, 10 x 10 patches": ("sphere_on_flat", {"patches": 10}, 0.6, 20.0, 1.0, WEAR),
-    "slider": ("sdof_slider", {}, 0.5, 160.0, 10.0, 1.1e-11),
-    "dovetail, mesh 1, 209 Hz": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 0.5, 1.1e-11),
-    "dovetail, mesh 1, 209 Hz, 4 N": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 4.0, 1.1e-11),
-    "dovetail, mesh 1, 212.5 Hz": ("dovetail_sector", {"mesh": 1}, 0.5, 212.5, 0.5, 1.1e-11),
-    "dovetail, mesh 1, 212.8 Hz": ("dovetail_sector", {"mesh": 1}, 0.5, 212.8, 0.5, 1.1e-11),
-}
-"""Scene, parameters, friction, Hz, N, 1/Pa."""
-
-
-def final_states(settings: SolverSettings) -> None:
-    """A row for each joint: both from one start state, whose time is left out."""
-    for label, (scene, parameters, friction, frequency, force, per_pressure) in FINAL.items():
-        model = build_scene(scene, **parameters)
-        ((_, start),) = follow_branch(model, friction, force, np.array([frequency]), "ramp", settings)
-        end, found, seconds = ToTheEnd(21), [], []
-        for direct in (True, True, False):
-            began = time.process_time()
-            if direct:
-                asked = SlowTime(per_pressure, "adaptive", end)
-                found.append(find_final_state(model, friction, settings, start, asked))
-            else:
-                found.append(march_from_start(model, friction, start, per_pressure, 1.0, "adaptive", end, settings))
-            # the first one compiles
-            seconds.append(time.process_time() - began)
-        depth, there = found[1].wear_depth[-1], found[2].wear_depth[-1]
-        deepest = max(float(there.max()), 1e-300)
-        same = np.array_equal(depth > 1e-6 * deepest, there > 1e-6 * deepest)
-        print(
-            f"E, {label}: {found[1].final_method}, {np.count_nonzero(depth)} pairs, {'same' if same else 'other'} pairs"
-            f" as the march, depth {np.abs(depth - there).max() / deepest:.1e} off,"
-            f" {seconds[1]:.2f} s of {seconds[2]:.2f} s; {found[1].message}",
-            flush=True,
-        )
-
-
 def main(chosen: list[str]) -> None:
     """Print a row for each case."""
     for letter, joint, sizes in (("A", cylinder, (50, 100, 200)), ("B", sphere, (10, 20))):
@@ -194,8 +153,6 @@ def main(chosen: list[str]) -> None:
                 f"area {1e9 * area[place]:.4f}e-3 mm2 ({area[place] / published * 1e9 - 1:+.2%})",
                 flush=True,
             )
-    if "E" in chosen:
-        final_states(SolverSettings(harmonics=5, samples=64, rtol=1e-2))
 
 
 if __name__ == "__main__":
