@@ -17,6 +17,7 @@ from solver.presentation import PresentedResponse
 from solver.results.history import WearHistory
 from solver.settings import SolverSettings
 from solver.structure.joint import friction_of_pairs
+from solver.wear.control import Given
 from solver.wear.history import integrate_wear
 from solver.wear.solutions import SlowTime
 
@@ -95,7 +96,7 @@ def frequency_response(
     branch = follow_branch(model, friction, load, ascending, sweep, settings)
     for index, start in branch:
         # a state is a wear history with cycle 0 alone
-        found[index] = integrate_wear(model, friction, settings, start, SlowTime(0.0, "implicit", _START, 1.0))
+        found[index] = integrate_wear(model, friction, settings, start, SlowTime(0.0, Given(1.0), _START))
     points = [found[index] for index in place.tolist()]
     return FrequencyResponse(
         frequency=wanted,

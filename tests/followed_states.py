@@ -20,12 +20,11 @@ from solver.settings import FollowedFrequency, SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
 from solver.wear.check import Checked, FullCheck
-from solver.wear.control import Given
+from solver.wear.control import Given, WearLine
+from solver.wear.course import Course
 from solver.wear.integrate import Integration
-from solver.wear.output import DenseOutput
 from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
-from solver.wear.where import Following
+from solver.wear.wearing_joint import Following, WearingJoint
 
 
 @dataclass(frozen=True)
@@ -63,14 +62,11 @@ def followed_states(
             errors.append(checked[1].excitation_frequency_error)
         return checked
 
-    output = DenseOutput(work.area, smooth=False)
-    steps = Given(work, "implicit", float(cycles[1] - cycles[0]), float(cycles[-1]))
-    integration = Integration(steps, recorded, output, lambda *_: None, 1e4, float(cycles[-1]))
-    estimate = Estimate(start.response_error, start.wear_rate_error)
-    first = work.begin(start.state, start.resolution, estimate, accurate=True)
-    begun = integration.begin(first)
-    assert isinstance(begun, WearState), begun
-    integration.run(begun)
+    line = WearLine(work, Given(float(cycles[1] - cycles[0])), float(cycles[-1]))
+    estimate, first = Estimate(start.response_error, start.wear_rate_error), start.state
+    Integration(line, recorded, lambda *_: None, 1e4).begin(
+        lambda: work.begin(first, start.resolution, estimate, accurate=True), Course(work.area, False, cycles)
+    )
     return FollowedStates(work, tuple(states), tuple(errors))
 
 

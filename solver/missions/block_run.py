@@ -24,8 +24,10 @@ from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
+from solver.wear.control import Adaptive
+from solver.wear.integrate import Ended
 from solver.wear.rate_slope import rate_slope
-from solver.wear.solutions import Ended, Like, SlowTime, Solutions
+from solver.wear.solutions import Like, SlowTime, Solutions
 from solver.wear.wearing_joint import WearingJoint
 
 NODES_OF_A_REFERENCE_STEP = 3
@@ -143,16 +145,15 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
         return case.not_computed(Failure(start.outcome, start.message), start.newton_iterations)
     left = replace(case.settings, time_limit=case.settings.time_limit - (computing_time() - began))
     counts = np.array([0.0, cycles])
-    asked = SlowTime(case.mission.wear_coefficient, "adaptive", counts, law=case.law, ends_at_last=True)
+    asked = SlowTime(case.mission.wear_coefficient, Adaptive(left.rtol), counts, law=case.law, ends_at_last=True)
     model = worn(block.model, case.depth)
     of_block = build_case(model, block.friction_coefficient, start.penalty_omega, left, start.resolution)
     solutions = Solutions(of_block, start, asked)
     ended = solutions.history(stable_end=case.every) if like is None else solutions.follow(like, counts)
-    output = solutions.output_of(ended) if like is None else solutions.output_of_reference(ended)
     iterations = start.newton_iterations + ended.iterations
     if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
         return case.not_computed(ended.failure, iterations)
-    computed = replace(_read(case, ended, output.read(counts), start), begun=begun, iterations=iterations)
+    computed = replace(_read(case, ended, ended.course.read(counts), start), begun=begun, iterations=iterations)
     if case.with_slope:
         work = WearingJoint.of(of_block, start.state, asked.wear_coefficient, asked.law)
         computed = replace(computed, slope=_slope(work, ended, case, computed.growth))
@@ -171,7 +172,7 @@ def _slope(work: WearingJoint, ended: Ended, case: BlockCase, growth: FloatArray
 
 def _read(case: BlockCase, ended: Ended, values: dict[str, Any], start: StartState) -> BlockRun:
     """The result of a block that was computed to its end."""
-    state, course, end = ended.state, ended.output.course, case.block.steady[1]
+    state, course, end = ended.state, ended.course, case.block.steady[1]
     assert state is not None
     growth = values["wear_depth"][-1]
     volume = float(growth @ case.mission.area)

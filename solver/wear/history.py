@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from solver.accuracy.history_error import Both, HistoryError, history_error
+from solver.accuracy.history_error import Both, history_error
 from solver.accuracy.options import ACCURACY
 from solver.accuracy.target_error import error_of_wear, target_error
+from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, unpack
@@ -20,8 +21,10 @@ from solver.results.history import StartState, WearHistory
 from solver.results.verdict import judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import build_case
-from solver.wear.output import DenseOutput, no_output
-from solver.wear.solutions import Ended, SlowTime, Solutions
+from solver.wear.course import unknown_course
+from solver.wear.integrate import Ended
+from solver.wear.interpolation import TargetSearch
+from solver.wear.solutions import SlowTime, Solutions
 from solver.wear.state import WearState
 
 ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
@@ -44,7 +47,7 @@ def integrate_wear(
     model, friction_coefficient, settings, start
         The case, and the unworn state at the start of the history.
     asked
-        Scheme, counts and wear law of the history.
+        Steps, counts and wear law of the history.
     keep
         Called from time to time with the progress.
     resume
@@ -52,24 +55,20 @@ def integrate_wear(
         to the last bit, except `run_time`.
     """
     if start.state is None:
-        return without_state(model, start, asked)
+        nothing = Ended(None, Failure(start.outcome, start.message), unknown_course(model, len(asked.loops)), 0)
+        return _assembled(model, start, asked, nothing, None)
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
     solutions = Solutions(case, start, asked, keep, None if resume is None else unpack(resume))
-    fine = solutions.history()
-    if (state := fine.state) is None:
-        iterations = start.newton_iterations + fine.iterations
-        failed = replace(
-            start, outcome=fine.failure.outcome, message=fine.failure.message, newton_iterations=iterations
-        )
-        return without_state(model, failed, asked)
-    reference = None
+    fine, reference = solutions.history(), None
+    if fine.state is None:
+        fine = replace(fine, course=unknown_course(model, len(asked.loops)))
     # without a step the errors of the start state suffice
-    compared = len(fine.output.course.ends) > 1 or asked.follow is not None
-    if compared and fine.failure.outcome not in ENDS_ALL:
-        reference = solutions.reference(fine)
+    elif fine.failure.outcome not in ENDS_ALL and (len(fine.course.ends) > 1 or asked.where.follows):
+        reference = solutions.reference(fine, _counts(asked, fine))
         if reference.failure.outcome in ENDS_ALL:
             fine = replace(fine, failure=reference.failure)
-    history = _assembled(solutions, fine, state, reference)
+    history = _assembled(model, start, asked, fine, reference)
+    history = replace(history, run_time=start.run_time + (solutions.spent if fine.state else 0.0))
     rows = np.flatnonzero(np.isfinite(history.worn_volume))
     history = replace(history, error_estimate=last_error(history, rows, history.last_cycle))
     if history.outcome is not Outcome.CONVERGED:
@@ -78,110 +77,93 @@ def integrate_wear(
     return replace(history, outcome=outcome, message=message)
 
 
-def reported(own: dict[str, Any]) -> dict[str, Any]:
-    """The values from `DenseOutput.read` that a result has."""
-    return {name: value for name, value in own.items() if name not in ("local", "depth_rate")}
+def _counts(asked: SlowTime, fine: Ended) -> FloatArray:
+    """Counts (n_output,) at which a history is read."""
+    if not isinstance(asked.cycles, ToTheEnd):
+        return asked.cycles
+    return np.zeros(asked.cycles.n_outputs) if fine.state is None else fine.course.even_counts(asked.cycles.n_outputs)
 
 
-def of_state(state: WearState) -> dict[str, Any]:
-    """What the last state of a history says of the whole history."""
+def _assembled(
+    model: ReducedModel, start: StartState, asked: SlowTime, fine: Ended, reference: Ended | None
+) -> WearHistory:
+    """The result, from the steps of a history and of its reference solution."""
+    counts, area, course = _counts(asked, fine), model.contact.area, fine.course
+    own = course.read(counts)
+    compared = reference is not None and bool(reference.course.nodes)
+    both, steps = (
+        Both(at, values, reference.course.read(at) if reference is not None and compared else {})
+        for at, values in ((counts, own), (course.cycles, course.read(course.cycles)))
+    )
+    error = history_error(both, steps, area, asked.steps.scheme)
+    state, target = fine.state, course.reached
+    ends_at_target = target <= asked.end
+    return WearHistory(
+        **{name: value for name, value in own.items() if name not in ("local", "depth_rate")}
+        | {"response_error": error.response, "wear_rate_error": error.wear_rate}
+        | {"excitation_frequency_error": _frequency_error(both, error.worn_volume, follows=asked.where.follows)}
+        | ({} if state is None else _of_state(state, asked.end)),
+        outcome=fine.failure.outcome,
+        message=fine.failure.message,
+        cycles=counts,
+        worn_volume=own["wear_depth"] @ area,
+        worn_volume_error=error.worn_volume,
+        wear_depth_error=error.wear_depth,
+        reference_volume=both.other("wear_depth") @ area,
+        error_estimate=math.nan,
+        newton_iterations=start.newton_iterations + fine.iterations + (reference.iterations if reference else 0),
+        run_time=start.run_time,
+        last_cycle=math.nan if state is None else min(course.ends[-1], float(counts[-1])),
+        branch=start.branch,
+        fold_frequency=start.fold_frequency,
+        cycles_to_target=target if ends_at_target else math.nan,
+        cycles_to_target_error=_target_error(fine, reference, steps, asked) if ends_at_target else math.nan,
+        cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
+    )
+
+
+def _of_state(state: WearState, end: float) -> dict[str, Any]:
+    """What the last state of a history says of the whole history up to its last count."""
     return {
         "step_limit": state.step_limit if state.step_limit > 0.0 else math.inf,
         "inaccurate_from": state.inaccurate_from,
         "inaccurate_in": "wear rate" if state.worst.wear_rate >= state.worst.response else "response",
         "inaccurate_error": state.worst.largest,
         "held_from": math.inf if math.isnan(state.held_from) else state.held_from,
-    }
-
-
-def _assembled(solutions: Solutions, fine: Ended, state: WearState, reference: Ended | None) -> WearHistory:
-    """The result, from the outputs of a history, with its last state, and of its reference solution."""
-    start, asked, model = solutions.start, solutions.asked, solutions.case.model
-    counts, area, output = solutions.counts(fine), model.contact.area, solutions.output_of(fine)
-    own = output.read(counts)
-    other = None if reference is None else solutions.output_of_reference(reference)
-    both = Both(counts, own, other.read(counts) if other else {})
-    at_steps = fine.output.cycles
-    steps = Both(at_steps, output.values(), other.read(at_steps) if other else {})
-    error = history_error(both, steps, area, asked.scheme)
-    target = fine.output.reached
-    ends_at_target = target <= asked.end
-    return WearHistory(
-        **reported(own) | _errors(both, error, follows=asked.follow is not None),
-        **of_state(state),
-        outcome=fine.failure.outcome,
-        message=fine.failure.message,
-        cycles=counts,
-        worn_volume=own["wear_depth"] @ area,
-        reference_volume=both.other("wear_depth") @ area,
-        error_estimate=math.nan,
-        newton_iterations=start.newton_iterations + fine.iterations + (reference.iterations if reference else 0),
-        run_time=start.run_time + solutions.spent,
-        last_cycle=min(fine.output.course.ends[-1], float(counts[-1])),
-        branch=start.branch,
-        fold_frequency=start.fold_frequency,
         # adaptive steps go beyond the last count
-        jump_cycle=state.jump_cycle if state.jump_cycle <= asked.end else math.nan,
-        cycles_to_target=target if ends_at_target else math.nan,
-        cycles_to_target_error=_target_error(output, other, steps, asked) if ends_at_target else math.nan,
-        cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
-    )
-
-
-def _errors(both: Both, error: HistoryError, *, follows: bool) -> dict[str, Any]:
-    """Errors of a history at its outputs; follows: whether its frequency follows the structure."""
-    frequency = both.fine["excitation_frequency_error"]
-    if follows:
-        apart = np.abs(both.fine["excitation_frequency"] - both.other("excitation_frequency"))
-        whole = np.maximum(frequency, ACCURACY.history_safety * apart)
-        frequency = np.where(np.isfinite(error.worn_volume) & np.isnan(whole), math.inf, whole)
-    return {
-        "response_error": error.response,
-        "wear_rate_error": error.wear_rate,
-        "worn_volume_error": error.worn_volume,
-        "wear_depth_error": error.wear_depth,
-        "excitation_frequency_error": frequency,
+        "jump_cycle": state.jump_cycle if state.jump_cycle <= end else math.nan,
     }
 
 
-def _target_error(output: DenseOutput, other: DenseOutput | None, steps: Both, asked: SlowTime) -> float:
+def _frequency_error(both: Both, volume_error: FloatArray, *, follows: bool) -> FloatArray:
+    """Error (n_output,) of the frequency, Hz; follows: whether it follows the structure.
+
+    volume_error (n_output,): relative error of the worn volume, finite where the history has come so far.
+    """
+    own: FloatArray = both.fine["excitation_frequency_error"]
+    if not follows:
+        return own
+    apart = np.abs(both.fine["excitation_frequency"] - both.other("excitation_frequency"))
+    whole = np.maximum(own, ACCURACY.history_safety * apart)
+    return np.where(np.isfinite(volume_error) & np.isnan(whole), math.inf, whole)
+
+
+def _target_error(fine: Ended, reference: Ended | None, steps: Both, asked: SlowTime) -> float:
     """Estimated error, cycles, of the count at which a history has reached its target.
 
-    output, other: of the history and of its reference solution, None if there is none; steps: both at the ends of the
-    steps.
+    steps: the history and its reference solution at the ends of the steps.
     """
-    if other is None or asked.until is None:
+    if reference is None or asked.until is None or not reference.course.nodes:
         return math.inf
-    area, at, quantity = output.area, output.taken.reached, asked.until.quantity
+    course, quantity = fine.course, asked.until.quantity
+    area, at = course.area, course.reached
     counts = np.array([0.0, at])
-    own = output.read(counts)
-    error = history_error(Both(counts, own, other.read(counts)), steps, area, asked.scheme)
+    own = course.read(counts)
+    error = history_error(Both(counts, own, reference.course.read(counts)), steps, area, asked.steps.scheme)
     depth = own["wear_depth"][1]
     known_to = error_of_wear(quantity, depth, error.wear_depth[1], float(error.worn_volume[1] * (depth @ area)))
-    deepest = np.arange(area.size) == depth.argmax()
-    weights = deepest if quantity == "wear_depth" else area
-    rate = min(float(rates @ weights) for rates in (own["depth_rate"][1], output.taken.nodes[-1].rate))
-    return target_error(at, other.target_count(), known_to, rate) + output.target_within()
-
-
-def without_state(model: ReducedModel, start: StartState, asked: SlowTime) -> WearHistory:
-    """History of a point without a valid start state: NaN everywhere."""
-    counts = np.zeros(asked.cycles.n_outputs) if isinstance(asked.cycles, ToTheEnd) else asked.cycles
-    own = no_output(counts.size, model.contact.n_contact, len(model.response_names), len(asked.loops))
-    nothing = own["wear_rate"]
-    return WearHistory(
-        **reported(own),
-        outcome=start.outcome,
-        message=start.message,
-        cycles=counts,
-        worn_volume=nothing,
-        worn_volume_error=nothing,
-        wear_depth_error=own["wear_depth"],
-        reference_volume=nothing,
-        error_estimate=math.nan,
-        jump_cycle=math.nan,
-        newton_iterations=start.newton_iterations,
-        run_time=start.run_time,
-        branch=start.branch,
-        fold_frequency=start.fold_frequency,
-    )
+    weights = np.arange(area.size) == depth.argmax() if quantity == "wear_depth" else area
+    rate = min(float(rates @ weights) for rates in (own["depth_rate"][1], course.nodes[-1].rate))
+    other = TargetSearch(asked.until, area, smooth=True).count(reference.course.nodes)
+    by_resonance = TargetSearch(asked.until, area, course.smooth).by_resonance(course.nodes, at)
+    return target_error(at, other, known_to, rate) + course.reached_within + by_resonance

@@ -6,15 +6,15 @@ the rates follow the motion as dg = G dp. A table of factors adds its own deriva
 Explicit limit: the wear rate falls where wear takes load off a pair. An explicit Euler step, Eq. (20), multiplies a
 disturbance of W by 1 + h dg/dW. It grows where h exceeds 2 / mu, with mu the largest positive eigenvalue of -dg/dW.
 
-Largest meaningful step: uniform wear brings the parts closer, nonuniform wear takes load off a pair. A step is rejected
-where its wear would move many times all normal forces at once. An explicit step then uses a wear rate that the pairs
-have lost during the step, an implicit step a rate that they only have at its end. The moved fraction of the normal
-forces is that of the linear static structure, with free tangents of pairs that slip: it does not depend on the
-vibration, which may change arbitrarily at the end of a branch, and is zero where wear does not act back on the joint.
+Largest meaningful step: a step is rejected where its wear would move many times all normal forces at once. An explicit
+step then uses a wear rate that the pairs have lost during the step, an implicit step a rate that they only have at its
+end. The moved fraction is that of the linear static structure, with free tangents of pairs that slip: it does not
+depend on the vibration, which may change arbitrarily at the end of a branch.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -34,12 +34,7 @@ worn volume is a sufficient warning (27 % with 0.6)."""
 
 
 def rate_changes(
-    joint: Joint,
-    at: Evaluation,
-    gain: FloatArray,
-    wearing: WearingWork,
-    depths: FloatArray,
-    run: Run,
+    joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, depths: FloatArray, run: Run
 ) -> FloatArray:
     """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths.
 
@@ -91,21 +86,20 @@ def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing:
     # depths of pairs whose rates follow no depth do not matter
     start = product(np.where(wears, np.random.default_rng(0).normal(size=wears.size), 0.0))
     if not np.isfinite(start).all() or not start.any():
-        return float("inf")
+        return math.inf
     values = ritz_values(product, start, min(SIGN_PRODUCTS, int(np.count_nonzero(wears))))[0]
     falling = values.real[np.isfinite(values) & (values.real > np.abs(values.imag))]
     # a value below the round-off of the largest one is zero
     fastest = float(falling.max(initial=0.0))
-    return 2.0 / fastest if fastest > 1e-12 * float(np.abs(values).max(initial=0.0)) else float("inf")
+    return 2.0 / fastest if fastest > 1e-12 * float(np.abs(values).max(initial=0.0)) else math.inf
 
 
 def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, free_tangents: bool = True) -> float:
-    """Change of the mean normal forces by wear, relative to these forces, both as norms.
+    """Change of the mean normal forces by wear to depths (n_contact,), m, relative to these forces, both as norms.
 
     Pairs that are open throughout the period carry no force.
 
     before: state at the start of the step.
-    wear_depth (n_contact,): depth at the end of the step, m.
     free_tangents: whether the tangents of pairs that slip are free; if not, the result is a bound, which is cheaper.
     """
     pair, component = joint.component_index // 3, joint.component_index % 3

@@ -234,8 +234,10 @@ class History(JointTask):
 
     def integrate(self, model: ReducedModel, keep: Keep) -> WearHistory:
         """The integrated history, at all counts at which one of the histories is read."""
+        from solver.wear.control import steps_of
         from solver.wear.history import integrate_wear
         from solver.wear.solutions import SlowTime
+        from solver.wear.wearing_joint import Fixed, Following
 
         if self.start is None:
             raise TypeError(f"task without a start state: {self}")
@@ -248,14 +250,12 @@ class History(JointTask):
             counts = np.unique([0.0, *itertools.chain.from_iterable(read)])
         asked = SlowTime(
             self.wear_coefficient,
-            cast("Literal['explicit', 'implicit', 'adaptive']", "adaptive" if self.scheme == "final" else self.scheme),
+            steps_of(self.scheme, self.step, self.settings.rtol, self.largest_depth),
             counts,
-            self.step,
-            largest_depth=self.largest_depth,
             law=self.law,
             until=self.until,
             loops=self.loops,
-            follow=self.follow,
+            where=Fixed() if self.follow is None else Following(self.follow),
         )
         friction = self.joint.friction_coefficient
         history = integrate_wear(model, friction, self.settings, unpack(self.start), asked, keep, self.resume)

@@ -21,7 +21,7 @@ import numpy as np
 from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
-from solver.wear.output import CERTIFIED
+from solver.wear.course import CERTIFIED
 from tests.random_scenes import RandomScene, random_scene
 from tests.solver.models import march_wear
 

@@ -22,7 +22,10 @@ from solver.model import ReducedModel
 from solver.results.history import StartState
 from solver.settings import FOLLOWED, Followed, FollowedFrequency, Scheme, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.solutions import Ended, SlowTime, Solutions
+from solver.wear.control import steps_of
+from solver.wear.integrate import Ended
+from solver.wear.solutions import SlowTime, Solutions
+from solver.wear.wearing_joint import Fixed, Following
 from studies import build_scene
 from tests.followed_states import at_maximum, followed_states, in_quadrature, responses_around
 
@@ -95,7 +98,7 @@ def print_cost(joint: Measured, scheme: Scheme) -> None:
     for word, start, follow in given:
         spent, ended = zip(*(_spent(joint, start, scheme, follow) for _ in range(4)), strict=True)
         # the first run compiles
-        whole, n_steps = min(spent[1:]), len(ended[0].output.course.ends) - 1
+        whole, n_steps = min(spent[1:]), len(ended[0].course.ends) - 1
         step = whole / n_steps
         first = first or (whole, step)
         print(
@@ -108,8 +111,9 @@ def print_cost(joint: Measured, scheme: Scheme) -> None:
 def _spent(joint: Measured, start: StartState, scheme: Scheme, follow: FollowedFrequency | None) -> tuple[float, Ended]:
     """CPU time of a history, s, and the history."""
     case = build_case(joint.model, FRICTION, start.penalty_omega, SolverSettings(), start.resolution)
-    step = np.inf if scheme == "adaptive" else joint.step
-    asked = SlowTime(WEAR, scheme, np.array([0.0, joint.cycles]), step, follow=follow)
+    where = Fixed() if follow is None else Following(follow)
+    steps = steps_of(scheme, joint.step, SolverSettings().rtol)
+    asked = SlowTime(WEAR, steps, np.array([0.0, joint.cycles]), where=where)
     began = computing_time()
     ended = Solutions(case, start, asked).history()
     return computing_time() - began, ended

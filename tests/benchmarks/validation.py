@@ -12,12 +12,10 @@ import numpy as np
 
 from solver import march_wear
 from solver.contact.wear_law import WearLaw
-from solver.loading_history.start_states import follow_branch
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
-from solver.settings import SolverSettings, ToTheEnd
-from solver.wear.solutions import SlowTime
+from solver.settings import SolverSettings
 from studies import build_scene
 from studies.scenes.closed_forms.hertz import (
     line_half_width,
@@ -28,7 +26,6 @@ from studies.scenes.closed_forms.hertz import (
     point_worn_depth,
 )
 from studies.scenes.half_space.influence import composite_modulus
-from tests.solver.models import march_wear as march_from_start
 from tests.studies.half_space_twin import limit_depth, pressed
 
 MODULUS = composite_modulus(200e9, 0.3)

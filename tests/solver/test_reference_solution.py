@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.accuracy.history_error import Both, Met, history_error
+from solver.accuracy.history_error import Both, history_error, largest_before
 from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome
 from solver.settings import Scheme, SolverSettings
-from solver.wear import integrate
 from solver.wear.check import FullCheck
-from solver.wear.control import Adaptive
+from solver.wear.control import Adaptive, WearLine
 from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 
@@ -121,13 +120,13 @@ def test_where_euler_steps_let_a_pair_stick_again_the_error_says_so(step):
 @pytest.mark.slow
 def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     """Of the volume at all counts beyond its end; the history itself and its errors before are the same."""
-    usual, own = worn("implicit", 1000.0), integrate.one_step
+    usual, own = worn("implicit", 1000.0), WearLine.step
 
-    def go_astray(steps, state):
-        lost = isinstance(steps, Adaptive) and state.cycle >= 12_000.0
-        return Failure(Outcome.MARCH_FAILED) if lost else own(steps, state)
+    def go_astray(line, state):
+        lost = isinstance(line.steps, Adaptive) and state.cycle >= 12_000.0
+        return Failure(Outcome.MARCH_FAILED) if lost else own(line, state)
 
-    monkeypatch.setattr(integrate, "one_step", go_astray)
+    monkeypatch.setattr(WearLine, "step", go_astray)
     model, found = start()
     history = march_wear(model, 0.5, found, WEAR, 1000.0, "implicit", CYCLES, GIVEN)
     assert np.array_equal(history.worn_volume, usual.worn_volume)
@@ -145,15 +144,15 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
 def test_histories_that_cross_are_wrong_by_what_they_differed_before():
     counts, at = np.linspace(0.0, 10.0, 11), np.arange(0.5, 8.0, 0.5)
     differences = np.abs(at - 6.0)
-    error = Met(at, differences).largest_before(counts)
+    error = largest_before(at, differences, counts)
     assert error[0] == 0.0
     assert error[6] == 3.0
     assert error[10] == 1.5
     # what comes later changes nothing
-    assert np.array_equal(Met(at[:10], differences[:10]).largest_before(counts[:6]), error[:6])
+    assert np.array_equal(largest_before(at[:10], differences[:10], counts[:6]), error[:6])
     # and where nothing is known there is no difference
-    assert not Met(at, np.full(at.size, np.nan)).largest_before(counts).any()
-    assert not Met(at[:0], at[:0]).largest_before(counts).any()
+    assert not largest_before(at, np.full(at.size, np.nan), counts).any()
+    assert not largest_before(at[:0], at[:0], counts).any()
 
 
 AREA = np.array([1.0, 2.0])
