@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.error_estimate import Estimate
 from solver.continuation.phase_lag import excitation_product
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, final_history
@@ -52,7 +51,7 @@ def followed_states(
     ((_, start),) = follow_branch(model, 0.5, load, follow, "up", settings)
     assert start.state is not None, start.message
     case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
-    work = WearingJoint.of(case, start.state, wear_coefficient, where=Following(follow))
+    work = WearingJoint(case, start, wear_coefficient, where=Following(follow))
     states, errors, check = [], [], FullCheck()
 
     def recorded(work: WearingJoint, state: WearState) -> Checked | Failure:
@@ -63,10 +62,7 @@ def followed_states(
         return checked
 
     line = WearLine(work, Given(float(cycles[1] - cycles[0])), float(cycles[-1]))
-    estimate, first = Estimate(start.response_error, start.wear_rate_error), start.state
-    Integration(line, recorded, lambda *_: None, 1e4).begin(
-        lambda: work.begin(first, start.resolution, estimate, accurate=True), Course(work.area, False, cycles)
-    )
+    Integration(line, recorded, lambda *_: None, 1e4).begin(work.begin, Course(work.area, False, cycles))
     return FollowedStates(work, tuple(states), tuple(errors))
 
 

@@ -155,7 +155,7 @@ def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
         return case.not_computed(ended.failure, iterations)
     computed = replace(_read(case, ended, ended.course.read(counts), start), begun=begun, iterations=iterations)
     if case.with_slope:
-        work = WearingJoint.of(of_block, start.state, asked.wear_coefficient, asked.law)
+        work = WearingJoint(of_block, start, asked.wear_coefficient, asked.law)
         computed = replace(computed, slope=_slope(work, ended, case, computed.growth))
     # as read from a file: an interrupted mission goes on with equal bits
     return in_rows(computed)

@@ -37,7 +37,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.reference import RTOL_RATIO
 from solver.clock import computing_time
 from solver.harmonic_balance.response_peak import largest_responses
@@ -187,12 +186,11 @@ def _slope(case: BlockCase, passage: Passage, state: SweptState) -> FloatArray:
 
 def _joint(case: BlockCase, start: StartState) -> tuple[WearingJoint, WearState]:
     """The joint at the depth before the passage, and its state at a frequency."""
-    assert start.state is not None
     model, friction = worn(case.block.model, case.depth), case.block.friction_coefficient
     of_state = build_case(model, friction, start.penalty_omega, case.settings, start.resolution)
-    work = WearingJoint.of(of_state, start.state, case.mission.wear_coefficient, case.law)
+    work = WearingJoint(of_state, start, case.mission.wear_coefficient, case.law)
     # the limit of the explicit step is not asked for
-    return work, work.begin(start.state, start.resolution, NOTHING, accurate=True, step_limit=np.inf)
+    return work, work.begin(np.inf)
 
 
 def parts_of(states: Sequence[SweptState]) -> FloatArray:

@@ -68,8 +68,7 @@ class LargestDepth:
 class Adaptive:
     """BDF2 steps with a relative error of the worn volume near `rtol`.
 
-    The steps depend neither on the last cycle count, which is interpolated, nor on the wear coefficient alone, but on
-    `k_w h`. So histories that differ in k_w only take equal steps in `k_w h`.
+    The last cycle count is interpolated. Histories that differ in k_w only take equal steps in `k_w h`.
 
     first: length of the first step over its usual length.
     """
@@ -210,9 +209,8 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
 def step_across(work: WearingJoint, state: WearState, shortest: float, end: float) -> Step | None:
     """A step that is longer than the shortest one, across corners of the branch; None where it is not found.
 
-    Where the last pairs that stick come loose one by one, the mean position of the joint is soft, and the branch has a
-    corner with a small fold at each pair. Between such corners no step ends, however short, while Newton's method finds
-    the state behind all of them.
+    Where the last pairs that stick come loose one by one, the branch has a corner with a small fold at each pair.
+    Between them no step ends, however short, while Newton's method finds the state behind all of them.
 
     shortest: length of the step whose end is not found, cycles. end: cycle count beyond which no step goes.
     """

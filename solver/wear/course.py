@@ -72,9 +72,8 @@ class Course:
     """The steps of a history so far.
 
     Euler steps: all values are linear over the step. Adaptive steps: the depth is a cubic with the wear rates at both
-    ends, and all other values are linear in the worn volume, of which the state is a function. Fretting loops are
-    interpolated phase by phase. So they close, lie within the friction cone and agree with the interpolated mean
-    pressure.
+    ends, and all other values are linear in the worn volume. Fretting loops are interpolated phase by phase: they
+    close, lie within the friction cone and agree with the interpolated mean pressure.
 
     area (n_contact,): m2.
     smooth: whether the depth is a cubic within a step.
@@ -211,8 +210,8 @@ class Course:
     def even_counts(self, n_outputs: int) -> FloatArray:
         """Counts (n_outputs,) that divide the progress of the history evenly, up to its end or its target.
 
-        The progress is the fraction of the worn volume plus the fraction of the cycles. So neither a burst of wear nor
-        a long calm phase is missed, and straight lines between the outputs show the history.
+        The progress is the fraction of the worn volume plus that of the cycles: neither a burst of wear nor a long calm
+        phase is missed.
         """
         end = self.reached if self.reached_target else self.nodes[-1].cycle
         whole = float(self.depth_at(np.array([end]))[0] @ self.area)

@@ -4,11 +4,10 @@ Where a branch folds, the vibration goes on in a state of another branch. Where 
 its mean position gets a soft hold in the direction without stiffness:
 
 Only friction holds a root along a prismatic slot. Where every pair slips at some time of the period, nothing determines
-the mean position along the slot: the Jacobian is singular, and the mean friction along the slot has to be zero. In a
-symmetric joint it is zero. Pairs with unequal wear leave a small force g (dovetail, friction 0.3, 1 N: up to 2e-6 of
-the friction F). Strictly, no periodic state exists: the root creeps by about g / F of its slip path in a period, here
-1e-12 m, and motion and wear change by g / F at most. So a soft spring holds the mean position from there on, with the
-force g. Where g / F is no longer negligible there is no periodic state, and the outcome is ADRIFT.
+the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean force g along the
+slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Strictly, the root creeps by about g / F of its slip
+path in a period, here 1e-12 m, and motion and wear change by g / F at most. So a soft spring holds the mean position
+from there on. Where g / F is no longer negligible there is no periodic state, and the outcome is ADRIFT.
 """
 
 from __future__ import annotations
@@ -46,9 +45,7 @@ def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -
 
 
 def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | None:
-    """The stable state with a hold of the mean position; None where the joint does not slide as a whole, or where the
-    vibration changes: then a branch has ended.
-    """
+    """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends."""
     at = state.point.evaluation
     hold = None if state.hold is not None else free_slide(work.at(state), at)
     if hold is None:

@@ -6,10 +6,8 @@ the rates follow the motion as dg = G dp. A table of factors adds its own deriva
 Explicit limit: the wear rate falls where wear takes load off a pair. An explicit Euler step, Eq. (20), multiplies a
 disturbance of W by 1 + h dg/dW. It grows where h exceeds 2 / mu, with mu the largest positive eigenvalue of -dg/dW.
 
-Largest meaningful step: a step is rejected where its wear would move many times all normal forces at once. An explicit
-step then uses a wear rate that the pairs have lost during the step, an implicit step a rate that they only have at its
-end. The moved fraction is that of the linear static structure, with free tangents of pairs that slip: it does not
-depend on the vibration, which may change arbitrarily at the end of a branch.
+Largest meaningful step: a step is rejected where its wear would move many times all normal forces at once, those of
+the linear static structure with free tangents of pairs that slip.
 """
 
 from __future__ import annotations
@@ -74,9 +72,8 @@ def rate_slope(
 def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, run: Run) -> float:
     """Largest stable explicit step of Eq. (20) at a state, cycles; inf where the wear rate of no pair falls.
 
-    The eigenvalues come from Arnoldi's method with at most `SIGN_PRODUCTS` solves. A complex eigenvalue counts where
-    its real part is larger than its imaginary part. Arguments as in `rate_changes`; that the wearing work depends on
-    the depth itself is neglected.
+    The eigenvalues come from Arnoldi's method. A complex one counts where its real part is larger than its imaginary
+    part. Arguments as in `rate_changes`; that the wearing work depends on the depth itself is neglected.
     """
     wears, held = gain * wearing.work(*worn_by(at)) > 0.0, replace(wearing, depth_held=True)
 
@@ -131,6 +128,6 @@ def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: fl
     # a hundredth of the limit; a usual step of the dovetail root moves 0.001 to 0.01 of the normal forces
     advised = length * LARGEST_MOVED_LOAD / 100.0 / fraction
     return (
-        f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {fraction:.2g} times the"
-        f" normal forces of the joint: at most {advised:.2g} cycles at once would do"
+        f"wearing on for {length:.6g} cycles at once from cycle {cycle:.6g} on moves {float(f'{fraction:.2g}'):g} times"
+        f" the normal forces of the joint: at most {float(f'{advised:.2g}'):g} cycles at once would do"
     )

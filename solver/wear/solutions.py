@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.accuracy.reference import RTOL_RATIO, coarser, finer
 from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
@@ -34,9 +33,9 @@ class SlowTime:
 
     wear_coefficient: k_w, 1/Pa.
     steps: `Given`, `LargestDepth` or `Adaptive`.
-    cycles (n_output,): ascending counts to report, the first 0. Values are interpolated within the steps; the last
-        Euler step ends at the last count. Or `ToTheEnd`: until nothing wears any more, at counts chosen from the
-        result; not with explicit steps, which cannot grow.
+    cycles (n_output,): ascending counts to report, the first 0; the last Euler step ends at the last one. Or
+        `ToTheEnd`: until nothing wears any more, at counts chosen from the result; not with explicit steps, which
+        cannot grow.
     law: part of the slip work that wears.
     until: target of the wear; the history ends with the step that reaches the target. None for no target.
     loops: pairs with reported fretting loops.
@@ -130,7 +129,7 @@ class Solutions:
         """Integrate the history. stable_end: whether the stability of its last state is tested."""
         if self.saved is not None and self.saved.fine is not None:
             return self.saved.fine
-        asked, start, work = self.asked, self.start, self._joint()
+        asked, work = self.asked, self._joint()
         counts, share = (
             (np.zeros(0), asked.cycles.final_share) if isinstance(asked.cycles, ToTheEnd) else (asked.cycles, 0.0)
         )
@@ -143,11 +142,8 @@ class Solutions:
             HISTORY_ITERATIONS,
             share,
         )
-        estimate, accurate = Estimate(start.response_error, start.wear_rate_error), start.outcome is Outcome.CONVERGED
-        first = start.state
-        assert first is not None
         course = Course(work.area, asked.adaptive, counts, asked.until)
-        ended = self._run(integration, lambda: work.begin(first, start.resolution, estimate, accurate=accurate), course)
+        ended = self._run(integration, work.begin, course)
         state = ended.state
         if state is None or ended.failure.outcome is not Outcome.CONVERGED or not stable_end:
             return ended
@@ -181,13 +177,12 @@ class Solutions:
             like.iterations + HISTORY_ITERATIONS,
         )
         course = Course(work.area, smooth=True, counts=compared)
-        return self._run(integration, lambda: begin_reference(work, self.start, like.step_limit), course)
+        return self._run(integration, lambda: begin_reference(work, like.step_limit), course)
 
     def _joint(self) -> WearingJoint:
         """The joint, with the rest of the time limit."""
         asked = self.asked
-        assert self.start.state is not None
-        work = WearingJoint.of(self.case, self.start.state, asked.wear_coefficient, asked.law, asked.where)
+        work = WearingJoint(self.case, self.start, asked.wear_coefficient, asked.law, asked.where)
         work.run.budget.deadline = self.began + self.case.settings.time_limit
         return work
 
@@ -205,7 +200,7 @@ class Solutions:
             self.keep(pack(Saved(state, course, work.run.budget.iterations, fine, self.spent)))
 
 
-def begin_reference(work: WearingJoint, start: StartState, step_limit: float) -> WearState:
+def begin_reference(work: WearingJoint, step_limit: float) -> WearState:
     """The unworn state of the reference solution.
 
     The state of the reference sweep differs from the start state in its tangential history. Even a small difference may
@@ -213,13 +208,10 @@ def begin_reference(work: WearingJoint, start: StartState, step_limit: float) ->
     (dovetail, 212.5 Hz: the worn volume is 0.082 or 0.106 mm3; both sweeps lead to 0.082, twice their difference to
     0.097). Where this state is not found, the state of the reference sweep is taken.
     """
-    fine, reference = start.state, start.reference
-    assert fine is not None
-    begun = work.begin(reference or fine, start.resolution, NOTHING, accurate=True, step_limit=step_limit)
-    if reference is None:
+    begun, fine, reference = work.begin(step_limit, of_reference=True), work.start.state, work.start.reference
+    if fine is None or reference is None:
         return begun
     history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
-    balance = Balance(work.at(begun), history, begun.depth)
-    first = begun.point.evaluation.predicted_h
+    balance, first = Balance(work.at(begun), history, begun.depth), begun.point.evaluation.predicted_h
     point = work.run.state(balance, first, most=CONTINUATION.near_iterations)
     return begun if point is None else work.noted(replace(begun, point=point))

@@ -17,14 +17,13 @@
   The first step, and the first step behind a jump, is an implicit Euler step. The error of an Euler step is its
   difference to the trapezoidal rule.
 
-Friction on the slow time scale: a pair that does not wear may slide all the same. The wear of other pairs changes its
-force, and at its friction limit it slides a little in each cycle, to a place that depends on the way. A balance alone
-takes one slide for the whole way, an error of first order in the step that the local error of the depths does not show
-(dovetail, 16 pairs, 212.6 Hz, `rtol` 1e-2: 1.8 % of the worn volume, with the way in parts 0.4 %). So the predicted
-force goes along a straight line from the state before towards the extrapolated state, and the law is applied at each
-part of the line until the period repeats. The last part is left to the balance: with the whole line, pairs may keep the
-history of a way that the joint did not go (48 pairs, 211.5 Hz: 1.667 mm3, another branch, for 2.284 mm3; 2.261 by time
-integration).
+Friction on the slow time scale: the wear of other pairs changes the force of a pair, which slides a little in each
+cycle at its friction limit, to a place that depends on the way. A balance alone takes one slide for the whole way, an
+error of first order in the step that the local error does not show (dovetail, 16 pairs, 212.6 Hz, `rtol` 1e-2: 1.8 %
+of the worn volume, with the way in parts 0.4 %). So the law is applied at parts of a straight line from the predicted
+force towards the extrapolated one, at each until the period repeats. The last part is left to the balance: with the
+whole line, pairs may keep the history of a way that the joint did not go (48 pairs, 211.5 Hz: 1.667 mm3, another
+branch, for 2.284 mm3; 2.261 by time integration).
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from solver.model import FloatArray
 from solver.newton.iteration import MOST_ITERATIONS
 from solver.newton.run import Run
 from solver.outcome import Outcome
-from solver.results.history import PeriodicState
+from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution
 from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Hold, Joint
@@ -121,36 +121,27 @@ class WearingJoint:
     """The joint of one wear history.
 
     case: model, friction and settings, with the resolution and the hold of the last state that was used.
-    excitation_amplitude: N.
-    wear_coefficient: 1/Pa.
-    wearing: part of the slip work that wears.
+    start: unworn state, which exists; its load is that of the history.
+    wear_coefficient: 1/Pa. law: part of the slip work that wears.
     where: at which frequency.
     run: counts the iterations, limits the time, and keeps a factorisation from one solve to the next.
     """
 
     case: Case
-    excitation_amplitude: float
+    start: StartState
     wear_coefficient: float
-    wearing: WearingWork
-    where: Fixed
+    law: WearLaw = ARCHARD
+    where: Fixed = FIXED
+    excitation_amplitude: float = field(init=False)
+    wearing: WearingWork = field(init=False)
     run: Run = field(init=False)
-    _joint: Joint | None = field(default=None, repr=False)
+    _joint: Joint | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
+        assert self.start.state is not None
+        self.excitation_amplitude = self.start.state.excitation_amplitude
+        self.wearing = wearing_work(self.law, self.case.model.contact, self.case.friction_coefficient)
         self.run = Run(self.case.settings.tolerance)
-
-    @classmethod
-    def of(
-        cls,
-        case: Case,
-        state: PeriodicState,
-        wear_coefficient: float,
-        law: WearLaw = ARCHARD,
-        where: Fixed = FIXED,
-    ) -> WearingJoint:
-        """The joint of a case at the load of its unworn state."""
-        wearing = wearing_work(law, case.model.contact, case.friction_coefficient)
-        return cls(case, state.excitation_amplitude, wear_coefficient, wearing, where)
 
     @property
     def area(self) -> FloatArray:
@@ -188,30 +179,24 @@ class WearingJoint:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
         return cycles * self.wear_coefficient / self.area
 
-    def begin(
-        self,
-        start: PeriodicState,
-        resolution: Resolution,
-        estimate: Estimate,
-        *,
-        accurate: bool,
-        step_limit: float = math.nan,
-    ) -> WearState:
-        """The unworn state. The start state is evaluated here, not solved again.
+    def begin(self, step_limit: float = math.nan, *, of_reference: bool = False) -> WearState:
+        """The unworn state, or that of the reference sweep where there is one. It is evaluated, not solved again.
 
-        estimate: estimated errors of the start state.
-        accurate: whether these errors are below rtol.
         step_limit: largest stable explicit step, cycles; NaN if unknown.
         """
-        balance = Balance(self.joint(resolution, None, start.omega), start.start_history, start.wear_depth)
-        at = balance.evaluate(balance.predict(start.displacement_h, start.contact_force_h))
+        start = self.start
+        state = start.reference if of_reference and start.reference is not None else start.state
+        assert state is not None
+        balance = Balance(self.joint(start.resolution, None, state.omega), state.start_history, state.wear_depth)
+        at = balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
+        estimate = Estimate(start.response_error, start.wear_rate_error)
         unknown = np.full(self.area.size + 1, np.nan)
         begun = WearState(
             0.0,
-            start.omega,
+            state.omega,
             State(at, final_history(balance, at)),
-            resolution,
-            Choice(left_out(resolution.orders, at), estimate, accurate),
+            start.resolution,
+            Choice(left_out(start.resolution.orders, at), estimate, start.outcome is Outcome.CONVERGED),
             rates=unknown,
             largest_rates=np.zeros_like(unknown),
             step_limit=step_limit,

@@ -1,6 +1,5 @@
 """Histories until nothing wears any more: where they end, what they keep, and joints that wear without end."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -124,13 +123,3 @@ def test_what_cannot_be_marched_to_the_end_is_told():
         march_from_model(model, 160.0, 10.0, 0.5, 1e-11, 1e5, scheme="final")
     with pytest.raises(ValueError, match="outputs = 1: give at least 2"):
         march_from_model(model, 160.0, 10.0, 0.5, 1e-11, np.inf, outputs=1)
-
-
-def test_without_a_start_state_there_is_nothing():
-    model, start = unworn()
-    failed = replace(start, outcome=Outcome.START_FAILED, state=None)
-    found = march_wear(model, 0.6, failed, PER_PRESSURE, 1000.0, "adaptive", ToTheEnd(3), COARSE)
-    assert found.outcome is Outcome.START_FAILED
-    assert found.worn_volume.shape == (3,)
-    assert np.isnan(found.worn_volume).all()
-    assert np.isnan(found.last_cycle)
