@@ -15,6 +15,7 @@ from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.results.periodic_motion import PeriodicMotion, periodic_motion
+from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.structure.joint import Case, build_case
 
@@ -152,5 +153,4 @@ def balance_at_start(
     joint = case.joint(omega, excitation_amplitude)
     if state is None:
         return Balance(joint, np.zeros((n_contact, 2)), np.zeros(n_contact)), None
-    balance = Balance(joint, state.start_history, state.wear_depth)
-    return balance, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
+    return evaluated(joint, state)

@@ -9,19 +9,18 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solver.harmonic_balance.response_peak import largest_responses
 from solver.loading_history.start_states import follow_branch
 from solver.loading_history.sweep_start import Direction
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
-from solver.outcome import Outcome
+from solver.outcome import Outcome, known_to
 from solver.presentation import PresentedResponse
-from solver.results.history import WearHistory
+from solver.results.cut_off import describe_cut_off, first_cut_off
+from solver.results.history import StartState
+from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
-from solver.structure.joint import friction_of_pairs
-from solver.wear.control import Given
-from solver.wear.history import integrate_wear
-from solver.wear.solutions import SlowTime
-
-_START = np.zeros(1)  # the only cycle count
+from solver.structure.fourier import to_complex
+from solver.structure.joint import build_case, friction_of_pairs
 
 
 @dataclass(frozen=True, repr=False)
@@ -92,22 +91,53 @@ def frequency_response(
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     model = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
-    found: dict[int, WearHistory] = {}
-    branch = follow_branch(model, friction, load, ascending, sweep, settings)
-    for index, start in branch:
-        # a state is a wear history with cycle 0 alone
-        found[index] = integrate_wear(model, friction, settings, start, SlowTime(0.0, Given(1.0), _START))
-    points = [found[index] for index in place.tolist()]
+    starts = dict(follow_branch(model, friction, load, ascending, sweep, settings))
+    points = [_Point.of(model, friction, settings, starts[index]) for index in range(ascending.size)]
+    points = [points[index] for index in place.tolist()]
     return FrequencyResponse(
         frequency=wanted,
-        response=np.array([point.response[0] for point in points]),
-        response_peak=np.array([point.response_peak[0] for point in points]),
-        response_error=np.array([point.response_error[0] for point in points]),
+        response=np.array([point.response for point in points]),
+        response_peak=np.array([point.peak for point in points]),
+        response_error=np.array([point.error for point in points]),
         outcome=tuple(point.outcome for point in points),
         message=tuple(point.message for point in points),
-        branch=np.array([point.branch for point in points], np.int64),
-        fold_frequency=np.array([point.fold_frequency for point in points]),
+        branch=np.array([point.start.branch for point in points], np.int64),
+        fold_frequency=np.array([point.start.fold_frequency for point in points]),
     )
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Values of a point as in `FrequencyResponse`."""
+
+    start: StartState
+    response: ComplexArray
+    peak: FloatArray
+    error: float
+    outcome: Outcome
+    message: str
+
+    @staticmethod
+    def of(
+        model: ReducedModel, friction: float | FloatArray | None, settings: SolverSettings, start: StartState
+    ) -> _Point:
+        """The values of a state."""
+        state, outcome, message = start.state, start.outcome, start.message
+        if state is None:
+            nothing = np.full(len(model.response_names), np.nan)
+            return _Point(start, nothing.astype(np.complex128), nothing, math.nan, outcome, message)
+        case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
+        joint = case.joint(state.omega, state.excitation_amplitude)
+        at = evaluated(joint, state)[1]
+        pressure = state.contact_force_h[:, 0, 0] / model.contact.area
+        if not math.isnan(first_cut_off(model.contact, np.zeros(1), pressure[None], state.wear_depth[None])):
+            outcome, message = Outcome.CONTACT_CUT_OFF, describe_cut_off(0.0)
+        elif outcome is Outcome.INACCURATE:
+            error = {"response": start.response_error, "wear rate": start.wear_rate_error}
+            name = max(error, key=lambda each: error[each])
+            message = f"the {name} {known_to(error[name], settings.rtol)}"
+        response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
+        return _Point(start, response, largest_responses(joint, at), start.response_error, outcome, message)
 
 
 def check_case(

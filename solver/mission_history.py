@@ -88,55 +88,52 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
     """The block with its numbers checked; errors name it by its number and its name."""
     try:
         check_word("begin", block.way, get_args(Begin))
-        frequency, cycles = _checked_times(block)
         load, friction = check_case(block.model, block.excitation_amplitude, block.friction_coefficient, "up", settings)
         wearing_work(law, block.model.contact, friction_of_pairs(block.model, friction))
         if block.way == "continue":
             # the way from another amplitude is a ramp of this one
             check_number("excitation_amplitude", load, above=0.0)
-    except ValueError as error:
-        raise ValueError(f"{_called(place, block)}: {error}") from error
-    return replace(block, frequency=frequency, cycles=cycles, excitation_amplitude=load, friction_coefficient=friction)
-
-
-def _checked_times(block: Block) -> tuple[float | Passage, float | None]:
-    """Frequency and cycles of a block."""
-    if not isinstance(block.frequency, Passage):
+        found = replace(block, excitation_amplitude=load, friction_coefficient=friction)
+        if isinstance(block.frequency, Passage):
+            return replace(found, frequency=_checked_passage(block, block.frequency))
         if block.cycles is None:
             raise ValueError("cycles: missing: only a passage has cycles of its own")
-        return check_number("frequency", block.frequency, above=0.0), check_number("cycles", block.cycles, above=0.0)
-    passage = Passage(
-        check_number("frequency.start", block.frequency.start, above=0.0),
-        check_number("frequency.stop", block.frequency.stop, above=0.0),
-        check_number("frequency.rate", block.frequency.rate, above=0.0),
-    )
-    if passage.start == passage.stop:
+        frequency = check_number("frequency", block.frequency, above=0.0)
+        return replace(found, frequency=frequency, cycles=check_number("cycles", block.cycles, above=0.0))
+    except ValueError as error:
+        raise ValueError(f"{_called(place, block)}: {error}") from error
+
+
+def _checked_passage(block: Block, passage: Passage) -> Passage:
+    """The passage of a block with its numbers checked."""
+    names = ("start", "stop", "rate")
+    found = Passage(*(check_number(f"frequency.{name}", getattr(passage, name), above=0.0) for name in names))
+    if found.start == found.stop:
         raise ValueError("frequency.stop: give another frequency than start")
     if block.cycles is not None:
         raise ValueError("cycles: the cycles of a passage follow from its rate: leave them out")
-    if block.way != passage.sweep:
-        raise ValueError(f'begin: this passage goes {passage.sweep}: give "{passage.sweep}"')
-    return passage, None
+    if block.way != found.sweep:
+        raise ValueError(f'begin: this passage goes {found.sweep}: give "{found.sweep}"')
+    return found
 
 
 def _check_neighbours(before: Block, block: Block, place: int) -> None:
     """Raises ValueError where a block does not have the pairs of the block before, or cannot continue it."""
     one, other = before.model.contact, block.model.contact
     same = one.n_contact == other.n_contact and (one.area == other.area).all() and one.surface == other.surface
+    said = ""
     if not same or ((one.dofs < 0) != (other.dofs < 0)).any():
-        raise ValueError(f"{_called(place, block)}: model: give equal contact pairs to all blocks")
-    if before.model.response_names != block.model.response_names:
-        raise ValueError(f"{_called(place, block)}: model: give equal responses to all blocks")
-    if block.way != "continue":
-        return
-    if before.excitation_amplitude == 0.0:
-        raise ValueError(f"{_called(place, block)}: begin: the block before does not vibrate: begin with a ramp")
-    rubs = [friction_of_pairs(each.model, each.friction_coefficient) for each in (before, block)]
-    if before.model is not block.model or (rubs[0] != rubs[1]).any():
-        raise ValueError(
-            f"{_called(place, block)}: begin: continue goes with the model and friction of the block before: give"
-            ' "ramp", "up" or "down"'
-        )
+        said = "model: give equal contact pairs to all blocks"
+    elif before.model.response_names != block.model.response_names:
+        said = "model: give equal responses to all blocks"
+    elif block.way == "continue":
+        rubs = [friction_of_pairs(each.model, each.friction_coefficient) for each in (before, block)]
+        if before.excitation_amplitude == 0.0:
+            said = "begin: the block before does not vibrate: begin with a ramp"
+        elif before.model is not block.model or (rubs[0] != rubs[1]).any():
+            said = 'begin: continue goes with the model and friction of the block before: give "ramp", "up" or "down"'
+    if said:
+        raise ValueError(f"{_called(place, block)}: {said}")
 
 
 def _called(place: int, block: Block) -> str:

@@ -44,6 +44,7 @@ _OF_VALUES = {
     "response_peak_begin": ("block response", "m"),
     "response_peak_end": ("block response", "m"),
     "amplitude": ("", "m kg^0.5"),
+    "excitation_amplitude": ("", "N"),
 }
 """Dimensions after the first one, and unit; of all others no dimension and "1"."""
 
@@ -54,6 +55,10 @@ _OF_MISSIONS = {
     "steps": ("step",),
 }
 """All dimensions of values that belong to blocks or steps of missions."""
+
+
+NOT_IN_DATASETS = {"dataset": False}
+"""Metadata of a field that is no array of numbers or words."""
 
 
 class Presented:
@@ -72,7 +77,7 @@ class Presented:
         points = getattr(self, name)
         data: dict[str, Any] = {}
         for field in fields(self):  # type: ignore[arg-type]
-            if field.name == name:
+            if field.name == name or not field.metadata.get("dataset", True):
                 continue
             value = getattr(self, field.name)
             others, units = _OF_VALUES.get(field.name, ("", "1"))
@@ -188,6 +193,42 @@ class PresentedResponse(PresentedPoints):
         if len(lines) > 1:
             axes.legend(lines, [f"response {place}" for place in range(len(lines))])
         axes.set(xlabel="frequency in Hz", ylabel="response in m (first harmonic)")
+
+
+class PresentedCurve(Presented):
+    """A response curve through folds, over its points."""
+
+    OVER = ("point", "point")
+
+    def _rows(self) -> Sequence[tuple[str, str]]:
+        own: Any = self
+        size, unit = np.abs(own.response), "Hz" if own.parameter == "frequency" else "N"
+        values = getattr(own, own.parameter)
+        span = f"{values[0]:.6g} to {values[-1]:.6g} {unit}" if values.size else f"no state: {own.outcome}"
+        largest, stability = "none", Counter(own.stability)
+        if values.size:
+            point, place = np.unravel_index(np.argmax(size), size.shape)
+            largest = f"{size[point, place]:.4g} m at {values[point]:.6g} {unit}, response {place} (first harmonic)"
+        return [
+            ("", f"{values.size} points, {span}, {np.count_nonzero(own.is_fold)} folds, {size.shape[1]} responses"),
+            ("outcome", str(own.outcome)),
+            ("largest", largest),
+            ("stability", ", ".join(f"{number} {kind}" for kind, number in stability.items()) or "unknown"),
+            ("message", own.message or "none"),
+        ]
+
+    def _draw(self, axes: Axes) -> None:
+        own: Any = self
+        values, size = getattr(own, own.parameter), np.abs(own.response)
+        stable = np.array(own.stability) == "stable"
+        for place in range(size.shape[1]):
+            (line,) = axes.plot(values, size[:, place], ":", label=f"response {place}")
+            axes.plot(values, np.where(stable, size[:, place], np.nan), color=line.get_color())
+        axes.set(
+            xlabel="frequency in Hz" if own.parameter == "frequency" else "excitation amplitude in N",
+            ylabel="response in m (first harmonic)",
+            title="solid where stable",
+        )
 
 
 class PresentedMode(PresentedPoints):

@@ -10,28 +10,30 @@ from numpy.typing import ArrayLike
 
 from solver.accuracy.refinement import refine
 from solver.balance_functions import HarmonicBalance, balance_at_start, functions_of, start_of
-from solver.continuation.arc_length import Arc, add_fold
-from solver.continuation.options import CONTINUATION
+from solver.continuation.arc_length import Arc
+from solver.continuation.natural import SMOOTH_CHANGE
 from solver.forced_response import check_case, check_number, check_numbers, worn_model
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.harmonic_balance.state import BalanceAt, State
 from solver.loading_history.sweep_start import Direction
-from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
+from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
+from solver.presentation import NOT_IN_DATASETS, PresentedCurve
 from solver.settings import SolverSettings
 from solver.stability.floquet import Multipliers, Stability, find_multipliers
 from solver.stability.hill import is_stable
 from solver.structure.fourier import to_complex
-from solver.structure.joint import Case, Joint
+from solver.structure.joint import Case
 
 _LEAST_PART = 0.1  # of the first value: how far a curve may turn back
 _FEWEST_STEPS = 50  # of a curve without folds: enough for a drawing
+_NO_FARTHER = "the curve was followed up to {}: more harmonics or samples may help"
 
 
-@dataclass(frozen=True)
-class ResponseCurve:
+@dataclass(frozen=True, repr=False)
+class ResponseCurve(PresentedCurve):
     """Periodic states along a curve, `n_points` of them in the order of the curve, unstable ones included.
 
     - parameter: "frequency" or "excitation_amplitude", which changes along the curve; the other one is constant.
@@ -58,11 +60,16 @@ class ResponseCurve:
     response_error: FloatArray
     is_fold: BoolArray
     stability: tuple[Stability, ...]
-    multipliers: tuple[ComplexArray, ...]
+    multipliers: tuple[ComplexArray, ...] = field(metadata=NOT_IN_DATASETS)
     multiplier_error: FloatArray
     outcome: Outcome
     message: str
-    _balances: tuple[HarmonicBalance, ...] = field(repr=False, compare=False)
+    _balances: tuple[HarmonicBalance, ...] = field(repr=False, compare=False, metadata=NOT_IN_DATASETS)
+
+    @property
+    def point(self) -> IntArray:
+        """Numbers of the points (n_points,)."""
+        return np.arange(self.frequency.size)
 
     @property
     def exponents(self) -> tuple[ComplexArray, ...]:
@@ -132,82 +139,65 @@ def response_curve(
         return Balance(joint, history, balance.wear_depth)
 
     if at is None or not start.outcome.complete:
-        return _reported(case, _Branch((), ()), balance_at, over_frequency, errors, (start.outcome, start.message))
+        branch = _Branch((), (), start.outcome, start.message)
+        return _reported(case, branch, balance_at, over_frequency, errors)
     begin = State(at, balance.history, float(first))
     # a branch may turn back behind its start before it comes to the last value
     back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
-    span = abs(last - first) / (CONTINUATION.smooth_change * _FEWEST_STEPS)
+    span = abs(last - first) / (SMOOTH_CHANGE * _FEWEST_STEPS)
     arc = Arc(balance_at, begin, span, Run(settings.tolerance))
-    branch = _follow_branch(arc, last, back, most)
-    return _reported(case, branch, balance_at, over_frequency, errors, _end(branch, most, over_frequency))
+    branch = _follow_branch(arc, last, back, most, over_frequency)
+    return _reported(case, branch, balance_at, over_frequency, errors)
 
 
 @dataclass(frozen=True)
 class _Branch:
-    """Points of a branch in the order of the arc.
-
-    - points: the converged states.
-    - folds: indices of the points at which the parameter turns.
-    - arrived: whether the last point is at the last value of the parameter.
-    - returned: whether the branch has come back to the limit behind its start.
-    """
+    """Converged states of a branch in the order of the arc, indices of the folds among them, and how it ended."""
 
     points: tuple[State, ...]
     folds: tuple[int, ...]
-    arrived: bool = False
-    returned: bool = False
+    outcome: Outcome
+    message: str
 
 
-def _follow_branch(arc: Arc, last: float, back: float, most: int) -> _Branch:
+def _follow_branch(arc: Arc, last: float, back: float, most: int, over_frequency: bool) -> _Branch:
     """Follow a branch until its parameter passes `last`, or the limit `back` on the other side of the start.
 
     most: largest number of points.
     """
     points, folds = [arc.start], list[int]()
+
+    def ended(said: str) -> _Branch:
+        at = points[-1].parameter
+        end = f"{at / (2.0 * np.pi):.6g} Hz" if over_frequency else f"{at:.6g} N"
+        return _Branch(tuple(points), tuple(folds), Outcome.BRANCH_LOST, said.format(end))
+
     for before, reached, fold in arc.steps(float(np.sign(last - arc.start.parameter))):
-        add_fold(points, folds, fold, reached)
+        if fold is not None:
+            if fold is not points[-1] and fold is not reached:
+                points.append(fold)
+            folds.append(len(points) - (fold is not reached))
         for value in (last, back):
-            if (reached.parameter - value) * (before.parameter - value) <= 0.0:
-                end = arc.state_at(before, reached, value)
-                return _Branch(
-                    tuple(points) if end is None else (*points, end),
-                    tuple(folds),
-                    end is not None and value == last,
-                    value == back,
-                )
+            if (reached.parameter - value) * (before.parameter - value) > 0.0:
+                continue
+            end = arc.state_at(before, reached, value)
+            points.extend([] if end is None else [end])
+            if value == back:
+                return ended("the curve turns back as far as {}: begin farther away")
+            if end is not None:
+                return _Branch(tuple(points), tuple(folds), Outcome.CONVERGED, "")
+            return ended(_NO_FARTHER)
         points.append(reached)
         if len(points) >= most:
-            break
-    return _Branch(tuple(points), tuple(folds))
+            return ended(f"the curve has most_points = {most} points up to {{}}: give more")
+    return ended(_NO_FARTHER)
 
 
-def _end(branch: _Branch, most: int, over_frequency: bool) -> tuple[Outcome, str]:
-    """Outcome of a curve, and the sentence of one that does not come to its last value."""
-    if branch.arrived:
-        return Outcome.CONVERGED, ""
-    value, unit = branch.points[-1].parameter, "N"
-    if over_frequency:
-        value, unit = value / (2.0 * np.pi), "Hz"
-    if branch.returned:
-        return Outcome.BRANCH_LOST, f"the curve turns back as far as {value:.6g} {unit}: begin farther away"
-    if len(branch.points) >= most:
-        return Outcome.BRANCH_LOST, f"the curve has most_points = {most} points up to {value:.6g} {unit}: give more"
-    return Outcome.BRANCH_LOST, f"the curve was followed up to {value:.6g} {unit}: more harmonics or samples may help"
-
-
-def _error(case: Case, joint: Joint, point: State, run: Run) -> float:
-    """Estimated relative error of the response of a point; inf where no state with other harmonics is found."""
-    found = refine(case, joint.omega, joint.excitation_amplitude, point, run).estimate.response
-    return found if np.isfinite(found) else np.inf
-
-
-def _reported(
-    case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency: bool, errors: bool, end: tuple[Outcome, str]
-) -> ResponseCurve:
+def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency: bool, errors: bool) -> ResponseCurve:
     """The curve of a branch, each point with its error and multipliers."""
     n_response, n_points = len(case.model.linear[0].response), len(branch.points)
     response = np.empty((n_points, n_response), np.complex128)
-    peak, error = np.empty((n_points, n_response)), np.empty(n_points)
+    peak, error = np.empty((n_points, n_response)), np.full(n_points, np.nan)
     found: list[Multipliers] = []
     stability: list[Stability] = []
     balances: list[HarmonicBalance] = []
@@ -216,7 +206,10 @@ def _reported(
         joint, run = balance.joint, Run(case.settings.tolerance)
         response[index] = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
         peak[index] = largest_responses(joint, at)
-        error[index] = _error(case, joint, point, run) if errors else np.nan
+        if errors:
+            # NaN where no state with other harmonics is found
+            estimate = refine(case, joint.omega, joint.excitation_amplitude, point, run).estimate.response
+            error[index] = estimate if np.isfinite(estimate) else np.inf
         found.append(find_multipliers(case, joint, at, run))
         stability.append(found[-1].stability(odd=not is_stable(balance, at, run.fresh())))
         balances.append(functions_of(balance, at.predicted_h, Outcome.CONVERGED, ""))
@@ -233,7 +226,7 @@ def _reported(
         stability=tuple(stability),
         multipliers=tuple(each.values for each in found),
         multiplier_error=np.array([each.error for each in found]),
-        outcome=end[0],
-        message=end[1],
+        outcome=branch.outcome,
+        message=branch.message,
         _balances=tuple(balances),
     )

@@ -32,6 +32,7 @@ from fretwear import (
     open_result,
     read_scene,
     read_study,
+    response_curve,
     run_study,
 )
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
@@ -262,10 +263,12 @@ def test_results_are_datasets_pictures_and_five_lines():
     missions = integrate_mission([Block(model, 160.0, 10.0, 0.5, cycles=10.0)], 1.1e-11, [0, 10])
     assert missions.to_xarray().sizes == {"mission": 2, "contact": 1, "block": 1, "response": 1, "end": 2, "step": 5}
     curve, mode = frequency_response(model, FREQUENCIES, 10.0, 0.5), backbone(model, 1e-3, 0.5, sweep="down")
+    whole = response_curve(model, (150.0, 152.0), 10.0, 0.5, settings=SolverSettings(harmonics=3), errors=False)
     for found, index, value in (
         (march_wear(model, 160.0, 10.0, 0.5, 1.1e-11, 1e4), "cycle", "worn_volume"),
         (missions, "mission", "worn_volume"),
         (curve, "frequency", "response"),
+        (whole, "point", "frequency"),
         (mode, "modal_amplitude", "damping_ratio"),
     ):
         lines = repr(found).splitlines()

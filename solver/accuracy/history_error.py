@@ -10,7 +10,6 @@ import numpy as np
 
 from solver.accuracy.options import ACCURACY
 from solver.model import ComplexArray, FloatArray
-from solver.settings import Scheme
 
 
 @dataclass(frozen=True)
@@ -20,12 +19,14 @@ class HistoryError:
     worn_volume (n_output,): relative; 0 where nothing has worn.
     wear_depth (n_output, n_contact): m.
     response, wear_rate (n_output,): relative, of the state at a count.
+    frequency (n_output,): of the excitation, Hz.
     """
 
     worn_volume: FloatArray
     wear_depth: FloatArray
     response: FloatArray
     wear_rate: FloatArray
+    frequency: FloatArray
 
 
 @dataclass(frozen=True)
@@ -35,19 +36,21 @@ class Both:
     counts (n,): ascending.
     fine, reference: values by name as from `solver.wear.course.Course.read`; the reference has NaN beyond its end, and
         nothing where there is none.
+    follows: whether the frequency of the excitation follows the structure.
     """
 
     counts: FloatArray
     fine: Mapping[str, Any]
     reference: Mapping[str, Any]
+    follows: bool = False
 
     def other(self, name: str) -> Any:
         """Values of the reference solution."""
         return self.reference.get(name, np.full_like(self.fine[name], np.nan))
 
 
-def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) -> HistoryError:
-    """Errors of a history.
+def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
+    """Errors of an adaptive history, from its difference to the reference solution.
 
     Parameters
     ----------
@@ -57,8 +60,6 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
         Both solutions at the ends of the steps: depths, responses and wear rates.
     area
         (n_contact,), m2.
-    scheme
-        Scheme of the history.
     """
     counts, fine, safety = outputs.counts, outputs.fine, ACCURACY.history_safety
 
@@ -71,10 +72,8 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
     # the error of the start state remains, even where later states agree by chance
     at_start = np.fmax(_start_error(outputs, area), fine["wear_rate_error"][0])
     from_start = np.where(volume > 0.0, at_start, 0.0) * volume
-    # the local errors of Euler steps have one sign and add up
-    by_steps = (1.0 if scheme == "adaptive" else safety) * fine["local"]
     # start state and steps have nothing to do with each other: the worst case is their sum
-    error = np.fmax(error, from_start + by_steps)
+    error = np.fmax(error, from_start + fine["local"])
     reached = np.isfinite(volume)
     unknown = reached & ~np.isfinite(difference).all(axis=1)
     relative = _over(error, volume)
@@ -98,7 +97,44 @@ def history_error(outputs: Both, steps: Both, area: FloatArray, scheme: Scheme) 
     rate = of_state("wear_rate_error", _rate_change(outputs), _rate_change(steps))
     # beyond the end of the history nothing is known, not even an error
     response, rate = (np.where(reached, each, np.nan) for each in (response, rate))
-    return HistoryError(relative, of_pairs, response, rate)
+    return HistoryError(relative, of_pairs, response, rate, _frequency_error(outputs, safety, 0.0))
+
+
+def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray) -> HistoryError:
+    """Errors of a history with given steps: its difference to the adaptive history, and the errors of the latter.
+
+    outputs: the history, and the adaptive one in place of the reference solution, at the counts to report.
+    adaptive: errors of the adaptive history at these counts. area (n_contact,): m2.
+    """
+    fine, depth = outputs.fine, outputs.fine["wear_depth"]
+    apart, volume, other = _depth_change(outputs), depth @ area, outputs.other("wear_depth") @ area
+    error = apart @ area + adaptive.worn_volume * other
+    reached = np.isfinite(volume)
+    unknown = reached & ~np.isfinite(error)
+    relative = _over(error, volume)
+    relative[unknown & (volume > 0.0)] = np.inf
+    of_pairs = np.where(unknown[:, None], np.where(depth > 0.0, np.inf, 0.0), apart + adaptive.wear_depth)
+    relative[~reached], of_pairs[~reached] = np.nan, np.nan
+    unworn = (outputs.counts == 0.0) | (volume <= 0.0)
+
+    def of_state(name: str, change: FloatArray, known: FloatArray) -> FloatArray:
+        found = np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], change + known)))
+        return np.where(reached, found, np.nan)
+
+    # both relative errors of the adaptive history are nearly those of this one: their values are as large
+    response = of_state("response_error", _response_change(outputs), adaptive.response)
+    rate = of_state("wear_rate_error", _rate_change(outputs), adaptive.wear_rate)
+    return HistoryError(relative, of_pairs, response, rate, _frequency_error(outputs, 1.0, adaptive.frequency))
+
+
+def _frequency_error(both: Both, safety: float, known: FloatArray | float) -> FloatArray:
+    """Error (n,), Hz, of the frequency of the excitation: its difference times `safety`, and the error of the other."""
+    name = "excitation_frequency"
+    own = both.fine.get("excitation_frequency_error", np.zeros(len(both.counts)))
+    if not both.follows:
+        return np.asarray(own)
+    whole = np.maximum(own, safety * np.abs(both.fine[name] - both.other(name)) + known)
+    return np.where(np.isfinite(both.fine["wear_rate"]) & np.isnan(whole), np.inf, whole)
 
 
 def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:

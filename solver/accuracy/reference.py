@@ -2,15 +2,13 @@
 
 It starts from another sweep: half the nodes, placed between those of the fine sweep (`solver.loading_history`). The
 difference of the tangential histories of both sweeps is extrapolated: the reference solution starts from twice this
-difference. Its steps on the slow time are adaptive, and it has other harmonics (`harmonic_levels`) with the samples
-that belong to them:
+difference. It is coarser in all: its steps on the slow time have twice the tolerance, and it has the next lower
+harmonics (the next higher ones where the harmonics are few) with the samples that belong to them.
 
-- The reference solution of an adaptive history is coarser in all: the next lower harmonics (the next higher ones where
-  the harmonics are few), and twice the tolerance.
-- That of a history with given Euler steps is finer: the next higher harmonics, and the tolerance itself. The Euler
-  steps are the largest error, and a coarse adaptive history may be wrong like them. Where a pair only just slips
-  (dovetail, 16 pairs, 212.5 Hz) it sticks again with coarse harmonics as with implicit steps: 1.89 mm3, with steps of
-  250 cycles 1.90, the truth 2.03.
+A history with given Euler steps has no reference solution of its own: it is compared with the adaptive history, whose
+errors are known, and which all given steps share. A coarser history with the same steps errs as they do: where a pair
+only just slips (dovetail, 16 pairs, 212.5 Hz) it sticks with implicit steps, 1.89 mm3, with steps of 250 cycles 1.90;
+the truth is 2.03.
 
 Some events make an error grow: pairs stick again, a resonance passes, a branch ends. The difference to the reference
 solution grows as well, a sum of local errors does not.
@@ -32,17 +30,11 @@ AUTOMATIC = SolverSettings()
 
 
 def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
-    """Harmonics and samples of the reference solution of an adaptive history: those of the next lower level.
+    """Harmonics and samples of the reference solution: those of the next lower level.
 
     With one harmonic alone a joint that slips is another joint. So the reference solution of a history with three
     harmonics or one has the next higher level, where the model has matrices for it.
     """
     few = resolution.highest <= FIRST_HARMONICS
-    richer = finer(resolution, model)
-    return richer if few and richer != resolution else fewer(resolution, AUTOMATIC)
-
-
-def finer(resolution: Resolution, model: ReducedModel) -> Resolution:
-    """Harmonics and samples of the next higher level; the same where the model has no matrices for it."""
     richer = shifted(resolution, 1)
-    return richer if model.holds(richer.highest) else resolution
+    return richer if few and model.holds(richer.highest) else fewer(resolution, AUTOMATIC)

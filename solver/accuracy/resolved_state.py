@@ -7,6 +7,7 @@ series, is its error.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -256,6 +257,7 @@ class ResolvedState:
         structure = self.joint.structure
         return to_complex(structure.response_h(self.joint.to_relative(self.point.evaluation.displacement_h)))[:, 0]
 
+    @cached_property
     def peaks(self) -> FloatArray:
         """Largest magnitudes of the responses over the period (n_response,), m."""
         return largest_responses(self.joint, self.point.evaluation)
@@ -279,7 +281,7 @@ class ResolvedState:
         mine, its = self.response(), better.response()
         least = better.least_response()
         first = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), least)
-        mine_peak, its_peak = self.peaks(), better.peaks()
+        mine_peak, its_peak = self.peaks, better.peaks
         size = np.maximum(its_peak, max(SMALL_PEAK * float(its_peak.max(initial=0.0)), least))
         response = max(first, float((np.abs(mine_peak - its_peak) / size).max(initial=0.0)))
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))

@@ -58,6 +58,14 @@ class Marched:
     periodicity_error: float
     slip_work: FloatArray
 
+    @property
+    def stuck(self) -> BoolArray:
+        """Pairs (n_contact,) that stick during the whole period and so transmit the predicted force.
+
+        The start of a period that was marched more than once may depend on the force.
+        """
+        return np.asarray((self.status_t == STICK).all(axis=1) & (self.periods == 1))
+
 
 @dataclass(frozen=True)
 class ContactLaw:
@@ -155,9 +163,8 @@ class ContactLaw:
         contact, basis, masses = self.contact, self.basis, self.penalty.inertial
         n_contact, m = contact.n_contact, basis.synthesis.shape[0]
         tangent, work_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
-        # a pair that sticks during the whole period transmits the predicted force, an open pair transmits nothing; but
-        # the start of a period that was marched more than once may depend on the force
-        stuck = (at.status_t == STICK).all(axis=1) & (at.periods == 1)
+        # an open pair transmits nothing
+        stuck = at.stuck
         switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
         slides = switching & (contact.dofs[:, 1:] >= 0).any(axis=1)
         march_tangent(
@@ -189,30 +196,28 @@ class ContactLaw:
 
         A linear map: Eq. (12) divided by the penalty; Newton's law for inertial pairs. Means are relative to `origin`.
         """
-        shape, masses = (-1,) + (1,) * (correction.ndim - 2), self.penalty.inertial
-        moved = np.empty_like(correction)
-        moved[:, 0] = correction[:, 0] / self.penalty.normal.reshape(shape)
-        moved[:, 1:] = correction[:, 1:] / self.penalty.tangential.reshape((*shape, 1))
-        if self.rate_dependent and self.basis.orders:
-            moved[masses, 1:] = _scaled(correction[masses, 1:], 1.0 / self.penalty.mean[masses], self._compliance)
-        return moved
+        return _scaled(correction, self.compliance)
 
     def force(self, motion: FloatArray) -> FloatArray:
         """Predicted less contact force (n_contact, 3, m), N, of a motion, m, Eqs. (10), (12); undoes `motion`."""
-        penalty, masses = self.penalty, self.penalty.inertial
-        force = motion * np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)[:, :, None]
-        if self.rate_dependent and self.basis.orders:
-            force[masses, 1:] = _scaled(motion[masses, 1:], penalty.mean[masses], 1.0 / self._compliance)
-        return force
+        return _scaled(motion, 1.0 / self.compliance)
 
     @cached_property
-    def _compliance(self) -> ComplexArray:
-        """Displacement per force (n_inertial, H), m/N, of the inertial pairs, exactly as in the steps of the march."""
-        orders = np.array(self.basis.orders, np.float64)
-        angle = np.pi * orders / self.basis.n_samples
-        mass, drag, _ = (part[:, None] for part in self._masses(self.penalty.inertial))
-        impedance = 2j * mass * np.sin(angle) / self.sample_step + drag * np.cos(angle)
-        return np.asarray(np.sin(angle) / angle / (1j * self.omega * orders * impedance))
+    def compliance(self) -> ComplexArray:
+        """Displacement per force (n_contact, 3, H+1), m/N, in each harmonic, from the static one on.
+
+        1 / eps for elastic pairs; for inertial pairs exactly as in the steps of the march.
+        """
+        penalty, masses, orders = self.penalty, self.penalty.inertial, np.array(self.basis.orders, np.float64)
+        own = 1.0 / np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)
+        found = np.repeat(own[:, :, None].astype(complex), orders.size + 1, axis=2)
+        if masses.any() and orders.size:
+            angle = np.pi * orders / self.basis.n_samples
+            mass, drag, mean = (part[masses, None] for part in (penalty.mass, penalty.drag, penalty.mean))
+            impedance = 2j * mass * np.sin(angle) / self.sample_step + drag * np.cos(angle)
+            moving = np.sin(angle) / angle / (1j * self.omega * orders * impedance)
+            found[masses, 1:] = np.concatenate([1.0 / mean, moving], axis=1)[:, None, :]
+        return found
 
     def origin(self, history: FloatArray) -> FloatArray:
         """Mean tangential position (n_contact, 2), m, at which no mean force acts: the history of inertial pairs."""
@@ -309,13 +314,14 @@ class ContactLaw:
         return beyond
 
 
-def _scaled(values_h: FloatArray, mean: FloatArray, factor: ComplexArray) -> FloatArray:
-    """Series (k, 2, m, ...) with their means times `mean` (k,) and their complex amplitudes times `factor` (k, H)."""
+def _scaled(values_h: FloatArray, factor: ComplexArray) -> FloatArray:
+    """Series (k, 3, m, ...) with their complex amplitudes times the factor (k, 3, H+1) of each harmonic."""
     tail = (1,) * (values_h.ndim - 3)
-    real, imaginary = (part.reshape(len(factor), 1, -1, *tail) for part in (factor.real, factor.imag))
+    real, imaginary = (part.reshape(*factor.shape, *tail) for part in (factor.real, factor.imag))
     cosine, sine = values_h[:, :, 1::2], values_h[:, :, 2::2]
     scaled = np.empty_like(values_h)
-    scaled[:, :, 0] = values_h[:, :, 0] * mean.reshape(-1, 1, *tail)
+    scaled[:, :, 0] = real[:, :, 0] * values_h[:, :, 0]
     # a complex amplitude is cosine - i sine
-    scaled[:, :, 1::2], scaled[:, :, 2::2] = real * cosine + imaginary * sine, real * sine - imaginary * cosine
+    scaled[:, :, 1::2] = real[:, :, 1:] * cosine + imaginary[:, :, 1:] * sine
+    scaled[:, :, 2::2] = real[:, :, 1:] * sine - imaginary[:, :, 1:] * cosine
     return scaled

@@ -1,4 +1,4 @@
-"""Pseudo-arc-length continuation of a branch through its folds to an accepted state at a target.
+"""Pseudo-arc-length continuation of a branch through its folds.
 
 The parameter is the further unknown of a bordered system (`solver.newton.bordering`), and the further equation says
 that the point lies in a plane across the tangent of the branch.
@@ -6,28 +6,22 @@ that the point lies in a plane across the tangent of the branch.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Evaluation, Linearisation
-from solver.harmonic_balance.state import BalanceAt, State, vibration_change
+from solver.harmonic_balance.state import BalanceAt, State
 from solver.model import FloatArray
 from solver.newton.bordering import Bordered
 from solver.newton.run import Run
 from solver.settings import DIFFERENCE, NEGLIGIBLE
 
-ARC_SPAN = 0.05
-"""Natural length of a frequency over the frequency, and of a load factor."""
-
-ARC_CORRECTORS = 300
-"""Most correctors of one continuation, converged or not."""
-
-FIRST_ARC = CONTINUATION.smooth_change / 10.0
-"""Length of the first step, in unknowns divided by the norm of the first predicted force. With the length of the
-longest one seven branches with folds take 1.5 % more iterations."""
+FIRST_ARC = SMOOTH_CHANGE / 10.0
+"""Length of the first step, in unknowns divided by the norm of the first predicted force; the longest one is
+`SMOOTH_CHANGE`. With this length seven branches with folds take 1.5 % more iterations."""
 
 CORNER_ARC = 1e-3
 """Length of the step behind a corner, and least length after a step. Without such a least length the same branches
@@ -41,90 +35,12 @@ ARC_WANDER = 2.0
 the branch of `tests/solver/test_arc_length.py` is left for another one. Four times the length takes 1 % more
 iterations."""
 
-FARTHEST = 10.0
-"""Natural lengths of the parameter from start and target at which the search ends."""
-
-
-@dataclass(frozen=True)
-class ArcResult:
-    """Result of a continuation by arc length.
-
-    - state: at the target; None where the target was not reached.
-    - folds: values of the parameter at which the branch turns back.
-    - jumps: the folds at which the state jumps when the parameter changes slowly. Where the branch returns to the
-      parameter of such a fold, the vibration is a different one.
-    """
-
-    state: State | None
-    folds: tuple[float, ...]
-    jumps: tuple[float, ...]
-
-
-def follow_arc(
-    arc: Arc,
-    target: float,
-    accept: Callable[[State], bool] = lambda _: True,
-    toward: float = 0.0,
-    beyond: bool = True,
-) -> ArcResult:
-    """Follow the branch by arc length, through folds, to an accepted state at the target.
-
-    accept: whether a state at the target ends the search. The search also ends at a distance of `FARTHEST` from start
-    and target, and after `ARC_CORRECTORS` correctors.
-    toward: sign of the first change of the parameter; by default towards the target.
-    beyond: False ends the search where the branch reaches the target before any fold in a state that is not accepted.
-    The branch has then lost its stability otherwise than at a fold, and no slow change leads to its later states.
-    """
-    begin = arc.start.parameter
-    toward = toward or float(np.sign(target - begin)) or 1.0
-    far = FARTHEST * abs(arc.span)
-    states, turns = [arc.start], list[int]()
-    for before, reached, fold in arc.steps(toward, ARC_CORRECTORS):
-        add_fold(states, turns, fold, reached)
-        states.append(reached)
-        if (reached.parameter - target) * (before.parameter - target) <= 0.0 and before.parameter != target:
-            found = arc.state_at(before, reached, target)
-            if found is not None and accept(found):
-                folds = tuple(states[turn].parameter for turn in turns)
-                return ArcResult(found, folds, _jumps(turns, [*states, found], toward))
-            if found is not None and not turns and not beyond:
-                break
-        if not min(begin, target) - far <= reached.parameter <= max(begin, target) + far:
-            break
-    return ArcResult(None, tuple(states[turn].parameter for turn in turns), ())
-
-
-def add_fold(states: list[State], turns: list[int], fold: State | None, reached: State) -> None:
-    """Add the fold of a step to the states before its end, and the index of the fold to `turns`."""
-    if fold is None:
-        return
-    if fold is not states[-1] and fold is not reached:
-        states.append(fold)
-    turns.append(len(states) - (fold is not reached))
-
-
-def _jumps(turns: list[int], states: list[State], toward: float) -> tuple[float, ...]:
-    """Folds behind which the branch returns with a different vibration. turns: indices of the folds in `states`."""
-    jumps: list[float] = []
-    free = 0  # folds between an earlier fold and the return of the branch do not count
-    for turn in turns:
-        if turn < free:
-            continue
-        fold = states[turn].parameter
-        beyond = [place for place in range(turn + 1, len(states)) if (states[place].parameter - fold) * toward > 0.0]
-        again = beyond[0] if beyond else len(states) - 1
-        one, other = states[turn].evaluation, states[again].evaluation
-        if max(vibration_change(one, other), vibration_change(other, one)) > CONTINUATION.smooth_change:
-            jumps.append(fold)
-        free = again
-    return tuple(jumps)
-
 
 @dataclass
 class Arc:
     """A branch and its arc-length steps in the scaled unknowns (p / size, parameter / span).
 
-    The tangential history of the start is held.
+    The tangential history of the start is constant.
 
     - balance_at: balance at a value of the parameter for a tangential history (n_contact, 2), m.
     - start: first state, with its parameter.
@@ -141,17 +57,21 @@ class Arc:
     def __post_init__(self) -> None:
         self.size = max(float(np.linalg.norm(self.start.evaluation.predicted_h)), 1e-300)
 
-    def steps(self, toward: float, correctors: float = np.inf) -> Iterator[tuple[State, State, State | None]]:
+    def steps(self, toward: float) -> Iterator[tuple[State, State, State | None]]:
         """Steps along the branch: start and end of a step, and the state at the fold between both, None if none.
 
-        toward: sign of the first change of the parameter. correctors: most correctors of all steps.
+        toward: sign of the first change of the parameter.
         """
-        state, length, left = self.start, FIRST_ARC, correctors
+        state, length = self.start, FIRST_ARC
         along = np.zeros(state.evaluation.predicted_h.size + 1)
         along[-1] = toward
         tangent = self.tangent(state.parameter, state.evaluation, along)
-        while tangent is not None and left > 0 and not self.run.budget.exhausted:
-            reached, length, left = self._advance(state, tangent, length, left)
+        while tangent is not None and not self.run.budget.exhausted:
+            reached = None
+            while reached is None and length > SHORTEST_ARC:
+                reached = self.step(state, tangent, length)
+                length = 0.5 * length if reached is None else min(2.0 * length, SMOOTH_CHANGE)
+            reached = reached or self._step_over_corner(state, tangent)
             if reached is None:
                 return
             back = state is self.start and (reached.parameter - state.parameter) * toward < 0.0
@@ -173,15 +93,13 @@ class Arc:
 
         A finite difference is enough: the slope only gives directions to the corrector, whose residual is exact.
         """
-        step = DIFFERENCE
-        ahead = self.balance_at(parameter + step * self.span, self.start.history).evaluate(evaluation.predicted_h)
-        return (ahead.residual - evaluation.residual) / step
+        ahead = self.balance_at(parameter + DIFFERENCE * self.span, self.start.history).evaluate(evaluation.predicted_h)
+        return (ahead.residual - evaluation.residual) / DIFFERENCE
 
     def tangent(self, parameter: float, evaluation: Evaluation, along: FloatArray) -> FloatArray | None:
         """Unit tangent of the branch, of the sign of a direction `along`; None where the tangent is not defined."""
         balance, slope = self.balance_at(parameter, self.start.history), self.slope(parameter, evaluation)
-        step = self.run.step(balance, evaluation, -slope) / self.size
-        tangent = np.append(step.ravel(), 1.0)
+        tangent = np.append((self.run.step(balance, evaluation, -slope) / self.size).ravel(), 1.0)
         largest = float(np.abs(tangent).max())
         if not np.isfinite(largest):
             return None
@@ -190,26 +108,13 @@ class Arc:
         tangent /= np.linalg.norm(tangent)
         return np.asarray(tangent * (np.sign(tangent @ along) or 1.0))
 
-    def _advance(
-        self, state: State, tangent: FloatArray, length: float, left: float
-    ) -> tuple[State | None, float, float]:
-        """The next state, None where none is found; the length of the step after it; correctors left of `left`."""
-        reached = None
-        while reached is None and length > SHORTEST_ARC and left > 0:
-            reached = self.step(state, tangent, length)
-            left -= 1
-            length = min(2.0 * length, CONTINUATION.smooth_change) if reached is not None else 0.5 * length
-        if reached is None:
-            reached = self._step_over_corner(state, tangent)
-        return reached, length, left
-
     def step(self, state: State, tangent: FloatArray, length: float) -> State | None:
         """State of the branch at the given length along the tangent; None where the corrector does not converge."""
         base = self.place(state)
         ahead = base + length * tangent
         start = ahead[:-1].reshape(state.evaluation.predicted_h.shape) * self.size
         plane = _Plane(self, base, tangent, length)
-        found = self.run.solve_bordered(plane, start, ahead[-1:], CONTINUATION.near_iterations - 1)
+        found = self.run.solve_bordered(plane, start, ahead[-1:], NEAR_ITERATIONS - 1)
         return None if found is None else State(found.at, self.start.history, float(found.values[0] * self.span))
 
     def _step_over_corner(self, state: State, tangent: FloatArray) -> State | None:
@@ -219,15 +124,15 @@ class Arc:
         may not meet the branch behind the corner. So the tangent behind the corner is taken a little ahead of the
         state, and both signs of this tangent are tried. A solution on the branch before the corner is refused.
         """
-        base, length = self.place(state), CORNER_ARC
-        ahead = base + length * tangent
+        base = self.place(state)
+        ahead = base + CORNER_ARC * tangent
         parameter, predicted_h = float(ahead[-1] * self.span), ahead[:-1].reshape(state.evaluation.predicted_h.shape)
         behind = self.balance_at(parameter, self.start.history).evaluate(predicted_h * self.size)
         turned = self.tangent(parameter, behind, tangent)
         if turned is None:
             return None
         for sign in (1.0, -1.0):
-            reached = self.step(state, sign * turned, length)
+            reached = self.step(state, sign * turned, CORNER_ARC)
             if reached is None:
                 continue
             chord = self.place(reached) - base
@@ -241,7 +146,7 @@ class Arc:
         fraction = (target - before.parameter) / (after.parameter - before.parameter)
         one, other = before.evaluation.predicted_h, after.evaluation.predicted_h
         balance = self.balance_at(target, self.start.history)
-        result = self.run.solve(balance, one + fraction * (other - one), CONTINUATION.near_iterations)
+        result = self.run.solve(balance, one + fraction * (other - one), NEAR_ITERATIONS)
         return State(result.evaluation, self.start.history, target) if result.converged else None
 
     def _fold(self, state: State, tangent: FloatArray, after: State) -> State:
@@ -255,7 +160,7 @@ class Arc:
         at_low, at_high = float(tangent[-1]), -float(tangent[-1])
         sign = np.sign(tangent[-1])
         best = max(state, after, key=lambda each: sign * each.parameter)
-        for step in range(CONTINUATION.near_iterations):
+        for step in range(NEAR_ITERATIONS):
             # the part behind the fold is known after the first steps: halve until then
             place = 0.5 * (low + high) if step < 2 else low + (high - low) * at_low / (at_low - at_high)
             found = self.step(state, tangent, place)

@@ -13,14 +13,14 @@ of an elastic joint and of a mass have opposite signs, and interpolated stiffnes
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.prolongation import carried_history
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import BalanceAt, State
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.run import Run
 from solver.settings import Resolution
@@ -39,14 +39,37 @@ def add_harmonics(
     """
     finer = replace(case, resolution=resolution).joint(joint.omega, joint.excitation_amplitude)
     new = np.flatnonzero(~np.isin(resolution.orders, case.resolution.orders))
-    homotopy = HarmonicHomotopy(finer, evaluation.history, evaluation.wear_depth, new, *compliances(finer, new))
+    balance_at = harmonic_homotopy(finer, evaluation, new)
     start = change_orders(evaluation.predicted_h, case.resolution.orders, resolution.orders)
-    begun = run.fresh().state(homotopy.at(0.0, evaluation.history), start)
+    begun = run.fresh().state(balance_at(0.0, evaluation.history), start)
     if begun is None:
         return None
     first = State(begun.evaluation, evaluation.history, 0.0)
-    last, arrived = follow_naturally(homotopy.at, first, 1.0, run.fresh(), keep_history=True)
+    last, arrived = follow_naturally(balance_at, first, 1.0, run.fresh(), keep_history=True)
     return last.evaluation if arrived else None
+
+
+def harmonic_homotopy(joint: Joint, known: Evaluation, new: IntArray) -> BalanceAt:
+    """Balances between the state without the new harmonics (s = 0) and the state with the new harmonics (s = 1).
+
+    joint: with all harmonics. known: its history and depths hold. new (k,): indices of the new harmonics.
+    """
+    structure = joint.structure
+    unit = np.zeros((joint.contact.n_contact, 3, 2 * joint.basis.n_harmonics + 1))
+    unit[:, :, 1::2] = 1.0
+    penalty = to_complex(joint.to_relative(joint.law.force(unit)))[:, new]
+    compliant = np.stack([np.diag(1.0 / column) for column in penalty.T])  # 1 / E_n (k, n_rel, n_rel), m/N
+    compliance: ComplexArray = np.linalg.inv(structure.dynamic_stiffness[new]).astype(complex)
+
+    def balance_at(parameter: float, _: FloatArray) -> Balance:
+        mixed_joint = joint
+        if parameter < 1.0:
+            mixed = structure.dynamic_stiffness.astype(complex)
+            mixed[new] = np.linalg.inv((1.0 - parameter) * compliant + parameter * compliance)
+            mixed_joint = replace(joint, structure=replace(structure, moving=DenseStiffness(mixed)))
+        return Balance(mixed_joint, known.history, known.wear_depth)
+
+    return balance_at
 
 
 def start_with_tail(old: Case, joint: Joint, evaluation: Evaluation) -> tuple[Balance, FloatArray]:
@@ -71,42 +94,3 @@ def start_with_tail(old: Case, joint: Joint, evaluation: Evaluation) -> tuple[Ba
         moved = -np.linalg.solve(joint.structure.moving.matrix(int(place)), amplitude)
         motion_h[:, 2 * place + 1], motion_h[:, 2 * place + 2] = moved.real, -moved.imag
     return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))
-
-
-def compliances(joint: Joint, places: IntArray) -> tuple[ComplexArray, ComplexArray]:
-    """Compliances 1 / E_n of the penalty and G_n of the structure, (k, n_rel, n_rel) each, m/N.
-
-    places (k,): indices of the wanted harmonics among the harmonics of the joint.
-    """
-    unit = np.zeros((joint.contact.n_contact, 3, 2 * joint.basis.n_harmonics + 1))
-    unit[:, :, 1::2] = 1.0
-    penalty = to_complex(joint.to_relative(joint.law.force(unit)))[:, places]
-    compliance = np.linalg.inv(joint.structure.dynamic_stiffness[places]).astype(complex)
-    return np.stack([np.diag(1.0 / column) for column in penalty.T]), compliance
-
-
-@dataclass(frozen=True)
-class HarmonicHomotopy:
-    """Balances between the state without the new harmonics (s = 0) and the state with the new harmonics (s = 1).
-
-    - joint: the joint with all harmonics.
-    - history (n_contact, 2), wear_depth (n_contact,): m, constant.
-    - new (k,): indices of the new harmonics.
-    - penalty_compliance, compliance: as `compliances` returns them.
-    """
-
-    joint: Joint
-    history: FloatArray
-    wear_depth: FloatArray
-    new: IntArray
-    penalty_compliance: ComplexArray
-    compliance: ComplexArray
-
-    def at(self, parameter: float, _: FloatArray) -> Balance:
-        """Balance at the homotopy parameter s."""
-        structure = self.joint.structure
-        if parameter < 1.0:
-            mixed = structure.dynamic_stiffness.astype(complex)
-            mixed[self.new] = np.linalg.inv((1.0 - parameter) * self.penalty_compliance + parameter * self.compliance)
-            structure = replace(structure, moving=DenseStiffness(mixed))
-        return Balance(replace(self.joint, structure=structure), self.history, self.wear_depth)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import ATTEMPTS
 from solver.continuation.phase_lag import (
     excitation_product,
     first_response,
@@ -49,7 +49,7 @@ def solve_at_peak(
     """
     below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
     before: tuple[float, float] | None = None
-    for _ in range(CONTINUATION.attempts):
+    for _ in range(ATTEMPTS):
         found = solve_at_lag(case, balance, start, lag, run, most)
         if found is None:
             return None

@@ -1,13 +1,9 @@
 """Ratcheting of masses on sliders, and the state after shakedown.
 
 A very small stiffness holds the mean position of an inertial pair (`penalty.mean`), and drag holds its mean velocity.
-Vibration may let the mass slip to a mean position u_0 that differs from the position of its history. The march through
-the period then ratchets by
-
-    2 pi / omega (p_0 - lambda_0) / c = 2 pi / omega penalty.mean (u_0 - history) / c
-
-in each period, with c the drag, although the Fourier series are periodic. The slip of this motion counts as wear, but
-its work is not in the balance of energy. Where little slips, nearly all slip and wear is ratcheting. In the joint the
+Vibration may let the mass slip to a mean position u_0 that differs from the position of its history. The law then
+ratchets by 2 pi / omega penalty.mean (u_0 - history) / c in each period, with c the drag, although the Fourier series
+are periodic. The slip of this motion counts as wear, but its work is not in the balance of energy. In the joint the
 mean position has moved already: with u_0 as the new history only a fraction of the ratcheting is left. In the end the
 mass slips to and fro, or sticks: this is the state after shakedown.
 """
@@ -16,8 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.continuation.natural import follow_naturally
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import ATTEMPTS, follow_naturally
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, final_history
 from solver.model import FloatArray
@@ -41,7 +36,7 @@ def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
     fraction: accepted work of ratcheting over the slip work.
     """
     run, worn = run.fresh(), state.evaluation.wear_depth
-    for _ in range(CONTINUATION.attempts):
+    for _ in range(ATTEMPTS):
         if not ratchets(joint, state.evaluation, fraction):
             break
         before = state.evaluation.history

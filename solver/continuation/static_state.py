@@ -20,7 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State
 from solver.model import FloatArray
@@ -31,45 +31,49 @@ from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, Joint, static_joint, viscous_joint
 
 LOAD_STEPS = 20
-"""Steps of the static load, which may change the state. The state of the dovetail is unchanged with 10 and 40."""
+"""Steps of the static load of a joint with gaps, wear or given normal forces, which may change the state."""
 
 VISCOSITY_CUT, VISCOSITY_RISE = 0.2, 10.0
 """Factors on the viscosity after a step in time, and after a step that was not found. With a cut of 0.05 and 0.1 as
-many random decks (`tests/random_decks.py`) have a static state, for 6 % fewer to 30 % more iterations; with a rise of 5
-as many iterations."""
+many random decks (`tests/random_decks.py`) have a static state, for 6 % fewer to 30 % more iterations."""
 
 VISCOUS_STEPS = 300
 """Most steps in time. Of 300 random decks one needs more than 60: a block that rocks through a gap with little
 friction."""
 
+RUNAWAY = 1e3
+"""Displacement over the largest one of vibration and start; above it parts run away."""
+
 
 def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State | Outcome:
     """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
 
-    Without gaps and wear the state grows in proportion to its load, as the first iterate of a step does. In the first
-    evaluation of the first step all pairs stick.
+    Without gaps, wear and given normal forces all states of a rising load are proportional, and one step is enough. In
+    the first evaluation of the first step all pairs stick.
 
     joint: its excitation is left out. wear_depth (n_contact,): m.
 
-    Returns the state with the load factor 1 as its parameter; STATIC_SLIDING or STATIC_OPEN where there is no static
-    state, STATIC_FAILED where none is found.
+    Returns the state; STATIC_SLIDING or STATIC_OPEN where there is no static state, STATIC_FAILED where none is found.
     """
-    run = run.fresh()
+    run, contact = run.fresh(), joint.contact
+    proportional = not contact.gap.any() and not wear_depth.any() and contact.has_normal.all()
+    n_steps = 1 if proportional else LOAD_STEPS
     unmoved = np.zeros((joint.contact.n_contact, 3, 1))
     rest = Balance(static_joint(joint, 0.0), unmoved[:, 1:, 0], wear_depth)
-    state = State(rest.evaluate(rest.predict(unmoved, unmoved)), rest.history, 0.0)
-    for step in range(1, LOAD_STEPS + 1):
-        balance = Balance(static_joint(joint, step / LOAD_STEPS), state.history, wear_depth)
+    state = State(rest.evaluate(rest.predict(unmoved, unmoved)), rest.history)
+    for step in range(1, n_steps + 1):
+        balance = Balance(static_joint(joint, step / n_steps), state.history, wear_depth)
         before = state.evaluation.predicted_h
         start = balance.joint.structure.force_h() if step == 1 else before * (step / (step - 1.0))
         found, used = run.state(balance, start), run.budget.iterations
-        settled = _settle(balance, state.evaluation, run) if found is None else found
-        if isinstance(settled, Outcome):
-            return settled
         if found is None:
+            settled = _settle(balance, state.evaluation, run)
+            if isinstance(settled, Outcome):
+                return settled
             # every search needs a static state, whose steps have a limit of their own
             run.budget.limit += run.budget.iterations - used
-        state = replace(settled, parameter=step / LOAD_STEPS)
+            found = settled
+        state = found
     return state
 
 
@@ -87,7 +91,7 @@ def predicted_at_rest(case: Case, quiet: Joint, static: State, wear_depth: Float
 
 def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Outcome:
     """Static state to which viscous pairs come from the state `before`, or why there is none."""
-    most, viscosity, begun = CONTINUATION.near_iterations, 1.0, before.displacement_h
+    most, viscosity, begun = NEAR_ITERATIONS, 1.0, before.displacement_h
     far, moved = float((balance.joint.contact.gap + balance.wear_depth).max()), np.zeros_like(begun)
     for _ in range(VISCOUS_STEPS):
         viscous = replace(balance, joint=viscous_joint(balance.joint, viscosity, before.displacement_h))
@@ -102,7 +106,7 @@ def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Outcome:
             return end
         if not moved.any():
             # the first step is about as long as the load deforms the joint
-            far = max(far, CONTINUATION.runaway * float(np.abs(before.displacement_h - begun).max()))
+            far = max(far, RUNAWAY * float(np.abs(before.displacement_h - begun).max()))
         moved = before.displacement_h - begun
         if viscosity < NEGLIGIBLE and np.abs(moved).max() > far:
             break

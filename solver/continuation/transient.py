@@ -28,7 +28,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
+from solver.continuation.static_state import RUNAWAY
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, final_history
 from solver.model import ComplexArray, FloatArray, LinearModel, Matrix
@@ -43,11 +44,15 @@ from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Case, Joint
 
 TRANSIENT_CUT = 0.35
-"""Factor of the length of a step that fails, or whose change is twice `smooth_change`. Half the value takes 2.5
+"""Factor of the length of a step that fails, or whose change is twice `SMOOTH_CHANGE`. Half the value takes 2.5
 times the iterations of a jump at a fold. With 0.5 a random scene (`THROWN_OFF` in `tests/solver/test_homotopy.py`)
 does not settle within the budget."""
 
-RELAXED_CHANGE = CONTINUATION.smooth_change / 10.0
+SEARCH_ITERATIONS = 800
+"""Most Newton iterations of a relaxation with its periodic state. A jump at a fold of vibro-impact takes 400 to 500. A
+motion that does not settle (a blade whose 16 pairs all slip and lift) would take thousands."""
+
+RELAXED_CHANGE = SMOOTH_CHANGE / 10.0
 """Change over a step below which a periodic state is sought: norm of the change of the amplitudes over the larger norm
 of two motions."""
 
@@ -103,7 +108,9 @@ class Transient:
         stiffness = np.empty((orders, n_rel, n_rel), complex)
         force = np.empty((orders, n_rel), complex)
         for place, load in enumerate(self._loads(before, inverse)):
-            condensed = condense(self._full(place, self.rates[place] + inverse), self.relative, load)
+            linear, rate = self.parts[place][0], self.rates[place] + inverse
+            full = cast("Matrix", linear.stiffness + rate * linear.damping + rate**2 * linear.mass)
+            condensed = condense(full, self.relative, load)
             stiffness[place], force[place] = condensed.stiffness, condensed.force
         plain = self.joint.structure
         kept: dict[str, Any] = {field.name: getattr(plain, field.name) for field in fields(plain)}
@@ -117,10 +124,6 @@ class Transient:
         return self._motion(
             evaluation, np.asarray(self.rates + inverse, np.complex128), self._loads(before, inverse), before, inverse
         )
-
-    def _full(self, place: int, rate: complex) -> Matrix:
-        linear, _ = self.parts[place]
-        return cast("Matrix", linear.stiffness + rate * linear.damping + rate**2 * linear.mass)
 
     def _loads(self, before: Motion, inverse: float) -> list[Matrix]:
         loads: list[Matrix] = []
@@ -156,24 +159,14 @@ def relax_to_periodic(
 ) -> State | Outcome:
     """Stable periodic state of `joint` to which the structure relaxes in time from a state of `start_joint`.
 
-    Parameters
-    ----------
-    case, joint
-        Model and settings of both joints; the joint whose periodic state is sought.
-    wear_depth
-        (n_contact,), m, constant.
-    start, start_joint
-        First state. Both joints have equal pairs and harmonics; frequency and load may differ. A start without
-        excitation leads to the state that builds up from rest.
-    history
-        Tangential history (n_contact, 2) at the start, m.
+    case, joint: model and settings of both joints; the joint whose periodic state is sought.
+    wear_depth (n_contact,): m, constant. history (n_contact, 2): tangential history at the start, m.
+    start, start_joint: first state. Both joints have equal pairs and harmonics; frequency and load may differ. A start
+    without excitation leads to the state that builds up from rest.
 
-    Returns
-    -------
-    State or Outcome
-        The stable state, or why there is none: ADRIFT where the mean positions run away, as all pairs slip and only
-        friction holds the parts; UNSTABLE where the motion is an unstable periodic state and does not leave this state;
-        UNSETTLED where it does not settle within `CONTINUATION.search_iterations` Newton iterations.
+    Returns the stable state, or why there is none: ADRIFT where the mean positions run away, as all pairs slip and only
+    friction holds the parts; UNSTABLE where the motion is an unstable periodic state and does not leave this state;
+    UNSETTLED where it does not settle within `SEARCH_ITERATIONS`.
     """
     budget = run.budget
     budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
@@ -183,17 +176,17 @@ def relax_to_periodic(
     # the longest step, in periods, is practically infinite: the step is the harmonic balance itself
     length, longest, tried = 1.0, 1.0 / ROUND_OFF, np.inf
     size = float(np.abs(start.displacement_h).max())
-    left = CONTINUATION.search_iterations
+    left = SEARCH_ITERATIONS
     # whether an unstable state has been found, which the motion leaves
     grows = False
     while left > 0 and length >= SHORTEST_STEP and not budget.exhausted:
         inverse = 1.0 / (length * period)
         balance = Balance(transient.step(motion, inverse), history, wear_depth)
-        result = run.solve(balance, predicted, CONTINUATION.near_iterations)
+        result = run.solve(balance, predicted, NEAR_ITERATIONS)
         left -= max(result.iterations, 1)
         ahead = transient.after(result.evaluation, motion, inverse) if result.converged else motion
         change = _change(motion, ahead)
-        too_far = change > 2.0 * CONTINUATION.smooth_change and length > 1.0
+        too_far = change > 2.0 * SMOOTH_CHANGE and length > 1.0
         # a step over more than the time in which a motion grows would damp this motion
         damped = grows and result.converged and not is_stable(balance, result.evaluation, run)
         if damped and result.iterations == 0:
@@ -205,7 +198,7 @@ def relax_to_periodic(
         history = final_history(balance, result.evaluation)
         moved = np.abs(result.evaluation.displacement_h)
         size = max(size, float(moved[:, :, 1:].max()))
-        if moved[:, :, 0].max() > CONTINUATION.runaway * size:
+        if moved[:, :, 0].max() > RUNAWAY * size:
             return Outcome.ADRIFT
         # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
         renewed = change < 0.5 * tried or length >= longest
@@ -218,12 +211,12 @@ def relax_to_periodic(
             left -= budget.iterations - begun
             if found is not None and not is_stable(balance, found.evaluation, run):
                 grows = True
-            elif found and _change(transient.periodic(found.evaluation), motion) < CONTINUATION.smooth_change:
+            elif found and _change(transient.periodic(found.evaluation), motion) < SMOOTH_CHANGE:
                 return found
         elif change > RELAXED_CHANGE:
             tried = np.inf
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
-        growth = float(np.clip(CONTINUATION.smooth_change / max(change, 1e-300), 0.5, 2.0))
+        growth = float(np.clip(SMOOTH_CHANGE / max(change, 1e-300), 0.5, 2.0))
         length = min(max(length * growth, 1.0), longest)
     return Outcome.UNSETTLED
 

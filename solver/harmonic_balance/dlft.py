@@ -24,15 +24,10 @@ from numba import njit
 
 from solver.contact.law import Marched
 from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
-from solver.model import BoolArray, FloatArray, IntArray
+from solver.model import ComplexArray, FloatArray, IntArray
 from solver.packing import packable
 from solver.settings import NEGLIGIBLE
 from solver.structure.joint import Joint
-from solver.structure.rough_forms import SingleArray
-
-# Largest difference between the tangent of a passive pair and the identity: a hundred times the round-off of an entry.
-# A passive pair transmits its predicted force and is left out of the coupled system.
-_PASSIVE = 1e-14
 
 
 @dataclass(frozen=True)
@@ -149,9 +144,9 @@ class Linearisation:
     - force_tangent (n_contact, 3m, 3m): derivative of the contact force, dimensionless.
     - growth_tangent (n_contact, 3m): derivative of the wear depth, m/N, which is a part of the static normal motion.
 
-    The motion of a pair that sticks and is closed during the whole period does not depend on p. The columns of its
-    unknowns in the Jacobian are columns of the identity. These unknowns are left out of the coupled system and computed
-    from its solution (`active`).
+    The motion of a pair that sticks during the whole period does not depend on p. The columns of its unknowns in the
+    Jacobian are columns of the identity. These unknowns are left out of the coupled system and computed from its
+    solution (`active`).
     """
 
     joint: Joint
@@ -159,7 +154,7 @@ class Linearisation:
     force_tangent: FloatArray
     growth_tangent: FloatArray
 
-    @cached_property
+    @property
     def motion_tangent(self) -> FloatArray:
         """`du/dp` (n_contact, 3m, 3m), m/N, by Eq. (12), including the wear."""
         size = self.force_tangent.shape[1]
@@ -171,7 +166,7 @@ class Linearisation:
     @cached_property
     def active(self) -> IntArray:
         """Pairs whose motion depends on their predicted force."""
-        return np.flatnonzero(differs_from_identity(self.force_tangent, _PASSIVE))
+        return np.flatnonzero(~self.at.stuck)
 
     @cached_property
     def active_rows(self) -> IntArray:
@@ -185,129 +180,89 @@ class Linearisation:
 
     def transmit(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Changes of motion, m, and contact force, N, both (n_contact, 3, m), for a step (n_rel, m), N."""
-        joint = self.joint
-        spread = joint.to_pairs(step)
-        force = np.matmul(self.force_tangent, spread.reshape(joint.contact.n_contact, -1, 1)).reshape(spread.shape)
-        motion = joint.law.motion(spread - force)
-        motion[:, 0, 0] += (self.growth_tangent * spread.reshape(joint.contact.n_contact, -1)).sum(axis=1)
-        return motion, force
+        held, motion = self._held_back(step)
+        return self.joint.to_pairs(motion), self.joint.to_pairs(step - held)
 
     def apply(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step (n_rel, m), N."""
-        motion, force = (self.joint.to_relative(part) for part in self.transmit(step))
-        return self.joint.structure.apply(motion) + force
+        held, motion = self._held_back(step)
+        return self.joint.structure.apply(motion) + step - held
 
     def apply_roughly(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step to at least three digits in less time, for directions of Newton's method."""
+        held, motion = self._held_back(step)
+        return self.joint.structure.apply_roughly(motion) + step - held
+
+    def _held_back(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Part of a step (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m."""
         joint = self.joint
-        rows, compliance = joint.pair_rows, joint.pair_compliance
-        held, motion = hold_back(step, rows, self.active, self._held_back, *compliance, self.growth_tangent)
-        if joint.law.rate_dependent:
-            # masses move by Newton's law
-            motion_h = joint.law.motion(joint.to_pairs(held))
-            motion_h[:, 0, 0] += (self.growth_tangent * joint.to_pairs(step).reshape(len(motion_h), -1)).sum(axis=1)
-            motion = joint.to_relative(motion_h)
-        return joint.structure.apply_roughly(motion) + step - held
+        blocks = self.force_tangent, joint.law.compliance, self.growth_tangent
+        return hold_back(np.ascontiguousarray(step), joint.pair_rows, self.active, *blocks)
 
-    @cached_property
-    def _held_back(self) -> SingleArray:
-        """Part `1 - d lambda/dp` (n, 3m, 3m) that the active pairs do not transmit, in single precision."""
-        return identity_less(self.force_tangent, self.active)
+    def dense(self, pairs: IntArray, kept: int | None = None) -> FloatArray:
+        """Rows and columns of the Jacobian for some pairs, in the order (relative displacement, harmonic).
 
-    def dense(self, pairs: IntArray) -> FloatArray:
-        """Rows and columns of the Jacobian for some pairs, in the order (relative displacement, harmonic)."""
-        m = self.joint.basis.synthesis.shape[0]
+        kept: number of harmonics, 2H'+1; by default all.
+        """
+        m, k = self.joint.basis.synthesis.shape[0], kept or self.joint.basis.synthesis.shape[0]
         rows = self.joint.rows_of(pairs)
         pair, component = np.divmod(self.joint.component_index[rows], 3)
         pair = np.searchsorted(pairs, pair)
         # blocks of the pairs, spread over the existing rows and columns: (row, harmonic, column, harmonic)
-        spread = np.zeros((2, rows.size, m, rows.size, m))
+        spread = np.zeros((2, rows.size, k, rows.size, k))
         row, column = np.nonzero(pair[:, None] == pair[None, :])
         for place, part in enumerate((self.motion_tangent, self.force_tangent)):
-            blocks = part[pairs].reshape(pairs.size, 3, m, 3, m)
+            blocks = part[pairs].reshape(pairs.size, 3, m, 3, m)[:, :, :k, :, :k]
             spread[place][row, :, column] = blocks[pair[row], component[row], :, component[column]]
-        motion, matrix = spread.reshape(2, rows.size, m, -1)
+        motion, matrix = spread.reshape(2, rows.size, k, rows.size * k)
         structure = self.joint.structure
         matrix[:, 0] += structure.static_stiffness[np.ix_(rows, rows)] @ motion[:, 0]
-        if m > 1:
+        if k > 1:
             amplitude = (motion[:, 1::2] - 1j * motion[:, 2::2]).transpose(1, 0, 2)
-            moved = np.matmul(structure.dynamic_stiffness[:, rows[:, None], rows], amplitude).transpose(1, 0, 2)
+            stiffness = structure.dynamic_stiffness[: k // 2, rows[:, None], rows]
+            moved = np.matmul(stiffness, amplitude).transpose(1, 0, 2)
             matrix[:, 1::2] += moved.real
             matrix[:, 2::2] -= moved.imag
-        return np.asarray(matrix.reshape(rows.size * m, rows.size * m))
-
-
-@njit(cache=True)
-def differs_from_identity(matrices: FloatArray, by: float) -> BoolArray:
-    """True (n,) for the matrices (n, k, k) with an entry that differs from the identity by more than `by`."""
-    n, k, _ = matrices.shape
-    differs = np.zeros(n, np.bool_)
-    for place in range(n):
-        for row in range(k):
-            for column in range(k):
-                # the negation also finds entries that are not a number
-                if not abs(matrices[place, row, column] - (row == column)) <= by:
-                    differs[place] = True
-                    break
-            if differs[place]:
-                break
-    return differs
-
-
-@njit(cache=True)
-def identity_less(matrices: FloatArray, chosen: IntArray) -> SingleArray:
-    """The identity less some of the matrices (n, k, k), in single precision."""
-    k = matrices.shape[1]
-    found = np.empty((chosen.size, k, k), np.float32)
-    for place, which in enumerate(chosen):
-        for row in range(k):
-            for column in range(k):
-                found[place, row, column] = -matrices[which, row, column]
-            found[place, row, row] = 1.0 - matrices[which, row, row]
-    return found
+        return np.asarray(matrix.reshape(rows.size * k, rows.size * k))
 
 
 @njit(cache=True)
 def hold_back(
     step: FloatArray,
     rows: IntArray,
-    pairs: IntArray,
-    held_back: SingleArray,
-    normal: FloatArray,
-    tangential: FloatArray,
+    active: IntArray,
+    force_tangent: FloatArray,
+    compliance: ComplexArray,
     growth: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Part of a predicted force (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m.
 
-    CPU time of an adaptive history, over that with this function: with the same products in NumPy 1.07 (16 pairs) and
-    1.08 (48 pairs), with those of all pairs in double precision 1.04 to 1.19, 1.14 and (336 pairs) 1.04.
-
     - step (n_rel, m): predicted force, N.
     - rows (n_contact, 3): row of each component, -1 for none.
-    - pairs (n,), held_back (n, 3m, 3m): active pairs, and their `1 - d lambda/dp`.
-    - normal, tangential (n_contact,): compliances, m/N.
-    - growth (n_contact, 3m): derivative of the wear depth, m/N.
+    - active (n,): pairs that do not transmit everything.
+    - force_tangent (n_contact, 3m, 3m), growth (n_contact, 3m): as in `Linearisation`.
+    - compliance (n_contact, 3, H+1): displacement per force in each harmonic, m/N.
     """
     m = step.shape[1]
-    held, motion = np.zeros_like(step), np.zeros_like(step)
-    own, single = np.zeros(3 * m), np.zeros(3 * m, np.float32)
-    for place, pair in enumerate(pairs):
+    held, motion, own = np.zeros_like(step), np.zeros_like(step), np.zeros(3 * m)
+    for pair in active:
         own[:] = 0.0
         for i in range(3):
             if rows[pair, i] >= 0:
                 own[i * m : (i + 1) * m] = step[rows[pair, i]]
-        for k in range(3 * m):
-            single[k] = own[k]
-        kept = np.dot(held_back[place], single)
+        passed = np.dot(force_tangent[pair], own)
         for i in range(3):
             row = rows[pair, i]
             if row < 0:
                 continue
-            compliance = normal[pair] if i == 0 else tangential[pair]
             for k in range(m):
-                held[row, k] = kept[i * m + k]
-                motion[row, k] = compliance * kept[i * m + k]
+                held[row, k] = own[i * m + k] - passed[i * m + k]
+            motion[row, 0] = compliance[pair, i, 0].real * held[row, 0]
+            for n in range(1, m // 2 + 1):
+                cosine, sine, of = held[row, 2 * n - 1], held[row, 2 * n], compliance[pair, i, n]
+                # a complex amplitude is cosine - i sine
+                motion[row, 2 * n - 1] = of.real * cosine + of.imag * sine
+                motion[row, 2 * n] = of.real * sine - of.imag * cosine
             if i == 0:
-                for k in range(3 * m):
-                    motion[row, 0] += growth[pair, k] * own[k]
+                motion[row, 0] += np.dot(growth[pair], own)
     return held, motion

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,14 +14,13 @@ from solver.accuracy.refinement import Refined, refine, state_difference
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.state import State
 from solver.loading_history.path import FREE_STEP, LoadingPath
-from solver.loading_history.path_of_states import Step
-from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep, SweepState
-from solver.loading_history.sweep_start import Direction, Origin, find_origin
+from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Step, Sweep, SweepState
+from solver.loading_history.sweep_start import Direction, Origin, cell_of, find_origin
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.results.history import PeriodicState
+from solver.results.history import StartState
 from solver.results.state_report import periodic_state
 from solver.settings import Resolution, SolverSettings, all_orders, allowed
 from solver.stability.floquet import find_instability
@@ -36,23 +35,6 @@ OTHER_STARTS = ((1, 64), (3, 256), (15, 256))
 
 _REASONS = (Outcome.UNSTABLE, Outcome.ADRIFT, Outcome.UNSETTLED)
 """Outcomes that give the reason for the end of a sweep, not only its end."""
-
-
-@dataclass(frozen=True)
-class Found:
-    """The state at a frequency with its errors, or the reason why there is none.
-
-    branch: number of folds jumped over before this frequency. fold: frequency of the last of them, rad/s.
-    """
-
-    outcome: Outcome
-    branch: int = 0
-    fold: float = float("nan")
-    state: PeriodicState | None = None
-    reference: PeriodicState | None = None
-    resolution: Resolution | None = None
-    estimate: Estimate = UNKNOWN
-    message: str = ""
 
 
 @packable
@@ -95,17 +77,6 @@ class FrequencySweep:
         self.run = Run(settings.tolerance)
         self.origin: Origin | None = None
         self.nodes: Sweep[State] | None = None
-        self._begun = False
-
-    @property
-    def penalty_omega(self) -> float:
-        """Frequency at which the penalty is taken, rad/s."""
-        return float("nan") if self.origin is None else 2.0 * np.pi * self.origin.penalty
-
-    @property
-    def resolution(self) -> Resolution:
-        """Harmonics and samples of the nodes."""
-        return Resolution((1,), 4) if self.nodes is None else self.nodes.state.resolution
 
     @property
     def n_iterations(self) -> int:
@@ -127,7 +98,6 @@ class FrequencySweep:
     def load(self, state: FrequencySweepState) -> None:
         """Go on from the saved state of another sweep."""
         self._new_sweep(state.origin, state.omega).load(state.nodes)
-        self._begun = True
 
     def go_on_from(self, case: Case, state: State, frequency: float) -> bool:
         """Begin at a known state; False where the state is rejected.
@@ -136,114 +106,110 @@ class FrequencySweep:
         its amplitude over that of the sweep. frequency: to which the sweep goes, Hz.
         """
         ramp, target = self.sweep == "ramp", 2.0 * np.pi * frequency
-        origin = replace(find_origin(self.model, frequency, self.sweep), penalty=case.penalty_omega / (2.0 * np.pi))
-        up = (1.0 if ramp else target) >= state.parameter
-        nodes = self._new_sweep(origin, target if ramp else None, case, 1.0 if up else -1.0)
-        self._begun = True
-        return nodes.begin(LoadingPath(case, self.excitation_amplitude, target if ramp else None), state)
+        origin = Origin((), case.penalty_omega / (2.0 * np.pi), cell_of(frequency))
+        nodes = self._new_sweep(origin, target if ramp else None)
+        nodes.direction = 1.0 if (1.0 if ramp else target) >= state.parameter else -1.0
+        return nodes.begin(replace(path_of(nodes), case=case), state)
 
-    def advance(self, frequency: float) -> Found:
-        """State at the next frequency, Hz, with the harmonics that it needs."""
-        origin, omega = find_origin(self.model, frequency, self.sweep), 2.0 * np.pi * frequency
-        ramp, budget = self.sweep == "ramp", self.run.budget
-        budget.iterations, budget.limit = 0, NODE_ITERATIONS
+    def advance(self, frequency: float) -> StartState:
+        """State at the next frequency, Hz, with the harmonics that it needs. Raises OutOfTimeError."""
+        omega, ramp = 2.0 * np.pi * frequency, self.sweep == "ramp"
         # the state must not depend on those at other frequencies
         self.run = run = self.run.fresh()
-        nodes, target = self._sweep_to(origin, omega), 1.0 if ramp else omega
+        run.budget.iterations, run.budget.limit = 0, NODE_ITERATIONS
+        nodes, target = self.sweep_to(frequency), 1.0 if ramp else omega
         nodes.advance_to(target)
         try:
-            reached = nodes.state_at(target, run.fresh())
-            case = path_of(nodes).case
+            path, reached = path_of(nodes), nodes.state_at(target, run.fresh())
             if isinstance(reached, Outcome):
-                nodes.state = nodes.state if nodes.here is None else replace(nodes.state, failure=reached)
-                budget.limit = budget.iterations + FIRST_ITERATIONS
-                first = self._first(nodes, target, run)
-                if first is None:
-                    return Found(self.why_lost(nodes), message=_where_lost(nodes))
-                case, reached = first[0], Step(first[1])
-            refined = self._at_known(frequency, case, omega, reached.state)
+                run.budget.limit = run.budget.iterations + FIRST_ITERATIONS
+                first = self._first(path, target, run)
+                if isinstance(first, Outcome):
+                    return self.without_state(why_lost(nodes, first), _where_lost(nodes))
+                path, reached = first[0], Step(first[1])
+            refined = self._at_known(frequency, path.case, omega, reached.state)
             if refined is None:
-                refined = refine(case, omega, self.excitation_amplitude, reached.state, run)
+                refined = refine(path.case, omega, self.excitation_amplitude, reached.state, run)
         except np.linalg.LinAlgError:
-            return Found(Outcome.SINGULAR)
+            return self.without_state(Outcome.SINGULAR)
         # folds of a ramp are load factors
-        fold = float("nan") if ramp else (nodes.state.fold, *reached.folds)[-1]
-        return self._judge(refined, nodes, Found(Outcome.CONVERGED, nodes.state.branch + len(reached.folds), fold))
+        fold = np.nan if ramp else (nodes.state.fold, *reached.folds)[-1] / (2.0 * np.pi)
+        found = self._judged(refined, nodes)
+        return replace(found, branch=nodes.state.branch + len(reached.folds), fold_frequency=float(fold))
 
-    def sweep_in_cell(self, frequency: float) -> Sweep[State]:
-        """The sweep that passes all frequencies in the quarter octave of a frequency, Hz, at its present node."""
-        origin = find_origin(self.model, frequency, self.sweep)
-        if self.nodes is None or self.origin is None or origin.cell != self.origin.cell:
-            return self._sweep_to(origin, 2.0 * np.pi * frequency)
-        return self._at_begin(self.nodes, origin)
+    def without_state(
+        self, outcome: Outcome, message: str = "", resolution: Resolution | None = None, estimate: Estimate = UNKNOWN
+    ) -> StartState:
+        """No state at the current frequency, and why."""
+        used = Resolution((1,), 4) if self.nodes is None else self.nodes.state.nodes.resolution
+        return StartState(
+            outcome=outcome,
+            state=None,
+            penalty_omega=float("nan") if self.origin is None else 2.0 * np.pi * self.origin.penalty,
+            resolution=resolution or used,
+            response_error=estimate.response,
+            wear_rate_error=estimate.wear_rate,
+            newton_iterations=self.n_iterations,
+            run_time=0.0,
+            message=message,
+        )
 
-    def _sweep_to(self, origin: Origin, omega: float) -> Sweep[State]:
-        """The sweep that leads to a frequency, rad/s, at its first node or beyond."""
-        nodes, ramp = self.nodes, self.sweep == "ramp"
-        passed = nodes is not None and (path_of(nodes).omega != omega if ramp else nodes.has_passed(omega))
-        if nodes is None or passed or self.origin is None or origin.cell != self.origin.cell:
-            nodes = self._new_sweep(origin, omega if ramp else None)
-        return self._at_begin(nodes, origin)
+    def sweep_to(self, frequency: float, *, beyond: bool = False) -> Sweep[State]:
+        """The sweep that leads to a frequency, Hz, at its first node or farther on; without a state if none is found.
 
-    def _new_sweep(
-        self, origin: Origin, omega: float | None, case: Case | None = None, direction: float | None = None
-    ) -> Sweep[State]:
+        beyond: whether the present sweep will do although it has passed the frequency.
+        """
+        omega, cell, nodes = 2.0 * np.pi * frequency, cell_of(frequency), self.nodes
+        ramp = omega if self.sweep == "ramp" else None
+        same_cell = self.origin is not None and self.origin.cell == cell
+        there = nodes is not None and same_cell and path_of(nodes).omega == ramp
+        if nodes is not None and there and (ramp or beyond or not nodes.has_passed(omega)):
+            return nodes
+        origin = find_origin(self.model, cell, self.sweep)
+        nodes = self._new_sweep(origin, ramp)
+        nodes.run.budget.limit = FIRST_ITERATIONS
+        places = [2.0 * np.pi * start for start in origin.starts] or [FREE_STEP]
+        any(self._begin_at(nodes, place) for place in places)
+        return nodes
+
+    def _new_sweep(self, origin: Origin, omega: float | None) -> Sweep[State]:
         """A sweep before its first node. omega: frequency of a ramp, rad/s, else None."""
-        case = case or build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
-        direction = direction or (-1.0 if self.sweep == "down" else 1.0)
+        case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
         path, of = LoadingPath(case, self.excitation_amplitude, omega), self.run.budget
-        self.origin, self._begun = origin, False
         budget = Budget(deadline=of.deadline, report=of.report)
-        self.nodes = Sweep(path, direction, budget, with_reference=not self.known)
+        self.origin = origin
+        self.nodes = Sweep(path, -1.0 if self.sweep == "down" else 1.0, budget, with_reference=not self.known)
         self.nodes.save = lambda: self.save()
         return self.nodes
 
-    def _at_begin(self, nodes: Sweep[State], origin: Origin) -> Sweep[State]:
-        """A sweep at its first node or beyond; without a state where none is found."""
-        if not self._begun:
-            self._begun = True
-            nodes.run.budget.limit = nodes.run.budget.iterations + FIRST_ITERATIONS
-            places = [2.0 * np.pi * start for start in origin.starts] or [FREE_STEP]
-            any(self._begin_at(nodes, place) for place in places)
-        return nodes
-
     def _begin_at(self, nodes: Sweep[State], place: float) -> bool:
         """Begin a sweep at a value of its parameter; False where there is no state."""
-        joint = path_of(nodes).omega
-        nodes.run.budget.report(f"first state at {(place if joint is None else joint) / (2.0 * np.pi):.6g} Hz")
+        nodes.run.budget.report(f"first state at {(path_of(nodes).omega or place) / (2.0 * np.pi):.6g} Hz")
+        first: tuple[LoadingPath, State] | Outcome = Outcome.START_FAILED
         with contextlib.suppress(np.linalg.LinAlgError):
-            if (first := self._first(nodes, place, nodes.run)) is not None:
-                return nodes.begin(replace(path_of(nodes), case=first[0]), first[1])
+            first = self._first(path_of(nodes), place, nodes.run)
+            if not isinstance(first, Outcome):
+                return nodes.begin(*first)
+        nodes.state = replace(nodes.state, failure=first if isinstance(first, Outcome) else Outcome.START_FAILED)
         return False
 
-    def _first(self, nodes: Sweep[State], place: float, run: Run) -> tuple[Case, State] | None:
-        """A state from the static one at a value of the parameter, with the harmonics of the sweep, or else with
-        others, and its case; None where there is none, with the reason of the first attempt in the sweep.
+    def _first(self, path: LoadingPath, place: float, run: Run) -> tuple[LoadingPath, State] | Outcome:
+        """A state from the static one at a value of the parameter, with the harmonics of a path, or else with others as
+        far as the settings allow them, and its path; or the reason of the first attempt.
         """
-        why: Outcome | None = None
-        for case in self._cases(nodes):
-            path = replace(path_of(nodes), case=case)
-            omega, load = (place, 1.0) if path.omega is None else (path.omega, place)
-            unworn = np.zeros(self.model.contact.n_contact)
-            found = solve_first_state(case, omega, load * self.excitation_amplitude, unworn, run.fresh())
+        others = [Resolution(all_orders(highest), samples) for highest, samples in OTHER_STARTS]
+        allowed_others = [allowed(other, self.settings) for other in others if self.settings.automatic]
+        omega, load = (place, 1.0) if path.omega is None else (path.omega, place)
+        unworn, why = np.zeros(self.model.contact.n_contact), list[Outcome]()
+        for resolution in (path.case.resolution, *allowed_others):
+            at = path.at(resolution)
+            found = solve_first_state(at.case, omega, load * self.excitation_amplitude, unworn, run.fresh())
             if isinstance(found, State):
-                return case, replace(found, parameter=place)
-            why = found if why is None or found.static else why
+                return at, replace(found, parameter=place)
+            why.append(found)
             if found.static or run.budget.exhausted:
                 break
-        nodes.state = replace(nodes.state, failure=why or Outcome.START_FAILED)
-        return None
-
-    def _cases(self, nodes: Sweep[State]) -> Iterator[Case]:
-        """The case of a sweep, and with other harmonics and samples as far as the settings allow them."""
-        yield path_of(nodes).case
-        for highest, samples in OTHER_STARTS if self.settings.automatic else ():
-            yield path_of(nodes).case.at(allowed(Resolution(all_orders(highest), samples), self.settings))
-
-    def why_lost(self, nodes: Sweep[State]) -> Outcome:
-        """The reason why a sweep has no state."""
-        never = np.isnan(nodes.state.lost_at)
-        return nodes.state.failure if never or nodes.state.failure in _REASONS else Outcome.BRANCH_LOST
+        return why[-1] if why[-1].static else why[0]
 
     def _at_known(self, frequency: float, case: Case, omega: float, state: State) -> Refined | None:
         """The state with the known resolution; None where none is known, or where the state is not found with it."""
@@ -256,27 +222,31 @@ class FrequencySweep:
             return None if moved is None else Refined(wanted, moved, NOTHING, accurate=True)
         return Refined(case, state, NOTHING, accurate=True)
 
-    def _judge(self, refined: Refined, nodes: Sweep[State], found: Found) -> Found:
+    def _judged(self, refined: Refined, nodes: Sweep[State]) -> StartState:
         """The outcome of a refined state, with its error and the state of the reference sweep."""
-        case, point = refined.case, refined.point
+        case, point, estimate = refined.case, refined.point, refined.estimate
         joint = replace(path_of(nodes), case=case).joint_at(point.parameter)
-        lost = replace(found, resolution=case.resolution, estimate=refined.estimate)
         if not certify(joint, point.evaluation).holds(self.settings.tolerance):
-            return replace(lost, outcome=Outcome.CERTIFICATE_FAILED)
+            return self.without_state(Outcome.CERTIFICATE_FAILED, "", case.resolution, estimate)
         if unstable := find_instability(case, joint, point.evaluation, self.run, self.every):
-            return replace(lost, outcome=unstable.outcome, message=unstable.sentence)
-        found = replace(lost, state=periodic_state(joint, point))
-        if (reference := self._reference(nodes, case, point)) is not None:
-            estimate = found.estimate + state_difference(case, joint, point, reference)
-            found = replace(found, reference=periodic_state(joint, reference), estimate=estimate)
-        return found if refined.accurate else replace(found, outcome=Outcome.INACCURATE)
+            return self.without_state(unstable.outcome, unstable.sentence, case.resolution, estimate)
+        reference = self._reference(nodes, case, point)
+        if reference is not None:
+            estimate = estimate + state_difference(case, joint, point, reference)
+        outcome = Outcome.CONVERGED if refined.accurate else Outcome.INACCURATE
+        return replace(
+            self.without_state(outcome, "", case.resolution, estimate),
+            state=periodic_state(joint, point),
+            reference=None if reference is None else periodic_state(joint, reference),
+        )
 
     def _reference(self, nodes: Sweep[State], case: Case, state: State) -> State | None:
         """A state with the history that the reference sweep leaves; None where there is none."""
         with contextlib.suppress(np.linalg.LinAlgError):
-            if nodes.reference is not None and (node := nodes.reference_node(state.parameter)) is not None:
-                path = path_of(nodes.reference)
-                return path.like(node, replace(path, case=case), state, self.run)
+            if nodes.here is not None and (reference := nodes.reference) is not None:
+                path, states = reference
+                assert isinstance(path, LoadingPath)
+                return path.like(states[-1], replace(path, case=case), state, self.run)
         return None
 
 
@@ -286,10 +256,15 @@ def path_of(sweep: Sweep[State]) -> LoadingPath:
     return sweep.path
 
 
+def why_lost(nodes: Sweep[State], failure: Outcome) -> Outcome:
+    """The reason why a sweep has no state; failure: of the last search."""
+    return failure if nodes.last is None or failure in _REASONS else Outcome.BRANCH_LOST
+
+
 def _where_lost(nodes: Sweep[State]) -> str:
     """Sentence with the last parameter of a lost sweep; empty for a sweep that never began."""
-    if np.isnan(nodes.state.lost_at):
+    if nodes.last is None or not nodes.state.lost:
         return ""
     if path_of(nodes).omega is not None:
-        return f"the vibration repeats up to {100.0 * nodes.state.lost_at:.3g} % of the excitation"
-    return f"the sweep goes on in stable states as far as {nodes.state.lost_at / (2.0 * np.pi):.6g} Hz"
+        return f"the vibration repeats up to {100.0 * nodes.last.parameter:.3g} % of the excitation"
+    return f"the sweep goes on in stable states as far as {nodes.last.parameter / (2.0 * np.pi):.6g} Hz"

@@ -1,8 +1,8 @@
 """The unworn joint along its frequency or its excitation: from a stable state to a stable state.
 
-`LoadingPath.solve` solves one balance, with a linear extrapolation of the last two states as its start. Where Newton's
-method fails or the state is unstable, `LoadingPath.rescue` searches by smaller natural steps, by arc-length
-continuation through folds, and by integration in time.
+`LoadingPath.solve` solves one balance, which starts on the parabola through the last three states. Where Newton's
+method fails or the state is unstable, `LoadingPath.rescue` goes on by smaller natural steps to the end of the branch.
+The structure then settles in time a little beyond this end, as in a slow sweep of the machine.
 """
 
 from __future__ import annotations
@@ -17,14 +17,12 @@ from solver.accuracy.period_events import nothing_happens
 from solver.accuracy.refinement import NODE_UNKNOWNS, Refined, refine
 from solver.accuracy.resolved_state import ResolvedState
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
-from solver.continuation.arc_length import ARC_SPAN, Arc, follow_arc
-from solver.continuation.natural import follow_naturally
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.prolongation import carried_history, transfer
 from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
-from solver.loading_history.path_of_states import Step
+from solver.loading_history.sweep import Step
 from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
@@ -34,7 +32,7 @@ from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3
-"""Fraction of the parameter: length of the steps with continuation through folds, or settling in time, where a branch
+"""Fraction of the parameter: length of the steps with smaller natural steps, or settling in time, where a branch
 ends. The load factor at which a ramp begins; the amplitude at which a nonlinear mode begins, as vibrating contact
 forces over the friction limits (with ten times the value and with a tenth the nodes lie elsewhere: the damping of the
 dovetail changes by 7e-5 and 1e-3); its smallest growth from node to node."""
@@ -68,9 +66,7 @@ def largest_change(rtol: float, wider: float, *, sticks: bool) -> float:
 
     sticks: whether no pair slips or opens at both ends. A longer step might go over a whole resonance.
     """
-    if sticks:
-        return CONTINUATION.linear_change
-    return wider * float(np.clip(CHANGE_PER_RTOL * rtol, *CHANGE_LIMITS))
+    return LINEAR_CHANGE if sticks else wider * float(np.clip(CHANGE_PER_RTOL * rtol, *CHANGE_LIMITS))
 
 
 @dataclass(frozen=True)
@@ -119,74 +115,50 @@ class LoadingPath:
         return min(target, 1.0) if length > 0.0 else max(target, 1.0)
 
     def solve(self, states: tuple[State, ...], target: float, run: Run) -> State | None:
-        """As in Path: a stable state by Newton's method alone, from the line through the states.
-
-        The tangential history comes from the last state.
-        """
+        """As in Path, by Newton's method alone, from the polynomial through the states."""
         start = states[-1]
-        joint, begin = self.joint_at(target), start.evaluation.predicted_h
+        joint, at = self.joint_at(target), np.array([state.parameter for state in states])
         balance = Balance(joint, history_at_rest(joint, start), start.evaluation.wear_depth)
-        if len(states) > 1:
-            ratio = (target - start.parameter) / (start.parameter - states[0].parameter)
-            begin = begin + ratio * (begin - states[0].evaluation.predicted_h)
+        begin = np.zeros_like(start.evaluation.predicted_h)
+        for place, state in enumerate(states):
+            others = np.delete(at, place)
+            begin += np.prod((target - others) / (at[place] - others)) * state.evaluation.predicted_h
         return _stable(balance, begin, target, run)
 
     def rescue(self, start: State, target: float, run: Run) -> Step[State] | Outcome:
-        """As in Path: a stable state by natural steps, arc length and settling in time, in turns until the target."""
-        start = replace(start, history=history_at_rest(self.joint_at(start.parameter), start))
-        fine = FREE_STEP * self.scale(target)
-        folds: list[float] = []
-
-        def accepted(state: State) -> bool:
-            return is_stable(self.balance_at(state.parameter, state.evaluation.history), state.evaluation, run)
-
+        """As in Path: by natural steps and settling in time, in turns until the target."""
+        state = replace(start, history=history_at_rest(self.joint_at(start.parameter), start))
+        fine, folds = FREE_STEP * self.scale(target), list[float]()
         while not run.budget.exhausted:
-            state, arrived = follow_naturally(self.balance_at, start, target, run, fine=fine)
-            if arrived and accepted(state):
-                return Step(state, tuple(folds))
+            end, arrived = follow_naturally(self.balance_at, state, target, run, fine=fine)
+            balance = self.balance_at(end.parameter, end.evaluation.history)
+            if arrived and is_stable(balance, end.evaluation, run):
+                return Step(end, tuple(folds))
             # natural steps may have passed the unknown start of an unstable part: then the search begins before them
-            end = start if arrived else state
-            arc = Arc(self.balance_at, end, ARC_SPAN * self.scale(target), run)
-            found = follow_arc(arc, target, accepted, beyond=False)
-            if found.state is not None:
-                return Step(found.state, (*folds, *found.jumps))
-            if arrived and not found.folds and abs(target - end.parameter) > fine:
-                # a shorter step comes closer to the loss of stability without a fold
-                return Outcome.UNSTABLE
-            landed = self._settled(end, target, found.folds, run)
-            if isinstance(landed, Outcome):
-                return landed
-            folds.extend(landed.folds)
-            if landed.state.parameter == target:
-                return Step(landed.state, tuple(folds))
-            start = landed.state
+            end = state if arrived else end
+            beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
+            joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
+            unworn = np.zeros(self.case.model.contact.n_contact)
+            settled = relax_to_periodic(self.case, joint, unworn, end.evaluation, before, end.history, run)
+            if isinstance(settled, Outcome):
+                return settled
+            # a fold with a smaller change is a corner of the branch
+            if vibration_change(end.evaluation, settled.evaluation) > SMOOTH_CHANGE:
+                folds.append(end.parameter)
+            state = replace(settled, parameter=beyond)
+            if beyond == target:
+                return Step(state, tuple(folds))
         return Outcome.BRANCH_LOST
-
-    def _settled(self, end: State, target: float, folds: tuple[float, ...], run: Run) -> Step[State] | Outcome:
-        """State to which the structure settles in time from the end of a branch, a little beyond this end."""
-        fine = FREE_STEP * self.scale(end.parameter)
-        beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
-        joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
-        unworn = np.zeros(self.case.model.contact.n_contact)
-        found = relax_to_periodic(self.case, joint, unworn, end.evaluation, before, end.history, run)
-        if isinstance(found, Outcome):
-            return found
-        landed = replace(found, parameter=beyond)
-        if vibration_change(end.evaluation, found.evaluation) <= CONTINUATION.smooth_change:
-            return Step(landed)
-        # an arc that ended beyond the fold has found the fold all the same
-        farthest = max((end.parameter, *folds), key=lambda at: (at - end.parameter) * (target - end.parameter))
-        return Step(landed, (farthest,))
 
     def change(self, before: State, after: State, wider: float) -> float:
         """As in Path."""
-        one, other = before.evaluation, after.evaluation
+        one, other, rtol = before.evaluation, after.evaluation, self.case.settings.rtol
         if self.rests(before) and self.rests(after):
             # over a whole resonance, where the phase reverses, the change is larger than 1
-            return vibration_change(one, other) / largest_change(self.case.settings.rtol, wider, sticks=True)
+            return vibration_change(one, other) / largest_change(rtol, wider, sticks=True)
         limit = np.linalg.norm(friction_limit(self.case.friction_coefficient, one.force_h[:, 0, 0]))
         size = max(vibration_size(one), SMALL_VIBRATION * float(limit))
-        most = largest_change(self.case.settings.rtol, wider, sticks=False)
+        most = largest_change(rtol, wider, sticks=False)
         return float(np.linalg.norm((other.predicted_h - one.predicted_h)[:, 1:])) / (size * most)
 
     def rests(self, state: State) -> bool:
@@ -271,7 +243,7 @@ def choose_resolution(case: Case, joint: Joint, point: State, run: Run) -> Refin
 
 def _stable(balance: Balance, begin: FloatArray, target: float, run: Run) -> State | None:
     """Stable state of a balance near a predicted force (n_rel, m), N; None where none is found."""
-    found = run.state(balance, begin, target, CONTINUATION.near_iterations)
+    found = run.state(balance, begin, target, NEAR_ITERATIONS)
     return found if found is not None and is_stable(balance, found.evaluation, run) else None
 
 

@@ -9,12 +9,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from solver.clock import computing_time
-from solver.loading_history.frequency_sweep import Found, FrequencySweep
-from solver.loading_history.resonance_search import advance_to_resonance
+from solver.harmonic_balance.state import Failure
+from solver.loading_history.frequency_sweep import FrequencySweep
+from solver.loading_history.resonance_search import find_resonance
 from solver.loading_history.sweep_start import Direction
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import OutOfTimeError
@@ -34,38 +36,20 @@ def follow_branch(
     keep: Callable[[Packed | str], None] | None = None,
     resume: Packed | None = None,
 ) -> Iterator[tuple[int, StartState]]:
-    """Unworn periodic states at given frequencies: index and state, one by one.
+    """Unworn periodic states at given frequencies, one by one, in the order of the sweep: index and state.
 
     A state depends on its own frequency only: the sweep begins at a frequency common to all points of a quarter octave
-    (`sweep_start`) and chooses its own steps (`sweep`).
+    (`sweep_start`) and chooses its own steps (`sweep`). Where the branch ends, the structure settles in time from the
+    last state, as in a slow sweep of the machine. The last attempt starts from the static state.
 
-    Where the branch ends at a fold, arc-length continuation follows the branch to a stable state at the next node. A
-    slow sweep of the machine would land there if the branch is one curve. Where the continuation fails, the
-    structure settles in time from the last state. The last attempt starts from the static state.
-
-    Parameters
-    ----------
-    model, friction_coefficient
-        The model, and the friction coefficient of all pairs or of each pair.
-    excitation_amplitude
-        N.
-    frequencies
-        Hz, ascending. Or what is sought in a range of frequencies: the first resonance that the sweep meets.
-    sweep
-        Loading history: "up" or "down" along the frequency, or "ramp" of the excitation at a given frequency.
-    settings
-        Harmonics, samples, tolerances, limit of time.
-    keep
-        Called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
+    friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
+    frequencies: Hz, ascending. Or what is sought in a range of frequencies: the first resonance that the sweep meets.
+    sweep: "up" or "down" along the frequency, or "ramp" of the excitation at a given frequency.
+    settings: harmonics, samples, tolerances, limit of time.
+    keep: called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
         position and the activity of the sweep, in words.
-    resume
-        Progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there to
-        frequencies not yet passed. The states are equal to the last bit, except `run_time`.
-
-    Returns
-    -------
-    iterator of tuple of int and StartState
-        Index of the frequency, in the order of the sweep, and the state or the reason why there is none.
+    resume: progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there
+        to frequencies not yet passed. The states are equal to the last bit, except `run_time`.
     """
     line = FrequencySweep(model, friction_coefficient, excitation_amplitude, sweep, settings)
     return follow_line(line, frequencies, keep, resume)
@@ -79,7 +63,6 @@ def follow_line(
 ) -> Iterator[tuple[int, StartState]]:
     """The states of `follow_branch` from a sweep before its first state."""
     n_states = 1 if isinstance(frequencies, FollowedFrequency) else frequencies.size
-    order = np.arange(n_states)[:: -1 if line.sweep == "down" else 1]
     line.run.budget.report = keep or line.run.budget.report
     if resume is not None:
         line.load(unpack(resume))
@@ -90,35 +73,24 @@ def follow_line(
 
     line.save = save
     started = computing_time()
-    for index in order:
+    for index in np.arange(n_states)[:: -1 if line.sweep == "down" else 1].tolist():
         line.set_deadline(started + line.settings.time_limit)
         try:
+            wanted: float | Failure
             if isinstance(frequencies, FollowedFrequency):
-                found = advance_to_resonance(line, frequencies)
+                wanted = find_resonance(line, frequencies)
             else:
-                found = line.advance(float(frequencies[index]))
+                wanted = float(frequencies[index])
+            if isinstance(wanted, Failure):
+                found = line.without_state(wanted.outcome, wanted.message)
+            else:
+                found = line.advance(wanted)
         except OutOfTimeError:
-            found = Found(Outcome.TIME_LIMIT)
+            found = line.without_state(Outcome.TIME_LIMIT)
         except Exception as error:
             # an error spoils one point only: the sweep goes on from the state before
-            found = Found(Outcome.EXCEPTION, message=describe_error(error))
+            found = line.without_state(Outcome.EXCEPTION, describe_error(error))
         now = computing_time()
-        yield (
-            int(index),
-            StartState(
-                outcome=found.outcome,
-                state=found.state,
-                reference=found.reference,
-                penalty_omega=line.penalty_omega,
-                resolution=found.resolution or line.resolution,
-                response_error=found.estimate.response,
-                wear_rate_error=found.estimate.wear_rate,
-                newton_iterations=line.n_iterations,
-                run_time=now - started,
-                branch=found.branch,
-                fold_frequency=found.fold / (2.0 * np.pi),
-                message=found.message,
-            ),
-        )
+        yield index, replace(found, newton_iterations=line.n_iterations, run_time=now - started)
         started = now
         save()

@@ -1,4 +1,4 @@
-"""A slow sweep: states with steps of their own, which leave the joint as the machine would.
+"""A slow sweep along a path: states with steps of their own, which leave the joint as the machine would.
 
 Friction gives a joint a family of periodic states. The tangential displacements at which the pairs stick select one of
 them, and these displacements depend on all vibration before. So a sweep has nodes of its own, whose distance depends
@@ -6,30 +6,32 @@ only on the change of the vibration from node to node. A state between two nodes
 leaves the sweep unchanged. So the state of a point does not depend on the other points of the study.
 
 The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
-slip, up to one step too early. A reference sweep has steps twice as long, and harmonics one level lower where these are
-automatic. The difference of both sweeps is at least half the error of the finer one, and as a rule the error of the
-coarser one. There is no difference, and no reference, as long as nothing slips or opens, and where each pair slips or
-opens within the period: such a state follows from its parameter alone. Where the sweep jumps over a fold, its reference
-begins anew behind the jump: the place of a jump is no measure of the error by steps.
+slip, up to one step too early. A reference sweep has half the nodes, in the middle of every second step, and harmonics
+one level lower where these are automatic. So the difference of both sweeps is at least half the error of the finer one,
+and as a rule the error of the coarser one: with common nodes both might keep the same history too early. There is no
+difference, and no reference, as long as nothing slips or opens, and where each pair slips or opens within the period:
+such a state follows from its parameter alone. Where the sweep jumps over a fold, its reference begins anew behind the
+jump: the place of a jump is no measure of the error by steps.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Generic
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from solver.accuracy.harmonic_levels import fewer
 from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.path_of_states import Path, S, Step
 from solver.march.steps import Lengths, take_step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
 from solver.settings import Resolution
+from solver.structure.joint import Case
 
 AIMED_CHANGE = 0.75
 """Expected change of the vibration in the next step over the largest change. Few steps are refused."""
@@ -44,84 +46,171 @@ ITERATIONS_PER_SAVE = 100
 """Newton iterations after which a sweep is saved at its next node, and its factorisation dropped, so that a resumed
 sweep is equal to the last bit: 1 s of 48 pairs, 17 s of 336."""
 
+KEPT_NODES = 3
+"""Last nodes that a sweep keeps: the next one is predicted on the parabola through them."""
+
+
+class OnPath(Protocol):
+    """A state at a value of the parameter of its path."""
+
+    @property
+    def parameter(self) -> float:
+        """Value of the parameter."""
+
+
+S = TypeVar("S", bound=OnPath)
+
+
+@dataclass(frozen=True)
+class Step(Generic[S]):
+    """End of a step: the state reached, and values of the parameter at the folds that the step has jumped over."""
+
+    state: S
+    folds: tuple[float, ...] = ()
+
+
+class Path(Protocol[S]):
+    """The joint along a parameter, with the harmonics and samples of its case."""
+
+    @property
+    def case(self) -> Case:
+        """Model and settings."""
+
+    @property
+    def steps(self) -> tuple[float, float, float]:
+        """Shortest and longest step, and the one at which a state that is not found is left to `rescue`."""
+
+    @property
+    def node_tolerance(self) -> float:
+        """Tolerance of the scaled residual of a node; reported states are solved to that of the settings."""
+
+    def ahead(self, parameter: float, length: float) -> float:
+        """The parameter a step farther; length: below 0 for a step down."""
+
+    def solve(self, states: tuple[S, ...], target: float, run: Run) -> S | None:
+        """Stable state at a target near the last of some states, which leaves its history to it; None if not found."""
+
+    def rescue(self, start: S, target: float, run: Run) -> Step[S] | Outcome:
+        """State at a target that `solve` does not find, or why there is none."""
+
+    def change(self, before: S, after: S, wider: float) -> float:
+        """Change over a step, over the largest change allowed times `wider`."""
+
+    def rests(self, state: S) -> bool:
+        """Whether no pair slips or opens within the period."""
+
+    def forgets(self, state: S) -> bool:
+        """Whether each pair slips or opens within the period, so that the state follows from its parameter alone."""
+
+    def differs(self, before: S, after: S) -> float:
+        """Relative change of the vibration between two states."""
+
+    def at(self, resolution: Resolution) -> Path[S]:
+        """The path with other harmonics and samples."""
+
+    def move(self, state: S, other: Any, run: Run) -> S | None:
+        """The state with the harmonics and samples of another path; None where not found."""
+
+    def choose(self, state: S, run: Run) -> tuple[Path[S], S, bool, float]:
+        """Path and state with the harmonics that the state needs, whether they suffice, relative error."""
+
+    def suffices(self, state: S, at_limit: bool, run: Run) -> bool:
+        """Whether the state has about the harmonics that it needs. at_limit: whether more are not allowed."""
+
+    def describe(self, state: S) -> str:
+        """Where the path is, in words."""
+
+
+@packable
+@dataclass(frozen=True)
+class Nodes:
+    """The last nodes of a sweep, with equal harmonics, the current one last; none where there is no state."""
+
+    resolution: Resolution
+    states: tuple[Any, ...] = ()
+
+    def then(self, state: Any) -> Nodes:
+        """With one node more."""
+        return replace(self, states=(*self.states, state)[-KEPT_NODES:])
+
 
 @packable
 @dataclass(frozen=True)
 class SweepState:
     """State of a sweep at a node, with which the sweep goes on.
 
-    resolution: harmonics and samples of the nodes.
-    states: the last one or two nodes, with equal harmonics, the current one last; empty where there is no state.
+    nodes: the last nodes; those before its end where the sweep is lost.
     length: of the next step.
     checked: the node at which the harmonics were chosen. at_limit: whether it needs more than a sweep may have.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
-    failure, lost_at: reason why there is no state, and the parameter of the last node before, NaN if there was none.
+    lost, failure: whether the sweep has ended, and the reason why there is no state.
     iterations: Newton iterations so far.
-    reference: state of the reference sweep; None for none.
+    reference: last nodes of the reference sweep, None for none; skipped: parameter of the node since then, NaN if none.
     """
 
-    resolution: Resolution
-    states: tuple[Any, ...] = ()
+    nodes: Nodes
     length: float = 0.0
     checked: Any = None
     at_limit: bool = False
     branch: int = 0
-    fold: float = float("nan")
+    fold: float = math.nan
+    lost: bool = False
     failure: Outcome = Outcome.START_FAILED
-    lost_at: float = float("nan")
     iterations: int = 0
-    reference: SweepState | None = None
+    reference: Nodes | None = None
+    skipped: float = math.nan
 
 
 class Sweep(Generic[S]):
     """A sweep, node by node, up (direction 1) or down (-1) along the parameter of its path.
 
     state: at the current node. saved: at the last saved node; a sweep resumed from there is equal to the last bit.
-    ahead: the next node, where it is known. last: the last node of a lost sweep.
+    ahead: the next node, where it is known.
     passed: parameters of the nodes so far.
     save: called where the sweep was saved.
-    wider: factor on the steps, 2 for a reference sweep. reference: the reference sweep, led from node to node.
+    with_reference: whether a reference sweep follows.
     """
 
-    def __init__(
-        self, path: Path[S], direction: float, budget: Budget, *, wider: float = 1.0, with_reference: bool = False
-    ) -> None:
-        self.path, self.direction, self.wider = path, direction, wider
-        self.run = Run(path.case.settings.tolerance, budget)
-        self.state = SweepState(path.case.resolution)
+    def __init__(self, path: Path[S], direction: float, budget: Budget, *, with_reference: bool = False) -> None:
+        self.path, self.direction, self.with_reference = path, direction, with_reference
+        self.run = self._reference_run = Run(path.case.settings.tolerance, budget)
+        self.state = SweepState(Nodes(path.case.resolution))
         self.saved: SweepState | None = None
         self.ahead: Step[S] | None = None
-        self.last: S | None = None
         self.passed: list[float] = []
         self.save: Callable[[], None] = lambda: None
-        # counts of its own: when the sweep is saved must not depend on the points that are asked for
-        own = Budget(deadline=budget.deadline)
-        self.reference = Sweep(path, direction, own, wider=2.0 * wider) if with_reference else None
 
     def load(self, state: SweepState) -> None:
         """Go on from the `saved` state of another sweep."""
         self.saved = self.state = state
-        self.path = self.path.at(state.resolution)
+        self.path = self.path.at(state.nodes.resolution)
         self.run.budget.iterations = state.iterations
-        self.forget()
-        if self.reference is not None and state.reference is not None:
-            self.reference.load(state.reference)
+        self._forget()
 
     @property
     def n_iterations(self) -> int:
         """Newton iterations so far, those of the reference sweep included."""
-        return self.run.budget.iterations + (0 if self.reference is None else self.reference.run.budget.iterations)
+        return self.run.budget.iterations
 
     def set_deadline(self, deadline: float) -> None:
         """Set the CPU time of the thread, s, after which the sweep ends."""
         self.run.budget.deadline = deadline
-        if self.reference is not None:
-            self.reference.run.budget.deadline = deadline
+
+    @property
+    def last(self) -> S | None:
+        """The current node, or the last one of a lost sweep; None where there was none."""
+        return self.state.nodes.states[-1] if self.state.nodes.states else None
 
     @property
     def here(self) -> S | None:
         """The current node, None where there is no state."""
-        return self.state.states[-1] if self.state.states else None
+        return None if self.state.lost else self.last
+
+    @property
+    def reference(self) -> tuple[Path[S], tuple[S, ...]] | None:
+        """Path and last nodes of the reference sweep; None where the state does not depend on steps."""
+        found = self.state.reference
+        return None if found is None else (self.path.at(found.resolution), found.states)
 
     def begin(self, path: Path[S], state: S) -> bool:
         """Take the first state, which has the harmonics and samples of a path; False where the state is rejected.
@@ -129,28 +218,19 @@ class Sweep(Generic[S]):
         A state that more harmonics change by more than half is rejected: one harmonic can give a joint that slips and
         opens everywhere a state that does not exist.
         """
-        self.place_at(path, state)
+        self._forget()
+        self.path, self.passed = path, [state.parameter]
+        nodes = Nodes(path.case.resolution, (state,))
+        self.state = replace(self.state, nodes=nodes, length=path.steps[1], lost=False)
         if self._choose_resolution() > SENSITIVE_ERROR:
-            self.state = replace(self.state, states=(), failure=Outcome.UNSETTLED)
+            self.state = replace(self.state, nodes=replace(nodes, states=()), failure=Outcome.UNSETTLED)
             return False
         self._save()
         return True
 
-    def lose(self) -> None:
-        """End the sweep at the current node."""
-        at = self.state.lost_at if self.here is None else self.here.parameter
-        self.last = self.here or self.last
-        self.drop()
-        self.state = replace(self.state, lost_at=at)
-
-    def drop(self) -> None:
-        """Be without a state, as a reference sweep that does not differ from its sweep."""
-        self.state, self.ahead = replace(self.state, states=()), None
-
     def has_passed(self, parameter: float) -> bool:
         """Whether a value of the parameter lies before the current node, or before the end of a lost sweep."""
-        last = self.state.lost_at if self.here is None else self.here.parameter
-        return (parameter - last) * self.direction < 0.0
+        return self.last is not None and (parameter - self.last.parameter) * self.direction < 0.0
 
     def advance_to(self, parameter: float) -> None:
         """Go on until the next node lies at or beyond a value of the parameter, or until the branch is lost."""
@@ -161,9 +241,9 @@ class Sweep(Generic[S]):
                 elif (self.ahead.state.parameter - parameter) * self.direction >= 0.0:
                     return
                 else:
-                    self._advance(self.ahead)
+                    self._advance(self.here, self.ahead)
         except np.linalg.LinAlgError:
-            self.lose()
+            self.state, self.ahead = replace(self.state, lost=True), None
 
     def state_at(self, parameter: float, run: Run) -> Step[S] | Outcome:
         """State at a parameter between the current and the next node, or why there is none.
@@ -173,39 +253,26 @@ class Sweep(Generic[S]):
         """
         if self.here is None or self.ahead is None:
             return self.state.failure
-        ahead = self.ahead
+        ahead, before = self.ahead, self.state.nodes.states[:-1]
         beyond = tuple(at for at in ahead.folds if (parameter - at) * self.direction > 0.0)
         if beyond and parameter != ahead.state.parameter:
             found = _reach(self.path, (ahead.state,), parameter, run)
             if isinstance(found, Step) and not found.folds:
                 return replace(found, folds=beyond)
-        near = () if ahead.folds else (ahead.state,)
+        near = before if ahead.folds else (*before[-1:], ahead.state)
         return _reach(self.path, (*near, self.here), parameter, run)
-
-    def reference_at(self, parameter: float, run: Run) -> S | None:
-        """State of the reference sweep at a parameter between the current and the next node; None if there is none."""
-        if self.reference is None or self.reference_node(parameter) is None:
-            return None
-        found = self.reference.state_at(parameter, run)
-        return None if isinstance(found, Outcome) else found.state
-
-    def reference_node(self, parameter: float) -> S | None:
-        """Last node of the reference sweep before a parameter; None where it has no state of its own."""
-        if self.reference is not None:
-            self.reference.advance_to(parameter)
-        return None if self.reference is None else self.reference.here
 
     # the line of `take_step`
 
     def attempt(self, here: S, length: float) -> Step[S] | None:
         """As in Line."""
         run = self.run.to(self.path.node_tolerance)
-        found = self.path.solve(self.state.states, self._target(here, length), run)
+        found = self.path.solve(self.state.nodes.states, self._target(here, length), run)
         return None if found is None else Step(found)
 
     def judge(self, here: S, end: Step[S], length: float) -> float:
         """As in Line: the shortest step is accepted, whatever the change of the vibration is."""
-        ratio = self.path.change(here, end.state, self.wider)
+        ratio = self.path.change(here, end.state, 1.0)
         return min(ratio, 1.0) if length <= self.path.steps[0] else ratio
 
     def rescue(self, here: S, length: float) -> Step[S] | Failure:
@@ -225,26 +292,23 @@ class Sweep(Generic[S]):
         if budget.iterations <= SWEEP_ITERATIONS:
             taken = take_step(self, here, self.state.length, Lengths(1, AIMED_CHANGE, shortest, rescue))
         if isinstance(taken, Failure):
-            self.state = replace(self.state, failure=taken.outcome)
-            self.lose()
+            self.state = replace(self.state, failure=taken.outcome, lost=True)
         else:
             self.ahead, length = taken
             self.state = replace(self.state, length=min(length, longest))
 
-    def _advance(self, step: Step[S]) -> None:
+    def _advance(self, before: S, step: Step[S]) -> None:
         """Make the next node the current one."""
-        before, self.ahead = self.here, None
+        self.ahead, nodes = None, self.state.nodes
         self.passed.append(step.state.parameter)
         self.state = replace(
             self.state,
-            states=(step.state,) if step.folds else (before, step.state),
+            nodes=replace(nodes, states=(step.state,)) if step.folds else nodes.then(step.state),
             branch=self.state.branch + len(step.folds),
             fold=(self.state.fold, *step.folds)[-1],
         )
-        if self.reference is not None and before is not None:
-            self._lead(self.reference, before, step)
-        if self.state.checked is None:
-            return
+        if self.with_reference:
+            self._lead_reference(before, step)
         if self.path.differs(self.state.checked, step.state) > ACCURACY.vibration_recheck:
             if self.path.suffices(step.state, self.state.at_limit, self.run):
                 self.state = replace(self.state, checked=step.state)
@@ -254,78 +318,79 @@ class Sweep(Generic[S]):
         if self.run.budget.iterations >= saved + ITERATIONS_PER_SAVE:
             self._save()
 
-    def _lead(self, reference: Sweep[S], before: S, step: Step[S]) -> None:
-        """Lead the reference sweep to the present node: the end of a step from the node `before`."""
+    def _lead_reference(self, before: S, step: Step[S]) -> None:
+        """Lead the reference sweep over a step from the node `before`: to its middle, if it is a second step."""
         if step.folds or self.path.forgets(step.state):
-            reference.drop()
+            self.state = replace(self.state, reference=None, skipped=math.nan)
             return
-        if reference.here is None and not self.path.rests(step.state):
-            self._begin_reference(reference, before)
-        reference.advance_to(step.state.parameter)
-        if reference.state.branch > 0:
-            reference.drop()
+        if self.state.reference is None:
+            if self.path.rests(step.state):
+                return
+            self._begin_reference(self.path, before)
+        if math.isnan(self.state.skipped):
+            self.state = replace(self.state, skipped=step.state.parameter)
+            return
+        middle = 0.5 * (before.parameter + step.state.parameter)
+        led = self._led((middle,)) or self._led((self.state.skipped, middle))
+        self.state = replace(self.state, reference=led, skipped=math.nan)
 
-    def _begin_reference(self, reference: Sweep[S], node: S) -> None:
-        """Begin the reference sweep at a node, with harmonics one level lower."""
-        path, moved = self.path.at(fewer(self.state.resolution, self.path.case.settings)), None
-        if path.case.resolution != self.state.resolution:
-            moved = self.path.move(node, path, self.run)
-        placed = (self.path, node) if moved is None else (path, moved)
-        reference.state = replace(reference.state, branch=0)
-        reference.place_at(*placed, reference.wider * self.state.length)
+    def _led(self, targets: tuple[float, ...]) -> Nodes | None:
+        """Nodes of the reference sweep at the last of some targets, one after the other; None where none is found."""
+        nodes = self.state.reference
+        for target in targets:
+            if nodes is not None:
+                path, run = self.path.at(nodes.resolution), self._reference_run.to(self.path.node_tolerance)
+                found = path.solve(nodes.states, target, run)
+                nodes = None if found is None else nodes.then(found)
+        return nodes
 
-    def place_at(self, path: Path[S], state: S, length: float = np.inf) -> None:
-        """Put the sweep at a first node; length: of the first step."""
-        self.forget()
-        self.path, self.passed, length = path, [state.parameter], min(length, path.steps[1])
-        self.state = replace(self.state, states=(state,), resolution=path.case.resolution, length=length)
+    def _begin_reference(self, path: Path[S], node: S) -> bool:
+        """Begin the reference sweep at a state of a path, with harmonics one level lower than those of the sweep.
+
+        False where the state is not found with these harmonics, and the state itself is taken.
+        """
+        wanted = self.path.at(fewer(self.state.nodes.resolution, self.path.case.settings))
+        moved: S | None = node
+        if wanted.case.resolution != path.case.resolution:
+            moved = path.move(node, wanted, self.run)
+        resolution = (path if moved is None else wanted).case.resolution
+        reference = Nodes(resolution, (node if moved is None else moved,))
+        self.state, self._reference_run = replace(self.state, reference=reference), self.run.fresh()
+        return moved is not None
 
     def _choose_resolution(self) -> float:
         """Choose the harmonics and samples of the nodes for the current state, as far as they are automatic.
 
         Returns the estimated relative error of the response, 0 for fixed settings.
         """
-        here, error = self.state.states[-1], 0.0
+        nodes, error = self.state.nodes, 0.0
+        here = nodes.states[-1]
         if self.path.case.settings.automatic:
             path, here, accurate, error = self.path.choose(here, self.run)
             self.state = replace(self.state, at_limit=not accurate)
-            self.take(path, here)
+            if path.case.resolution == nodes.resolution:
+                self.state = replace(self.state, nodes=replace(nodes, states=(*nodes.states[:-1], here)))
+            else:
+                self._take(path, here)
         self.state = replace(self.state, checked=here)
         return error
 
-    def take(self, path: Path[S], state: S) -> None:
-        """Take the current node with the harmonics and samples of a path; those of the reference sweep follow."""
-        if path.case.resolution == self.state.resolution:
-            self.state = replace(self.state, states=(*self.state.states[:-1], state))
-            return
-        self.path, self.run = path, self.run.fresh()
-        self.state = replace(self.state, states=(state,), resolution=path.case.resolution)
-        other = self.reference
-        if other is not None and other.here is not None:
-            wanted = path.at(fewer(path.case.resolution, path.case.settings))
-            moved = other.path.move(other.here, wanted, self.run)
-            if moved is None:
-                self._begin_reference(other, state)
-            else:
-                other.forget()
-                other.take(wanted, moved)
+    def _take(self, path: Path[S], state: S) -> None:
+        """Take the current node with other harmonics and samples; those of the reference sweep follow."""
+        before, self.path, self.run = self.reference, path, self.run.fresh()
+        self.state = replace(self.state, nodes=Nodes(path.case.resolution, (state,)))
+        if before is not None and not self._begin_reference(before[0], before[1][-1]):
+            self._begin_reference(path, state)
 
     def _save(self) -> None:
         """Save the current node, and drop all that a resumed sweep would not have."""
-        other = None
-        if self.reference is not None:
-            other = replace(self.reference.state, iterations=self.reference.run.budget.iterations)
-        self.state = in_rows(replace(self.state, iterations=self.run.budget.iterations, reference=other))
-        self.forget()
-        if self.reference is not None and self.state.reference is not None:
-            self.reference.state = self.state.reference
-            self.reference.forget()
-        self.saved = self.state
+        self.saved = self.state = in_rows(replace(self.state, iterations=self.run.budget.iterations))
+        self._forget()
         self.save()
 
-    def forget(self) -> None:
-        """Drop the factorisation that is kept from node to node, and the next node."""
-        self.run, self.ahead = self.run.fresh(), None
+    def _forget(self) -> None:
+        """Drop the factorisations that are kept from node to node, and the next node."""
+        self.run, self._reference_run, self.ahead = self.run.fresh(), self.run.fresh(), None
 
 
 def _reach(path: Path[S], states: tuple[S, ...], target: float, run: Run) -> Step[S] | Outcome:

@@ -48,9 +48,13 @@ class Origin:
     cell: int
 
 
-def find_origin(model: ReducedModel, frequency: float, sweep: Direction) -> Origin:
-    """Origin of the sweep to a frequency, Hz."""
-    cell = math.floor(CELLS_PER_OCTAVE * math.log2(frequency))
+def cell_of(frequency: float) -> int:
+    """Number of the cell of a frequency, Hz."""
+    return math.floor(CELLS_PER_OCTAVE * math.log2(frequency))
+
+
+def find_origin(model: ReducedModel, cell: int, sweep: Direction) -> Origin:
+    """Origin of the sweep to the points of a cell."""
     low, high = (2.0 ** (edge / CELLS_PER_OCTAVE) for edge in (cell, cell + 1))
     if sweep == "ramp":
         return Origin((), high, cell)
@@ -62,14 +66,14 @@ def find_origin(model: ReducedModel, frequency: float, sweep: Direction) -> Orig
 
 def _quiet(model: ReducedModel, far: float, near: float) -> float:
     """Frequency between two of them, Hz, at which the excitation loads the stuck joint least."""
-    frequencies = np.geomspace(far, near, ORIGIN_CANDIDATES + 1)
+    frequencies = [float(at) for at in np.geomspace(far, near, ORIGIN_CANDIDATES + 1)]
     loads = []
     for frequency in frequencies:
         try:
-            structure = build_structure(model, 2.0 * np.pi * float(frequency), 1.0, (1,))
+            structure = build_structure(model, 2.0 * np.pi * frequency, 1.0, (1,))
             loads.append(float(np.linalg.norm(structure.harmonic_force)))
         except np.linalg.LinAlgError:
             loads.append(math.inf)
     # of equally good frequencies the farthest: round-off must not decide
-    least = min(loads)
-    return next(float(at) for at, load in zip(frequencies, loads, strict=True) if load <= least * (1.0 + 1e-6))
+    least = min(loads) * (1.0 + 1e-6)
+    return next(at for at, load in zip(frequencies, loads, strict=True) if load <= least)

@@ -1,38 +1,69 @@
-"""One block of one mission: its wear, and the reference solution of its wear."""
+"""One block of one mission: the state with which it begins, its wear, and the reference solution of its wear."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from solver.accuracy.options import ACCURACY
 from solver.clock import computing_time
-from solver.contact.wear_law import WearLaw
-from solver.harmonic_balance.state import Failure
+from solver.continuation.first_state import solve_first_state
+from solver.continuation.natural import SMOOTH_CHANGE
+from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
+from solver.loading_history.path import LoadingPath
+from solver.loading_history.start_states import follow_line
 from solver.loading_history.sweep_start import Direction
-from solver.missions.block_start import Begun, begin_block, continue_block
-from solver.missions.blocks import Block, Mission, worn
-from solver.model import ComplexArray, FloatArray
+from solver.missions.blocks import Block, Mission
+from solver.model import ComplexArray, FloatArray, ReducedModel
+from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import in_rows, packable
 from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState
-from solver.settings import SolverSettings
+from solver.results.state_report import periodic_state
+from solver.settings import Resolution, SolverSettings
+from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
 from solver.wear.control import Adaptive
 from solver.wear.integrate import Ended
 from solver.wear.rate_slope import rate_slope
 from solver.wear.solutions import Like, SlowTime, Solutions
+from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
 
 NODES_OF_A_REFERENCE_STEP = 3
 """Nodes of the sweep of a block in one step of its reference solution: the difference of both is twice the error by the
 steps of the sweep, as in a wear history."""
+
+LARGEST_CHANGE = 2.0
+"""Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
+
+CHANGE_OF_A_WAY = 0.5
+"""Change of the vibration behind such a sweep, after which the sweep chooses its nodes anew and its error is estimated
+again. A state without its way is left after `smooth_change`, as only the way tells on which branch it lies."""
+
+MOST_HALVINGS = 12
+"""Most halvings of the distance of two such nodes in one sweep, to come past a corner at the resonance."""
+
+
+@packable
+@dataclass(frozen=True)
+class Begun:
+    """The way by which a block began in an earlier mission.
+
+    nodes: frequencies, rad/s, or load factors of the nodes of its sweep; of a passage the frequencies that count, Hz.
+    start, resolution: the state to which the sweep led, with its errors, and harmonics and samples of the last node;
+        None for a passage.
+    """
+
+    nodes: tuple[float, ...]
+    start: StartState | None = None
+    resolution: Resolution | None = None
 
 
 @packable
@@ -40,24 +71,19 @@ steps of the sweep, as in a wear history."""
 class BlockRun:
     """A block that was computed once. Rows of the responses: begin and end.
 
-    failure: reason of the end; the outcome CONVERGED for a regular end.
     growth (n_contact,): depth worn in the block, m.
-    response (2, n_response): complex first harmonic, m.
-    peak (2, n_response): largest magnitude over a period, m.
-    slope (n_contact, n_contact): derivative of the growth with respect to the depth before, 1; None if not asked for.
-    response_error: estimated relative error of response and peak.
-    growth_error: estimated relative error of the growth by harmonics, samples, the way to the start state and steps.
+    response (2, n_response): complex first harmonic, m. peak (2, n_response): largest magnitude over a period, m.
+    slope (n_contact, n_contact): derivative of the growth by the depth before, 1; None if not asked for.
+    response_error, growth_error: estimated relative errors of responses and growth.
     inaccurate: largest relative error of a state above rtol, 0 where there is none.
     held: whether the mean position of a joint that slides as a whole was held.
     cut_off: whether a pair at an edge of the modelled contact carries load or has worn.
-    like: what the reference solution takes over.
+    like, begun: what the reference solution takes over, and the next mission (None for a block that continues).
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
-    begun: what the block of the next mission takes over; None for a block that continues.
-    iterations: Newton iterations, start state included.
-    sweep_rate: |df/dt| / (zeta f)^2 of a passage, see `solver.missions.passage`; 0 for steady vibration.
+    iterations: of Newton's method, start state included.
+    sweep_rate: |df/dt| / (zeta f)^2 of a passage; 0 for steady vibration.
     """
 
-    failure: Failure
     growth: FloatArray
     response: ComplexArray
     peak: FloatArray
@@ -73,11 +99,6 @@ class BlockRun:
     iterations: int = 0
     sweep_rate: float = 0.0
 
-    @property
-    def completed(self) -> bool:
-        """Whether the block was computed to its end."""
-        return self.failure.outcome is Outcome.CONVERGED
-
 
 @dataclass(frozen=True)
 class BlockCase:
@@ -85,20 +106,21 @@ class BlockCase:
 
     mission, place: the mission, and the place of the block in it.
     depth (n_contact,): m, worn before the block.
-    carried: state that the block continues; None for a block that begins anew.
     settings: with the time that is left.
+    carried: state that the block continues; None for a block that begins anew.
+    begun, like: of this block in an earlier mission, and in the history for its reference solution; else None.
     with_slope: whether the slope of the growth is asked for.
-    begun: of an earlier mission.
     every: whether stability is tested at begin and end, also where nothing speaks for a loss of stability.
     """
 
     mission: Mission
     place: int
     depth: FloatArray
-    carried: StartState | None
     settings: SolverSettings
-    with_slope: bool = False
+    carried: StartState | None = None
     begun: Begun | None = None
+    like: Like | None = None
+    with_slope: bool = False
     every: bool = True
 
     @property
@@ -107,94 +129,93 @@ class BlockCase:
         return self.mission.blocks[self.place]
 
     @property
-    def law(self) -> WearLaw:
-        """The wear law, whose table counts depths from the unworn joint."""
-        return self.mission.law.begun_at(self.depth)
+    def is_continued(self) -> bool:
+        """Whether the block behind begins from the last state of this one."""
+        blocks = self.mission.blocks
+        return blocks[(self.place + 1) % len(blocks)].way == "continue"
 
-    def line(self, sweep: Direction) -> FrequencySweep:
-        """The sweep to the states of the block, at the depth before."""
-        block = self.block
-        model = worn(block.model, self.depth)
-        line = FrequencySweep(model, block.friction_coefficient, block.excitation_amplitude, sweep, self.settings)
+    @property
+    def model(self) -> ReducedModel:
+        """The model whose pairs the depth has opened."""
+        contact = self.block.model.contact
+        return replace(self.block.model, contact=replace(contact, gap=contact.gap + self.depth))
+
+    def left(self, began: float) -> BlockCase:
+        """The same with the time that is left after a begin at a CPU time, s."""
+        limit = self.settings.time_limit - (computing_time() - began)
+        return replace(self, settings=replace(self.settings, time_limit=limit))
+
+    def run(self) -> Run:
+        """A computation with the time of the settings."""
+        return Run(self.settings.tolerance, Budget(deadline=computing_time() + self.settings.time_limit))
+
+    def line(self, sweep: Direction, amplitude: float | None = None) -> FrequencySweep:
+        """A sweep at the depth before the block. amplitude: N; that of the block if not given."""
+        block, model = self.block, self.model
+        load = block.excitation_amplitude if amplitude is None else amplitude
+        line = FrequencySweep(model, block.friction_coefficient, load, sweep, self.settings)
         line.every = self.every
         return line
 
-    def not_computed(self, failure: Failure, iterations: int = 0) -> BlockRun:
-        """The block, which was not computed to its end."""
-        nothing = np.full((2, len(self.block.model.response_names)), np.nan)
-        unknown = np.full_like(self.depth, np.nan)
-        return BlockRun(failure, unknown, nothing.astype(complex), nothing, iterations=iterations)
+    def work(self, start: StartState) -> WearingJoint:
+        """The joint at the depth before the block, with harmonics, samples and penalty of a state."""
+        friction, mission = self.block.friction_coefficient, self.mission
+        assert start.state is not None
+        case = build_case(self.model, friction, start.penalty_omega, self.settings, start.resolution)
+        return WearingJoint(case, start, mission.wear_coefficient, mission.law.begun_at(self.depth))
+
+    def begin(self, start: StartState) -> tuple[WearingJoint, WearState]:
+        """The joint at the depth before the block, and a state as its first one."""
+        work = self.work(start)
+        assert start.state is not None
+        # the limit of the explicit step is not asked for
+        return work, work.begin(np.inf)
 
 
-def run_block(case: BlockCase, like: Like | None = None) -> BlockRun:
-    """Compute a block of steady vibration; with `like` of this block in the history its reference solution.
-
-    A block that does not come to its end has its failure as a value. Raises OutOfTimeError, LinAlgError.
-    """
-    began, block = computing_time(), case.block
-    frequency, cycles = block.steady
-    if case.carried is not None:
-        start, begun = continue_block(block, case.depth, case.carried, case.settings), None
-    else:
-        line = case.line(case.mission.first if block.way == "continue" else block.way)
-        line.set_deadline(began + case.settings.time_limit)
-        every_node = 1 if like is None else NODES_OF_A_REFERENCE_STEP
-        start, begun = begin_block(line, frequency, case.begun, every_node)
-        begun = None if block.way == "continue" else begun
+def run_block(case: BlockCase) -> BlockRun | Failure:
+    """Compute a block of steady vibration, or why it does not come to its end. Raises OutOfTimeError, LinAlgError."""
+    began = computing_time()
+    start, begun = find_start(case)
     if start.state is None:
-        return case.not_computed(Failure(start.outcome, start.message), start.newton_iterations)
-    left = replace(case.settings, time_limit=case.settings.time_limit - (computing_time() - began))
-    counts = np.array([0.0, cycles])
-    asked = SlowTime(case.mission.wear_coefficient, Adaptive(left.rtol), counts, law=case.law, ends_at_last=True)
-    model = worn(block.model, case.depth)
-    of_block = build_case(model, block.friction_coefficient, start.penalty_omega, left, start.resolution)
-    solutions = Solutions(of_block, start, asked)
-    ended = solutions.history(stable_end=case.every) if like is None else solutions.follow(like, counts)
-    iterations = start.newton_iterations + ended.iterations
-    if ended.state is None or ended.failure.outcome is not Outcome.CONVERGED:
-        return case.not_computed(ended.failure, iterations)
-    computed = replace(_read(case, ended, ended.course.read(counts), start), begun=begun, iterations=iterations)
+        return Failure(start.outcome, start.message)
+    case, law, (_, cycles) = case.left(began), case.mission.law.begun_at(case.depth), case.block.steady
+    work, counts = case.work(start), np.array([0.0, cycles])
+    asked = SlowTime(work.wear_coefficient, Adaptive(work.case.settings.rtol), counts, law=law, ends_at_last=True)
+    solutions = Solutions(work.case, start, asked)
+    ended = solutions.history(stable_end=case.every) if case.like is None else solutions.follow(case.like, counts)
+    state = ended.state
+    if state is None or ended.failure.outcome is not Outcome.CONVERGED:
+        return ended.failure
+    values = ended.course.read(counts)
+    depth, at = values["wear_depth"], state.point.evaluation
+    volume, slope = float(depth[-1] @ work.area), None
     if case.with_slope:
-        work = WearingJoint(of_block, start, asked.wear_coefficient, asked.law)
-        computed = replace(computed, slope=_slope(work, ended, case, computed.growth))
-    # as read from a file: an interrupted mission goes on with equal bits
-    return in_rows(computed)
-
-
-def _slope(work: WearingJoint, ended: Ended, case: BlockCase, growth: FloatArray) -> FloatArray:
-    """Derivative of the growth over the block: the flow of the linearised wear rate."""
-    assert ended.state is not None
-    at = ended.state.point.evaluation
-    pairs = case.depth + growth > 0.0
-    slope = rate_slope(work.at(ended.state), at, work.gain(1.0), work.wearing, pairs, work.run)
-    return np.asarray(scipy.linalg.expm(case.block.steady[1] * slope) - np.eye(len(slope)))
-
-
-def _read(case: BlockCase, ended: Ended, values: dict[str, Any], start: StartState) -> BlockRun:
-    """The result of a block that was computed to its end."""
-    state, course, end = ended.state, ended.course, case.block.steady[1]
-    assert state is not None
-    growth = values["wear_depth"][-1]
-    volume = float(growth @ case.mission.area)
+        pairs = case.depth + depth[-1] > 0.0
+        rates = rate_slope(work.at(state), at, work.gain(1.0), work.wearing, pairs, work.run)
+        # the flow of the linearised wear rate
+        slope = np.asarray(scipy.linalg.expm(cycles * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = ACCURACY.history_safety * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
-    cut = first_cut_off(case.block.model.contact, np.array([0.0, end]), values["mean_pressure"], values["wear_depth"])
-    return BlockRun(
-        failure=ended.failure,
-        growth=growth,
+    found = BlockRun(
+        growth=depth[-1],
         response=values["response"],
         peak=values["response_peak"],
+        slope=slope,
         response_error=float(np.fmax.reduce(values["response_error"])),
         growth_error=float(values["wear_rate_error"][0]) + by_steps,
-        inaccurate=state.worst.largest if state.inaccurate_from <= end else 0.0,
-        held=state.held_from <= end,
-        cut_off=not math.isnan(cut),
-        like=Like(course.resolutions, state.step_limit, ended.iterations),
-        last=_last(case, ended, start) if case.mission.continued_by(case.place) else None,
+        inaccurate=state.worst.largest if state.inaccurate_from <= cycles else 0.0,
+        held=state.held_from <= cycles,
+        cut_off=not math.isnan(first_cut_off(case.model.contact, counts, values["mean_pressure"], depth)),
+        like=Like(ended.course.resolutions, state.step_limit, ended.iterations),
+        last=_last(ended, start) if case.is_continued else None,
+        begun=begun,
+        iterations=start.newton_iterations + ended.iterations,
     )
+    # as read from a file: an interrupted mission goes on with equal bits
+    return in_rows(found)
 
 
-def _last(case: BlockCase, ended: Ended, start: StartState) -> StartState:
+def _last(ended: Ended, start: StartState) -> StartState:
     """The last state of a block, with the tangential history for the next one."""
     assert ended.state is not None
     assert start.state is not None
@@ -204,7 +225,6 @@ def _last(case: BlockCase, ended: Ended, start: StartState) -> StartState:
         displacement_h=point.evaluation.displacement_h,
         contact_force_h=point.evaluation.force_h,
         start_history=point.history,
-        wear_depth=np.zeros_like(case.depth),
     )
     return replace(
         start,
@@ -216,3 +236,115 @@ def _last(case: BlockCase, ended: Ended, start: StartState) -> StartState:
         message="",
         reference=None,
     )
+
+
+def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
+    """The state with which a block begins, or why there is none; and what the block of the next mission takes over."""
+    if case.carried is not None:
+        return _continued(case, case.carried), None
+    if case.begun is not None and (again := _again(case, case.begun)) is not None:
+        return again, case.begun
+    way = case.block.way
+    line = case.line(case.mission.first if way == "continue" else way)
+    _, start = next(follow_line(line, np.array([case.block.steady[0]])))
+    nodes = line.nodes
+    if start.state is None or nodes is None or way == "continue":
+        return start, None
+    passed = tuple(nodes.passed) if nodes.here is not None and start.branch == 0 else ()
+    return start, Begun(passed, start, nodes.state.nodes.resolution)
+
+
+def _again(case: BlockCase, begun: Begun) -> StartState | None:
+    """The state at other depths than `begun`, with its errors, through the nodes of its sweep.
+
+    With nodes of its own, the sweep of each mission would leave other static friction forces: the wear of a mission
+    would jump from depth to depth by the error of the sweep. Where each pair slips or opens within the period, the
+    state keeps nothing of its way, and follows from the depths alone. None where the way has jumped over a fold, where
+    there is no stable state, or where the vibration has changed so much that the way may lead to another branch.
+    """
+    start, run = begun.start, case.run()
+    if start is None or start.state is None or start.branch > 0:
+        return None
+    ramp, omega, (work, begins) = case.block.way == "ramp", start.state.omega, case.begin(start)
+    path = LoadingPath(work.case, case.block.excitation_amplitude, omega if ramp else None)
+    at, target = begins.point.evaluation, 1.0 if ramp else omega
+    before = State(at, start.state.start_history, target)
+    try:
+        found, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
+        if found is None or not path.forgets(found):
+            every_node = 1 if case.like is None else NODES_OF_A_REFERENCE_STEP
+            found, most = _through_nodes(path, begun, target, every_node, run), CHANGE_OF_A_WAY
+        if found is None or vibration_change(at, found.evaluation) > most:
+            return None
+        joint = path.joint_at(target)
+        if find_instability(work.case, joint, found.evaluation, run, case.every):
+            return None
+    except np.linalg.LinAlgError:
+        return None
+    state = periodic_state(joint, found)
+    return replace(start, state=state, reference=None, newton_iterations=run.budget.iterations)
+
+
+def _through_nodes(path: LoadingPath, begun: Begun, target: float, every_node: int, run: Run) -> State | None:
+    """The state at a target of the path, through nodes of an earlier sweep; None where it is not found."""
+    if not begun.nodes or begun.resolution is None:
+        return None
+    coarse, (first, *nodes) = path.at(begun.resolution), begun.nodes[::every_node]
+    joint, unworn = coarse.joint_at(first), np.zeros(path.case.model.contact.n_contact)
+    found: State | Outcome | None = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, unworn, run)
+    if not isinstance(found, State):
+        return None
+    states: tuple[State, ...] = (replace(found, parameter=first),)
+    ahead, halvings = [*nodes, target], 0
+    while ahead:
+        here, parameter = states[-1], ahead[0]
+        after = coarse.solve(states, parameter, run if parameter == target else run.to(coarse.node_tolerance))
+        if after is not None and coarse.change(here, after, float(every_node)) <= LARGEST_CHANGE:
+            states = (here, after)
+            ahead.pop(0)
+        elif (halvings := halvings + 1) > MOST_HALVINGS:
+            return None
+        else:
+            ahead.insert(0, 0.5 * (here.parameter + parameter))
+    return states[-1] if coarse.case is path.case else run.move(coarse.case, path.joint_at(target), states[-1])
+
+
+def _continued(case: BlockCase, carried: StartState) -> StartState:
+    """The state of a block that keeps the tangential history of the block before, or why there is none.
+
+    carried: state at the end of the block before. It is solved first at the depth before the block, which a longer or
+    an extrapolated step may have changed. Then amplitude and frequency change, one after the other, the frequency at
+    the smaller of both amplitudes. Raises OutOfTimeError, LinAlgError.
+    """
+    before, run, (frequency, _) = carried.state, case.run(), case.block.steady
+    assert before is not None
+    work, begins = case.begin(carried)
+    at = begins.point.evaluation
+    balance = Balance(work.at(begins), at.history, at.wear_depth)
+    found = run.solve(balance, at.predicted_h)
+    if not found.converged:
+        return replace(carried, state=None, outcome=Outcome.BRANCH_LOST)
+    start = replace(carried, state=periodic_state(balance.joint, State(found.evaluation, before.start_history)))
+    along: Direction = "up" if 2.0 * np.pi * frequency > before.omega else "down"
+    amplitude, iterations = case.block.excitation_amplitude, run.budget.iterations
+    lower = min(amplitude, before.excitation_amplitude)
+    legs: tuple[tuple[Direction, float, float], ...] = (
+        ("ramp", before.omega / (2.0 * np.pi), lower),
+        (along, frequency, lower),
+        ("ramp", frequency, amplitude),
+    )
+    for way, target, load in legs:
+        here = start.state
+        if here is None:
+            break
+        if here.excitation_amplitude == load if way == "ramp" else here.omega == 2.0 * np.pi * target:
+            continue
+        line, (work, begins) = case.line(way, load), case.begin(start)
+        line.set_deadline(run.budget.deadline)
+        parameter = here.excitation_amplitude / load if way == "ramp" else here.omega
+        if not line.go_on_from(work.case, replace(begins.point, parameter=parameter), target):
+            return replace(start, state=None, outcome=Outcome.UNSETTLED)
+        _, after = next(follow_line(line, np.array([target])))
+        start = replace(after, penalty_omega=start.penalty_omega, branch=start.branch + after.branch)
+        iterations += after.newton_iterations
+    return replace(start, newton_iterations=iterations)

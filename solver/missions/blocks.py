@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from solver.contact.wear_law import ARCHARD, WearLaw
@@ -103,12 +103,3 @@ class Mission:
     def called(self, place: int) -> str:
         """Name of a block in messages."""
         return self.blocks[place].name or f"block {place + 1}"
-
-    def continued_by(self, place: int) -> bool:
-        """Whether the block behind a block begins from its last state."""
-        return self.blocks[(place + 1) % len(self.blocks)].way == "continue"
-
-
-def worn(model: ReducedModel, wear_depth: FloatArray) -> ReducedModel:
-    """The model with depths (n_contact,), m, that open its pairs."""
-    return replace(model, contact=replace(model.contact, gap=model.contact.gap + wear_depth))

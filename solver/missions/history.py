@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -13,10 +13,10 @@ from solver.accuracy.history_error import Both, HistoryError, history_error
 from solver.accuracy.target_error import error_of_wear, target_error
 from solver.harmonic_balance.state import Failure
 from solver.missions.blocks import Mission
-from solver.missions.course import MissionCourse, Values
+from solver.missions.course import MissionCourse, worn_by
+from solver.missions.integrate import Missions
 from solver.missions.passage import LARGEST_SWEEP_RATE
 from solver.missions.result import MissionHistory
-from solver.missions.solutions import MissionSolutions, missions_to_target, worn_by
 from solver.model import FloatArray
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, unpack
@@ -31,31 +31,32 @@ def integrate_missions(
 ) -> MissionHistory:
     """Mission history of one point of a study, as far as computed, with its outcome.
 
-    keep: called after each block with the progress. resume: such progress of an equal mission, which goes on from there
+    keep: called after each step with the progress. resume: such progress of an equal mission, which goes on from there
     with a result that is equal to the last bit, except `run_time`.
     """
-    solutions = MissionSolutions(mission, keep, None if resume is None else unpack(resume))
-    fine = solutions.history()
-    reference = MissionCourse.unworn(*fine.nodes[0].growth.shape)
+    missions = Missions(mission, keep, None if resume is None else unpack(resume))
+    fine, reference = missions.history(), MissionCourse.unworn(mission)
     if len(fine.nodes) > 1 and (fine.failure is None or fine.failure.outcome not in ENDS_ALL):
-        reference = solutions.reference(fine)
+        reference = missions.reference(fine)
         if reference.failure is not None and reference.failure.outcome in ENDS_ALL:
             fine = replace(fine, failure=reference.failure)
-    history = _assembled(solutions, fine, reference)
+    history = replace(_assembled(mission, fine, reference), run_time=missions.spent)
     if history.outcome is not Outcome.CONVERGED:
         return history
     failure = _judged(mission, fine, history)
     return replace(history, outcome=failure.outcome, message=failure.message)
 
 
-def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: MissionCourse) -> MissionHistory:
+def _assembled(mission: Mission, fine: MissionCourse, reference: MissionCourse) -> MissionHistory:
     """The result, from both solutions."""
-    mission, counts = solutions.mission, np.array(solutions.mission.missions, np.float64)
-    area, (growth, values) = mission.area, _read(mission, fine, counts)
-    depth, other = growth.sum(axis=1), reference.growth_at(counts).sum(axis=1)
+    counts, area = np.array(mission.missions, np.float64), mission.area
+    growth, values = fine.growth_at(counts), fine.values_at(counts)
+    depth = growth.sum(axis=1)
     whole, *blocks = _errors(mission, counts, fine, reference)
     reached = np.flatnonzero(np.isfinite(whole.worn_volume))
-    failure, target = fine.failure or Failure(Outcome.CONVERGED), missions_to_target(mission, fine)
+    failure, target = fine.failure or Failure(Outcome.CONVERGED), fine.missions_to_target(mission)
+    if math.isinf(target):
+        target = math.nan
     return MissionHistory(
         response_begin=values["response"][:, :, 0],
         response_end=values["response"][:, :, 1],
@@ -72,42 +73,37 @@ def _assembled(solutions: MissionSolutions, fine: MissionCourse, reference: Miss
         wear_depth_error=whole.wear_depth,
         block_volume=growth @ area,
         block_volume_error=np.array([each.worn_volume for each in blocks]).T,
-        reference_volume=other @ area,
+        reference_volume=reference.growth_at(counts).sum(axis=1) @ area,
         sweep_rate=fine.largest("sweep_rate"),
         error_estimate=float(whole.worn_volume[reached[-1]]) if reached.size else math.nan,
         last_mission=float(fine.ends[-1]),
         steps=np.diff(fine.ends),
-        missions_to_target=math.nan if math.isinf(target) else target,
-        missions_to_target_error=math.nan if math.isinf(target) else _target_error(mission, fine, reference),
+        missions_to_target=target,
+        missions_to_target_error=_target_error(mission, target, fine, reference),
         newton_iterations=fine.iterations + reference.iterations,
-        run_time=solutions.spent,
+        run_time=math.nan,
     )
-
-
-def _read(mission: Mission, course: MissionCourse, missions: FloatArray) -> tuple[FloatArray, Values]:
-    """Depths worn by each block (n, n_block, n_contact), m, and other values of a course; NaN beyond its end."""
-    n_response = len(mission.blocks[0].model.response_names)
-    return course.growth_at(missions), course.values_at(missions, n_response)
 
 
 def _errors(mission: Mission, counts: FloatArray, fine: MissionCourse, reference: MissionCourse) -> list[HistoryError]:
     """Errors of the whole wear, and of wear and responses of each block, at the counts (n_output,), the first 0."""
-    blocks = range(len(mission.blocks))
-    read = [(rows, _read(mission, fine, rows), _read(mission, reference, rows)) for rows in (counts, fine.ends)]
+    blocks = list(range(len(mission.blocks)))
     found = []
-    for chosen in (list(blocks), *([place] for place in blocks)):
+    for chosen in (blocks, *([place] for place in blocks)):
         outputs, steps = (
-            Both(rows, *(_of_blocks(*each, chosen, mission.area) for each in solutions)) for rows, *solutions in read
+            Both(rows, _values_of(chosen, mission.area, fine, rows), _values_of(chosen, mission.area, reference, rows))
+            for rows in (counts, fine.ends)
         )
-        found.append(history_error(outputs, steps, mission.area, "adaptive"))
+        found.append(history_error(outputs, steps, mission.area))
     # where blocks adapt the pressures of the pairs against each other, two solutions may agree in a pair by chance
-    by_steps = np.fmax(found[0].wear_depth, np.where(counts[:, None] > 0.0, read[0][1][1]["local"], 0.0))
-    return [replace(found[0], wear_depth=by_steps), *found[1:]]
+    local = np.where(counts[:, None] > 0.0, fine.values_at(counts)["local"], 0.0)
+    return [replace(found[0], wear_depth=np.fmax(found[0].wear_depth, local)), *found[1:]]
 
 
-def _of_blocks(growth: FloatArray, values: Mapping[str, Any], chosen: list[int], area: FloatArray) -> dict[str, Any]:
-    """Wear of some blocks together, and their responses, in the terms of a wear history."""
-    n, rates = len(growth), values["rate"][:, chosen]
+def _values_of(chosen: list[int], area: FloatArray, course: MissionCourse, missions: FloatArray) -> dict[str, Any]:
+    """Wear of some blocks together, and their responses, at numbers of missions, in the terms of a wear history."""
+    n, growth, values = missions.size, course.growth_at(missions), course.values_at(missions)
+    rates = values["rate"][:, chosen]
     volumes = np.nan_to_num(rates @ area)
     errors = np.nan_to_num(values["growth_error"][:, chosen], posinf=np.inf)
     # the error of a block that wears nothing may be unknown
@@ -130,39 +126,48 @@ def _of_blocks(growth: FloatArray, values: Mapping[str, Any], chosen: list[int],
     }
 
 
-def _target_error(mission: Mission, fine: MissionCourse, reference: MissionCourse) -> float:
-    """Estimated error of the number of missions to the target; the rate of the wear is that of the last step."""
-    assert mission.until is not None
-    at, other = missions_to_target(mission, fine), missions_to_target(mission, reference)
+def _target_error(mission: Mission, at: float, fine: MissionCourse, reference: MissionCourse) -> float:
+    """Estimated error of the number of missions to the target, NaN where it was never reached.
+
+    The rate of the wear is that of the last step.
+    """
+    if mission.until is None or math.isnan(at):
+        return math.nan
     whole, *_ = _errors(mission, np.array([0.0, at]), fine, reference)
     depth = fine.growth_at(np.array([at])).sum(axis=1)[0]
     volume_error = float(whole.worn_volume[1] * (depth @ mission.area))
     known = error_of_wear(mission.until.quantity, depth, whole.wear_depth[1], volume_error)
     before, end = fine.nodes[-2:]
     per_mission = (worn_by(mission, end.growth) - worn_by(mission, before.growth)) / (end.mission - before.mission)
-    return target_error(at, other, known, per_mission)
+    return target_error(at, reference.missions_to_target(mission), known, per_mission)
 
 
 def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> Failure:
     """The outcome of a complete history, and its sentence."""
     rtol, held, cut_off = mission.settings.rtol, fine.first_with("held"), fine.first_with("cut_off")
-    inaccurate, said, remarks = fine.largest("inaccurate"), "", []
-    if held < math.inf:
-        remarks.append(f"from mission {held:.0f} on only friction holds the joint in one direction: it is held there")
-    for place in np.flatnonzero(history.sweep_rate > LARGEST_SWEEP_RATE):
-        rate = f"passes at {history.sweep_rate[place]:.2g} (zeta f)^2"
-        remarks.append(
-            f"{mission.called(int(place))} {rate}: it may wear otherwise than its steady states (see the error)"
-        )
-    worst, outcome = int(np.argmax(inaccurate)), Outcome.CONVERGED
     if cut_off < math.inf:
         return Failure(Outcome.CONTACT_CUT_OFF, describe_cut_off(cut_off).replace("cycle", "mission"))
+    inaccurate, outcome, said = fine.largest("inaccurate"), Outcome.CONVERGED, []
+    worst = int(np.argmax(inaccurate))
     if history.error_estimate > SENSITIVE_ERROR:
-        last = np.flatnonzero(np.isfinite(history.worn_volume))[-1]
-        volumes = 1e9 * history.worn_volume[last], 1e9 * history.reference_volume[last]
-        outcome = Outcome.SENSITIVE
-        said = f"worn volume {volumes[0]:.3g} mm3, but {volumes[1]:.3g} mm3 in coarser steps"
+        outcome, last = Outcome.SENSITIVE, np.flatnonzero(np.isfinite(history.worn_volume))[-1]
+        volumes = history.worn_volume[last], history.reference_volume[last]
+        said.append(_two_volumes(*volumes, history.error_estimate, rtol))
     elif inaccurate[worst] > 0.0:
         outcome = Outcome.INACCURATE
-        said = f"in {mission.called(worst)} the vibration {known_to(float(inaccurate[worst]), rtol)}"
-    return Failure(outcome, "; ".join(filter(None, (said, *remarks))))
+        said.append(f"in {mission.called(worst)} the vibration {known_to(float(inaccurate[worst]), rtol)}")
+    if held < math.inf:
+        said.append(f"from mission {held:.0f} on only friction holds the joint in one direction: it is held there")
+    for place in np.flatnonzero(history.sweep_rate > LARGEST_SWEEP_RATE):
+        name, rate = mission.called(int(place)), history.sweep_rate[place]
+        passes = f"passes at {rate:.2g} (zeta f)^2" if np.isfinite(rate) else "has no damping where the joint sticks"
+        said.append(f"{name} {passes}: it may wear otherwise than its steady states (see the error)")
+    return Failure(outcome, "; ".join(said))
+
+
+def _two_volumes(volume: float, other: float, error: float, rtol: float) -> str:
+    """Sentence about an uncertain worn volume, m3: that of the history and of its reference solution."""
+    known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
+    if abs(volume - other) < 0.5 * error * volume:
+        return f"worn volume {1e9 * volume:.3g} mm3, {known} although coarser steps agree: see the errors of its blocks"
+    return f"worn volume {1e9 * volume:.3g} mm3, but {1e9 * other:.3g} mm3 in coarser steps: {known}"

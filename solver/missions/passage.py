@@ -22,7 +22,7 @@ exp(-zeta omega t). So a passage shows at one frequency what belongs to another 
 Where the wear rate rises or falls, the passage wears less or more than its steady states, at most the lag times the
 largest wear over frequency: a part of the error. The damping ratio zeta is that of the structure with its closed pairs
 sticking, as the vibration grows with the joint still at rest; friction damps more where pairs slip. The sweep rate
-|df/dt| / (zeta f)^2 says how fast a passage is.
+|df/dt| / (zeta f)^2 says how fast a passage is. Without damping the delay is infinite, and the wear not known.
 
 A vibration passes df in the time df / |df/dt|, in which it does not tell apart frequencies that are closer than
 1 / time: an interval far below sqrt(|df/dt|) is not divided. Without this limit no number of frequencies suffices at
@@ -42,9 +42,8 @@ from solver.clock import computing_time
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.start_states import follow_line
-from solver.missions.block_run import BlockCase, BlockRun
-from solver.missions.block_start import Begun
-from solver.missions.blocks import Passage, worn
+from solver.missions.block_run import Begun, BlockCase, BlockRun
+from solver.missions.blocks import Passage
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
 from solver.outcome import Outcome
@@ -52,11 +51,9 @@ from solver.packing import in_rows
 from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import to_complex
-from solver.structure.joint import build_case, friction_of_pairs
+from solver.structure.joint import friction_of_pairs
 from solver.wear.rate_slope import rate_slope
 from solver.wear.solutions import Like
-from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
 
 FIRST_FREQUENCIES = 17
 """Frequencies before those that are added."""
@@ -81,13 +78,10 @@ at 63."""
 
 @dataclass(frozen=True)
 class SweptState:
-    """The state at a frequency of a passage.
+    """The state at a frequency, Hz, of a passage.
 
-    frequency: Hz.
-    start: the state.
     density (n_contact,): wear in one passage over frequency, m/Hz.
-    response (n_response,): complex first harmonic, m.
-    peak (n_response,): largest magnitude over a period, m.
+    response, peak (n_response,): complex first harmonic and largest magnitude over a period, m.
     """
 
     frequency: float
@@ -99,10 +93,9 @@ class SweptState:
 
 @dataclass(frozen=True)
 class Swept:
-    """The states of one passage, in the order of their frequencies.
+    """The states of one passage, ascending in frequency.
 
-    error: estimated error of the wear by the number of frequencies, m3.
-    iterations: Newton iterations.
+    error: estimated error of the wear by the number of frequencies, m3. iterations: of Newton's method.
     needed: frequencies without which the error would be too large, Hz.
     """
 
@@ -112,46 +105,44 @@ class Swept:
     needed: tuple[float, ...]
 
 
-def run_passage(case: BlockCase, like: Like | None = None) -> BlockRun:
-    """Compute a passage, or its reference solution, as `block_run.run_block`."""
-    passage = case.block.frequency
-    assert isinstance(passage, Passage)
-    swept = find_states(case, passage, like)
+def run_passage(case: BlockCase) -> BlockRun | Failure:
+    """Compute a passage, as `block_run.run_block`."""
+    passage, swept = passage_of(case), find_states(case)
     if isinstance(swept, Failure):
-        return case.not_computed(swept)
+        return swept
     ascending, area = swept.states, case.mission.area
-    states = ascending[:: 1 if passage.stop > passage.start else -1]
+    states = ascending[:: 1 if passage.sweep == "up" else -1]
     starts, parts = [state.start for state in ascending], parts_of(ascending)
     volume = float(parts.sum(axis=0) @ area)
-    growth, slope = in_order(states, (_slope(case, passage, state) for state in states))
-    sweep_rate, lag = delay_of(case, passage, ascending)
-    errors = (
-        swept.error,
-        float((parts @ area) @ [start.wear_rate_error for start in starts]),
-        float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0,
-        min(lag * max(float(state.density @ area) for state in states), volume),
-    )
-    inaccurate = [
-        max(start.response_error, start.wear_rate_error) for start in starts if start.outcome is Outcome.INACCURATE
-    ]
-    ends = states[0], states[-1]
+    growth, slope = in_order(states, (_slope(case, state) for state in states))
+    sweep_rate, lag = delay_of(case, ascending)
+    error = swept.error + float((parts @ area) @ [start.wear_rate_error for start in starts])
+    error += float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0
+    error += min(lag * max(float(state.density @ area) for state in states), volume)
+    ends, inaccurate = (states[0], states[-1]), [each for each in starts if each.outcome is Outcome.INACCURATE]
     resolutions = tuple((state.frequency, state.start.resolution) for state in ascending)
     found = BlockRun(
-        failure=Failure(Outcome.CONVERGED),
         growth=growth,
         response=np.array([state.response for state in ends]),
         peak=np.array([state.peak for state in ends]),
         slope=slope if case.with_slope else None,
         response_error=max(state.start.response_error for state in ends),
-        growth_error=sum(errors) / volume if volume > 0.0 else 0.0,
-        inaccurate=max(inaccurate, default=0.0),
+        growth_error=error / volume if volume > 0.0 else 0.0,
+        inaccurate=max((max(each.response_error, each.wear_rate_error) for each in inaccurate), default=0.0),
         like=Like(resolutions, math.nan, swept.iterations),
-        last=states[-1].start if case.mission.continued_by(case.place) else None,
-        begun=Begun(None, swept.needed),
+        last=ends[-1].start if case.is_continued else None,
+        begun=Begun(swept.needed),
         iterations=swept.iterations,
         sweep_rate=sweep_rate if volume > 0.0 else 0.0,
     )
     return in_rows(found)
+
+
+def passage_of(case: BlockCase) -> Passage:
+    """The passage of a block."""
+    passage = case.block.frequency
+    assert isinstance(passage, Passage)
+    return passage
 
 
 def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -173,24 +164,15 @@ def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tupl
     return np.maximum(grown[:, 0], 0.0), grown[:, 1:]
 
 
-def _slope(case: BlockCase, passage: Passage, state: SweptState) -> FloatArray:
+def _slope(case: BlockCase, state: SweptState) -> FloatArray:
     """Derivative (n_contact, n_contact) of the density of a state with respect to the depths, 1/Hz."""
-    pairs = state.density > 0.0
-    if not pairs.any():
-        return np.zeros((pairs.size, pairs.size))
-    work, begun = _joint(case, state.start)
-    at = begun.point.evaluation
-    slope = rate_slope(work.at(begun), at, work.gain(1.0), work.wearing, pairs | (case.depth > 0.0), work.run)
-    return np.asarray(slope * state.frequency / abs(passage.rate))
-
-
-def _joint(case: BlockCase, start: StartState) -> tuple[WearingJoint, WearState]:
-    """The joint at the depth before the passage, and its state at a frequency."""
-    model, friction = worn(case.block.model, case.depth), case.block.friction_coefficient
-    of_state = build_case(model, friction, start.penalty_omega, case.settings, start.resolution)
-    work = WearingJoint(of_state, start, case.mission.wear_coefficient, case.law)
-    # the limit of the explicit step is not asked for
-    return work, work.begin(np.inf)
+    wears = state.density > 0.0
+    if not wears.any():
+        return np.zeros((wears.size, wears.size))
+    work, begun = case.begin(state.start)
+    at, pairs = begun.point.evaluation, wears | (case.depth > 0.0)
+    slope = rate_slope(work.at(begun), at, work.gain(1.0), work.wearing, pairs, work.run)
+    return np.asarray(slope * state.frequency / passage_of(case).rate)
 
 
 def parts_of(states: Sequence[SweptState]) -> FloatArray:
@@ -200,38 +182,39 @@ def parts_of(states: Sequence[SweptState]) -> FloatArray:
     return np.asarray(0.5 * (np.append(0.0, width) + np.append(width, 0.0))[:, None] * density)
 
 
-def find_states(case: BlockCase, passage: Passage, like: Like | None) -> Swept | Failure:
-    """The states of one passage at the depth before it; like: of the history, for its reference solution."""
-    aim = FREQUENCY_ERROR * (1.0 if like is None else RTOL_RATIO) * case.settings.rtol
+def find_states(case: BlockCase) -> Swept | Failure:
+    """The states of one passage at the depth before it, as many as its wear needs."""
+    passage, area = passage_of(case), case.mission.area
+    aim = FREQUENCY_ERROR * (1.0 if case.like is None else RTOL_RATIO) * case.settings.rtol
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
     # the mission before has found the frequencies that count: a second sweep is then seldom needed
     wanted = list(case.begun.nodes if case.begun else least)
     states: list[SweptState] = []
-    iterations, error, area = 0, np.inf, case.mission.area
-    while wanted:
-        found = states_at(case, passage, np.array(sorted(wanted)), like)
+    iterations = 0
+    while True:
+        found = states_at(case, np.array(sorted(wanted)))
         if isinstance(found, Failure):
             return found
-        iterations += max((state.start.newton_iterations for state in found), default=0)
+        iterations += max(state.start.newton_iterations for state in found)
         states = sorted([*states, *found], key=lambda state: state.frequency)
         errors, volume = interval_errors(states, area), float((parts_of(states) @ area).sum())
-        allowed, error = aim * max(volume, _negligible(case, passage, states)), float(errors.sum())
-        if error <= allowed or len(states) >= MOST_FREQUENCIES:
-            break
+        allowed, error = aim * max(volume, _negligible(case, states)), float(errors.sum())
         wanted = []
-        for place in np.flatnonzero(errors > allowed / len(errors)):
-            wanted.extend(_between(states[place], states[place + 1], FINEST_INTERVAL * passage.rate**0.5))
-    return Swept(tuple(states), error, iterations, _needed(states, errors, allowed / len(errors), least))
+        if error > allowed and len(states) < MOST_FREQUENCIES:
+            for place in np.flatnonzero(errors > allowed / len(errors)):
+                wanted.extend(_between(states[place], states[place + 1], FINEST_INTERVAL * passage.rate**0.5))
+        if not wanted:
+            return Swept(tuple(states), error, iterations, _needed(states, errors, allowed / len(errors), least))
 
 
-def _negligible(case: BlockCase, passage: Passage, states: list[SweptState]) -> float:
+def _negligible(case: BlockCase, states: list[SweptState]) -> float:
     """Worn volume of a passage, m3, that does not matter: beside the wear so far, or as round-off.
 
     Wear by round-off is compared with the wear if friction took up all work of the excitation.
     """
     size = max(float(np.abs(state.response).max()) for state in states)
-    work = np.pi * case.block.excitation_amplitude * size * passage.cycles
+    work = np.pi * case.block.excitation_amplitude * size * passage_of(case).cycles
     so_far = float(case.depth @ case.mission.area)
     return max(NEGLIGIBLE * so_far, ROUND_OFF * case.mission.wear_coefficient * work)
 
@@ -277,37 +260,33 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
     return np.asarray(errors @ area)
 
 
-def states_at(
-    case: BlockCase, passage: Passage, frequencies: FloatArray, like: Like | None = None
-) -> list[SweptState] | Failure:
+def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
+    passage, began, found = passage_of(case), computing_time(), []
     line = case.line(passage.sweep)
-    if like is not None:
+    if case.like is not None:
         # errors of a reference solution are not used
-        line.known = like.resolutions
-    began, found = computing_time(), []
+        line.known = case.like.resolutions
     for index, start in follow_line(line, frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)
         if computing_time() - began > case.settings.time_limit:
             return Failure(Outcome.TIME_LIMIT)
-        work, begun = _joint(case, start)
+        work, begun = case.begin(start)
         at, joint, frequency = begun.point.evaluation, work.at(begun), float(frequencies[index])
-        density = work.rate(at) * frequency / abs(passage.rate)
+        density = work.rate(at) * frequency / passage.rate
         response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
         found.append(SweptState(frequency, start, density, response, largest_responses(joint, at)))
     return found
 
 
-def delay_of(case: BlockCase, passage: Passage, states: Sequence[SweptState]) -> tuple[float, float]:
-    """Sweep rate `|df/dt| / (zeta f)^2` and lag, Hz, of a passage through states, ascending in frequency.
+def delay_of(case: BlockCase, states: Sequence[SweptState]) -> tuple[float, float]:
+    """Sweep rate `|df/dt| / (zeta f)^2` and lag, Hz, of a passage through states; infinite without damping.
 
     With the mode nearest to the largest response, of the joint whose closed pairs stick, or slide or are open where the
-    joint cannot move otherwise. No delay without mass. A structure without damping has the half-power half-width of its
-    response in place of `zeta f`, and an infinite delay where no peak is passed.
+    joint cannot move otherwise. No delay without mass.
     """
-    size = np.array([np.abs(state.response).max() for state in states])
-    largest = states[int(np.argmax(size))].start.state
+    largest = max(states, key=lambda state: float(np.abs(state.response).max())).start.state
     assert largest is not None
     friction = friction_of_pairs(case.block.model, case.block.friction_coefficient)
     closed = largest.contact_force_h[:, 0, 0] > 0.0
@@ -316,26 +295,5 @@ def delay_of(case: BlockCase, passage: Passage, states: Sequence[SweptState]) ->
     mode = next((found for found in modes if found is not None), None)
     if mode is None:
         return 0.0, 0.0
-    width = mode.damping_ratio * mode.omega / (2.0 * math.pi)
-    if width <= 0.0:
-        width = half_width(np.array([state.frequency for state in states]), size)
-    return (math.inf, math.inf) if width == 0.0 else (passage.rate / width**2, passage.rate / (2.0 * math.pi * width))
-
-
-def half_width(frequencies: FloatArray, size: FloatArray) -> float:
-    """Half-power half-width, Hz, of responses (n,), m, at ascending frequencies (n,), Hz; 0 where no peak is passed.
-
-    One side of a bent peak is a jump: the width is that of the wider side.
-    """
-    top = int(np.argmax(size))
-    if top in (0, len(size) - 1):
-        return 0.0
-    sides, half = [0.0], size[top] / np.sqrt(2.0)
-    for places in (np.arange(top, len(size)), np.arange(top, -1, -1)):
-        below = np.flatnonzero(size[places] < half)
-        if below.size:
-            one, other = places[below[0] - 1], places[below[0]]
-            share = (size[one] - half) / (size[one] - size[other])
-            at = frequencies[one] + share * (frequencies[other] - frequencies[one])
-            sides.append(float(abs(at - frequencies[top])))
-    return max(sides)
+    width, rate = mode.damping_ratio * mode.omega / (2.0 * math.pi), passage_of(case).rate
+    return (rate / width**2, rate / (2.0 * math.pi * width)) if width > 0.0 else (math.inf, math.inf)

@@ -24,23 +24,19 @@ node is a part of the error of the step.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockRun
-from solver.missions.blocks import Mission
 from solver.missions.course import MissionNode
 from solver.model import FloatArray
 from solver.outcome import Outcome
-from solver.results.history import StartState
+from solver.wear.control import allowed_error
 
-RunBlock = Callable[[int, FloatArray, StartState | None, bool], BlockRun]
-"""Computes a block: place, depth before (n_contact,), m, state that it continues, whether the slope is asked for."""
-
-Allowed = Callable[[float, float, int, int], float]
-"""Allowed error of a step, m3: worn volumes at its start and end, m3, number of missions at its start, its length."""
+RunMission = Callable[[FloatArray, bool], tuple[BlockRun, ...] | Failure]
+"""Computes the blocks of a mission: depth before (n_contact,), m, and whether slopes are asked for."""
 
 MOST_ITERATIONS = 6
 """Most missions computed for a step. Sliders and roots need 1 to 3."""
@@ -57,41 +53,54 @@ class Step:
     ratio: float
 
 
-def run_mission(
-    mission: Mission, now: MissionNode, number: int, depth: FloatArray, run: RunBlock, *, with_slopes: bool = False
-) -> tuple[BlockRun, ...] | Failure:
-    """Compute the blocks of the mission of a number behind a node. depth (n_contact,): m, before the mission."""
-    runs: list[BlockRun] = []
-    carried = now.runs[-1].last if now.runs else None
-    for place in range(len(mission.blocks)):
-        found = run(place, depth, carried, with_slopes)
-        if not found.completed:
-            said = f"in mission {number}, {mission.called(place)}"
-            return Failure(found.failure.outcome, ": ".join(filter(None, (said, found.failure.message))))
-        runs.append(found)
-        depth, carried = depth + found.growth, found.last
-    return tuple(runs)
+@dataclass(frozen=True)
+class Formula:
+    """The step from the nodes before: `Z = base + factor R(Z)`.
+
+    base (n_block, n_contact): m, by blocks.
+    first (n_contact,): Z of the parabola through three nodes before, m.
+    ahead (n_contact,): depth of this parabola at the end of the step, m.
+    share: error over the difference of the end to `ahead`.
+    """
+
+    base: FloatArray
+    factor: float
+    first: FloatArray
+    ahead: FloatArray
+    share: float
+
+    @classmethod
+    def of(cls, nodes: tuple[MissionNode, ...], length: int) -> Formula:
+        """The formula of a step of some missions behind at least three nodes."""
+        past, before, now = nodes[-3:]
+        h, a, b = float(length), float(now.mission - before.mission), float(before.mission - past.mission)
+        last = (now.growth - before.growth) / a
+        turn = (last - (before.growth - past.growth) / b) / (a + b)
+        first, ahead = ((now.growth + at * last + at * (at + a) * turn).sum(axis=0) for at in (h - 1.0, h))
+        whole = 2.0 * h - 1.0 + a
+        base = now.growth + (h - 1.0) * h / whole * last
+        factor = (h - 1.0) * (h - 1.0 + a) / whole
+        return cls(base, factor, np.maximum(first, base.sum(axis=0)), ahead, factor / (h + a + b))
 
 
 def attempt_step(
-    mission: Mission, nodes: tuple[MissionNode, ...], length: int, run: RunBlock, allowed: Allowed
+    nodes: tuple[MissionNode, ...], length: int, area: FloatArray, run: RunMission, share: float
 ) -> Step | Failure:
-    """A step over missions; over more than one from the third mission on. nodes: ends of all steps before."""
+    """A step over missions; over more than one from the third mission on.
+
+    nodes: ends of all steps before. area (n_contact,): m2. share: allowed error as in `allowed_error`.
+    """
     now = nodes[-1]
     if length == 1:
-        runs = run_mission(mission, now, now.mission + 1, now.depth, run)
-        if isinstance(runs, Failure):
-            return runs
-        rates = np.array([each.growth for each in runs])
-        node = _node(now, 1, now.growth + rates, rates, runs, np.zeros_like(now.depth))
-        return Step(node, _ratio_of_one(nodes, node, mission.area, allowed))
-    formula, unit = _Formula.of(nodes, length), np.eye(now.depth.size)
+        runs = run(now.depth, False)
+        return runs if isinstance(runs, Failure) else _one_mission(nodes, area, runs, share)
+    formula, unit = Formula.of(nodes, length), np.eye(now.depth.size)
     base, factor, depth = formula.base.sum(axis=0), formula.factor, formula.first
-    slope, last, area = np.zeros_like(unit), None, mission.area
+    slope, last = np.zeros_like(unit), None
     rate_before = now.rate.sum(axis=0)
     depth_before = now.depth - rate_before
     for _ in range(MOST_ITERATIONS):
-        runs = run_mission(mission, now, now.mission + length, depth, run, with_slopes=last is None)
+        runs = run(depth, last is None)
         if isinstance(runs, Failure):
             return runs
         rates = np.array([each.growth for each in runs])
@@ -116,61 +125,28 @@ def attempt_step(
         missed = np.abs(rate - rate_before - slope @ (last[0] - depth_before))
         part = np.abs(depth - last[0]) @ area / max(float(np.abs(last[0] - depth_before) @ area), 1e-300)
         left = factor * part * missed
-        error = formula.error_of(end) + left
-        most = allowed(float(now.depth @ area), float(end @ area), now.mission, length)
+        error = np.abs(formula.share * (end - formula.ahead)) + left
+        most = allowed_error(share, float(now.depth @ area), float(end @ area), now.mission, length)
         ratio = float(error @ area) / most
         if ratio > 1.0 or left @ area <= DEPTH_TOLERANCE * most:
-            growth = formula.base + (factor + 1.0) * rates
-            return Step(_node(now, length, growth, rates, runs, error), ratio)
+            return Step(_node(now, length, formula.base + (factor + 1.0) * rates, rates, runs, error), ratio)
     said = f"the depth before mission {now.mission + length}, {length} missions at once, was not found"
     return Failure(Outcome.MARCH_FAILED, said)
 
 
-def _ratio_of_one(nodes: tuple[MissionNode, ...], end: MissionNode, area: FloatArray, allowed: Allowed) -> float:
-    """Ratio of a mission by itself, whose error is 0: from that of two missions, for the length of the next step."""
+def _one_mission(nodes: tuple[MissionNode, ...], area: FloatArray, runs: tuple[BlockRun, ...], share: float) -> Step:
+    """A step of one mission, whose error is 0; its ratio is that of two missions, for the length of the next step."""
+    now, rates = nodes[-1], np.array([each.growth for each in runs])
+    end = _node(now, 1, now.growth + rates, rates, runs, np.zeros_like(now.depth))
     if len(nodes) < 3:
-        return 0.0
-    past, before, now = (node.mission for node in nodes[-3:])
-    a, b, two = float(now - before), float(before - past), _Formula.of(nodes, 2)
+        return Step(end, 0.0)
+    a, b = (float(after.mission - before.mission) for before, after in ((nodes[-2], now), (nodes[-3], nodes[-2])))
+    two = Formula.of(nodes, 2)
     # the error grows with the third divided difference
     growth = 2.0 * (2.0 + a) * (2.0 + a + b) / ((1.0 + a) * (1.0 + a + b))
     error = two.share * growth * float(np.abs(end.depth - two.first) @ area)
-    most = 2.0 * allowed(float(nodes[-1].depth @ area), float(end.depth @ area), now, 1)
-    return min(0.25 * error / most, 1.0)
-
-
-@dataclass(frozen=True)
-class _Formula:
-    """The step from the nodes before: `Z = base + factor R(Z)`.
-
-    base (n_block, n_contact): m, by blocks.
-    first (n_contact,): Z of the parabola through three nodes before, m.
-    ahead (n_contact,): depth of this parabola at the end of the step, m.
-    share: error over the difference of the end to `ahead`.
-    """
-
-    base: FloatArray
-    factor: float
-    first: FloatArray
-    ahead: FloatArray
-    share: float
-
-    @classmethod
-    def of(cls, nodes: tuple[MissionNode, ...], length: int) -> _Formula:
-        """The formula of a step of some missions behind at least three nodes."""
-        past, before, now = nodes[-3:]
-        h, a, b = float(length), float(now.mission - before.mission), float(before.mission - past.mission)
-        last = (now.growth - before.growth) / a
-        turn = (last - (before.growth - past.growth) / b) / (a + b)
-        first, ahead = ((now.growth + at * last + at * (at + a) * turn).sum(axis=0) for at in (h - 1.0, h))
-        whole = 2.0 * h - 1.0 + a
-        base = now.growth + (h - 1.0) * h / whole * last
-        factor = (h - 1.0) * (h - 1.0 + a) / whole
-        return cls(base, factor, np.maximum(first, base.sum(axis=0)), ahead, factor / (h + a + b))
-
-    def error_of(self, end: FloatArray) -> FloatArray:
-        """Local error (n_contact,), m, of the depth at the end of the step."""
-        return np.abs(self.share * (end - self.ahead))
+    most = 2.0 * allowed_error(share, float(now.depth @ area), float(end.depth @ area), now.mission, 1)
+    return Step(end, min(0.25 * error / most, 1.0))
 
 
 def mission_slope(runs: tuple[BlockRun, ...]) -> FloatArray:
@@ -190,4 +166,5 @@ def _node(
     known = np.array([run.growth_error for run in runs])[:, None]
     # the error of a block that wears nothing may be unknown
     of_blocks = np.where(rates > 0.0, known * np.fmax(rates, 1e-300), 0.0).sum(axis=0)
-    return MissionNode(now.mission + length, growth, rates, now.local + error + length * of_blocks, runs)
+    kept = tuple(replace(run, slope=None) for run in runs)
+    return MissionNode(now.mission + length, growth, rates, now.local + error + length * of_blocks, kept)

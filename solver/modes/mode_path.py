@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
-from solver.continuation.first_state import relieved_history
-from solver.continuation.options import CONTINUATION
+from solver.continuation.first_state import RELIEF, relieved_history
+from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.static_state import predicted_at_rest, solve_static_state
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, history_at_rest
 from solver.loading_history.path import FREE_STEP, choose_resolution, largest_change
-from solver.loading_history.path_of_states import Step
+from solver.loading_history.sweep import Step
 from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import FloatArray, ReducedModel
 from solver.modes.modal_model import linear_mode, modal_model
@@ -71,11 +71,11 @@ class ModePath:
         grown = np.concatenate([last[:, :1], growth * last[:, 1:]], axis=1)
         starts = [(grown, here.values * np.array([1.0, 1.0, growth]))]
         if len(states) > 1:
-            ratio = (target - here.parameter) / (here.parameter - states[0].parameter)
-            change = last - states[0].state.evaluation.predicted_h
-            starts.insert(0, (last + ratio * change, here.values + ratio * (here.values - states[0].values)))
+            ratio = (target - here.parameter) / (here.parameter - states[-2].parameter)
+            change = last - states[-2].state.evaluation.predicted_h
+            starts.insert(0, (last + ratio * change, here.values + ratio * (here.values - states[-2].values)))
         for start, values in starts:
-            found = problem.solve(target, start, values, history, run, CONTINUATION.near_iterations)
+            found = problem.solve(target, start, values, history, run, NEAR_ITERATIONS)
             if found is not None:
                 return found
         return None
@@ -159,7 +159,7 @@ class Rest:
         start = self.state.evaluation.predicted_h.copy()
         start[:, 1:] = joint.structure.force_h()[:, 1:]
         values = np.array([mode.omega, mode.damping_ratio, amplitude])
-        for fraction in (0.0, *CONTINUATION.relief):
+        for fraction in (0.0, *RELIEF):
             history = relieved_history(joint, self.state, fraction)
             found = problem.solve(amplitude, start, values, history, run.fresh())
             if found is not None:

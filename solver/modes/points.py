@@ -22,8 +22,7 @@ from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.path_of_states import Step
-from solver.loading_history.sweep import Sweep
+from solver.loading_history.sweep import Path, Step, Sweep
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import natural_frequencies
 from solver.modes.mode_balance import ModeProblem, ModeState
@@ -173,8 +172,6 @@ class _Way:
             return Failure(Outcome.BRANCH_LOST, describe_loss(self.up))
         sweep.set_deadline(deadline)
         sweep.advance_to(amplitude)
-        # the reference sweep as well, so that its iterations do not depend on the points before
-        sweep.reference_node(amplitude)
         self.spent += sweep.n_iterations
         return solve_point(sweep, amplitude, run)
 
@@ -204,7 +201,7 @@ class _Way:
             self.to_down = self.to_rest + own.iterations
         elif (raised := self._raised_to(rest, top, deadline)) is not None:
             first = raised.last if raised.ahead is None else raised.ahead.state
-            path, self.to_down = ModePath(problem_of(raised)), self.to_up + raised.n_iterations
+            path, self.to_down = ModePath(problem_of(raised.path)), self.to_up + raised.n_iterations
         self.down, self.top = None if first is None else _begun(path, first, -1.0, deadline), top
 
 
@@ -225,15 +222,18 @@ def solve_point(sweep: Sweep[ModeState], amplitude: float, run: Run) -> ModePoin
         ends = f"{sweep.here.parameter:.4g} and {ahead.parameter:.4g}"
         said = f"no state was found between the amplitudes {ends} m sqrt(kg), where the mode has states"
         return Failure(Outcome.BRANCH_LOST, said)
-    reference = sweep.reference_at(amplitude, run.fresh())
-    other = None if reference is None or sweep.reference is None else (problem_of(sweep.reference), reference)
-    return judge_point(problem_of(sweep), found.state, other, run)
+    other = None
+    if sweep.reference is not None:
+        path, states = sweep.reference
+        reference = path.solve(states, amplitude, run.fresh())
+        other = None if reference is None else (problem_of(path), reference)
+    return judge_point(problem_of(sweep.path), found.state, other, run)
 
 
-def problem_of(sweep: Sweep[ModeState]) -> ModeProblem:
-    """The problem of a sweep, with its present harmonics."""
-    assert isinstance(sweep.path, ModePath)
-    return sweep.path.problem
+def problem_of(path: Path[ModeState]) -> ModeProblem:
+    """The problem of a path, with its harmonics."""
+    assert isinstance(path, ModePath)
+    return path.problem
 
 
 def judge_point(
@@ -303,7 +303,7 @@ def _errors_by_resolution(problem: ModeProblem, state: ModeState, run: Run) -> F
 
 def describe_loss(sweep: Sweep[ModeState]) -> str:
     """Sentence about the end of a mode: the last amplitude, and what ends the mode there."""
-    here, problem = sweep.last, problem_of(sweep)
+    here, problem = sweep.last, problem_of(sweep.path)
     assert here is not None
     up = sweep.direction > 0.0
     way, beyond = ("up", "larger") if up else ("down", "smaller")

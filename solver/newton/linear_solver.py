@@ -6,16 +6,16 @@ preconditioner.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from solver.harmonic_balance.dlft import Linearisation
-from solver.model import ComplexArray, FloatArray
+from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.krylov import MOST_PRODUCTS, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
-from solver.newton.slip_preconditioner import SlipFactor, build_slip_factor
 
 FORCING = 1e-3
 """Relative residual of a Newton direction: an iteration gains up to three digits. With half and twice this value the
@@ -32,26 +32,77 @@ SETTLED = 0.1
 certainly positive (all are 1 for an exact factorisation). With 0.15 for the real part the same cases are equal."""
 
 DENSE_UNKNOWNS = 200
-"""Unknowns up to which a Jacobian is factorised as it is. With 100 and 400, sweeps and histories of 16 and 48 pairs
-take equal times."""
+"""Unknowns up to which a Jacobian is factorised at each solve. With 100 and 400, sweeps and histories of 16 and 48
+pairs take equal times."""
+
+LARGEST_DENSE = 3000
+"""Largest number of unknowns of a factorisation: 72 MB and 0.6 s. Above, the highest harmonics are left out."""
 
 EXPENSIVE_UNKNOWNS = 1000
 """Unknowns of an expensive dense solve: above, no odd harmonics above 79, no homotopy in the harmonics, no 3 N + 2
 samples to compare, and no eigenvalues of Hill's matrix (255 unknowns take 0.15 s, 800 take 3 s)."""
 
 SMALL_JOINT = 40
-"""Relative displacements up to which a joint is small and its slip space is factorised: impacts couple most harmonics
-and directions, and products with any other factorisation are in vain (three pairs with 115 harmonics,
+"""Relative displacements up to which a joint is small and its Jacobian is factorised: impacts couple most harmonics and
+directions, and products with any other factorisation are in vain (three pairs with 115 harmonics,
 `tests/solver/test_refinement.py`)."""
 
-Factor = SlipFactor | PeriodFactor
+# Shift of the eigenvalues, which are 1 for a pair that sticks. The position of a joint that slips as a whole is
+# arbitrary along its slip: round-off in a zero eigenvalue would give the determinant any sign.
+_NEUTRAL_SHIFT = 1e-8
+
+
+@dataclass(frozen=True)
+class DenseFactor:
+    """LU factors of a Jacobian in the rows of its active pairs and the first m' harmonics; the identity elsewhere.
+
+    rows (n,): these rows. factor: LU factors and pivots of n m' rows. exact: whether no harmonics are left out.
+    """
+
+    rows: IntArray
+    factor: tuple[FloatArray, IntArray]
+    exact: bool
+
+    @property
+    def sign(self) -> float:
+        """Sign of the determinant, 0 where it is singular."""
+        triangle, pivots = self.factor
+        swaps = np.count_nonzero(pivots != np.arange(pivots.size))
+        return float(np.prod(np.sign(np.diag(triangle))) * (-1.0) ** swaps)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solution (n_rel, m), approximate unless `exact`, for a right-hand side (n_rel, m)."""
+        found = right.copy()
+        if self.rows.size:
+            kept = len(self.factor[1]) // self.rows.size
+            inside = right[self.rows, :kept].ravel()
+            found[self.rows, :kept] = scipy.linalg.lu_solve(self.factor, inside, check_finite=False).reshape(-1, kept)
+        return found
+
+
+Factor = DenseFactor | PeriodFactor
 """A factorisation of a Jacobian or of a matrix near the Jacobian; each gives the sign of its determinant."""
 
 
+def build_dense_factor(tangent: Linearisation) -> DenseFactor:
+    """Factorisation of a Jacobian, for small joints, for masses, and for a sign that is not certain otherwise.
+
+    Singular matrices give infinities, not errors: Newton's method goes on and judges by the residual.
+    """
+    rows, m = tangent.active_rows, tangent.joint.basis.synthesis.shape[0]
+    kept = min(m, 2 * (LARGEST_DENSE // max(rows.size, 1) // 2) + 1)
+    matrix = tangent.dense(tangent.active, kept)
+    matrix[np.diag_indices_from(matrix)] += _NEUTRAL_SHIFT
+    factor = matrix, np.zeros(0, np.int64)
+    if rows.size:
+        factor = scipy.linalg.lapack.dgetrf(matrix, overwrite_a=True)[:2]
+    return DenseFactor(rows, factor, kept == m)
+
+
 def build_factor(tangent: Linearisation) -> Factor:
-    """A march through the period, or the slip space for small joints, masses, and where a sample is singular."""
+    """A march through the period, or dense factors for small joints, masses, and where a sample is singular."""
     small = tangent.joint.component_index.size <= SMALL_JOINT
-    return (None if small else build_period_factor(tangent)) or build_slip_factor(tangent)
+    return (None if small else build_period_factor(tangent)) or build_dense_factor(tangent)
 
 
 @dataclass
@@ -83,44 +134,43 @@ class JacobianSolver:
 
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
         """Solution (n_rel, m) in the rows of the active pairs, with the kept factorisation while products are few."""
-        wanted = _cleared(tangent, right.copy())
 
-        def inverse(factor: Factor, vector: FloatArray) -> FloatArray:
-            return _cleared(tangent, factor.solve(vector.reshape(right.shape)))
+        def cleared(values: FloatArray) -> FloatArray:
+            values[tangent.passive_rows] = 0.0
+            return values
 
         def iterate(factor: Factor, products: int, cycles: float) -> tuple[FloatArray, bool]:
-            def of(apply: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:
-                return lambda vector: _cleared(tangent, apply(inverse(factor, vector))).ravel()
+            def inverse(vector: FloatArray) -> FloatArray:
+                return cleared(factor.solve(vector.reshape(right.shape)))
 
             # preconditioned from the right: the residual of GMRES is the true one
-            operators = of(tangent.apply_roughly), of(tangent.apply)
-            solution, found = solve_gmres(*operators, wanted.ravel(), rtol, products, cycles)
-            return inverse(factor, solution), found
+            solution, found = solve_gmres(
+                lambda vector: cleared(tangent.apply_roughly(inverse(vector))).ravel(),
+                lambda vector: cleared(tangent.apply(inverse(vector))).ravel(),
+                cleared(right.copy()).ravel(),
+                rtol,
+                products,
+                cycles,
+            )
+            return inverse(solution), found
 
         if self._factor is not None:
             solution, found = iterate(self._factor, KEPT_PRODUCTS, 1)
             if found:
                 return solution
-        self._factor = factor = build_factor(tangent)
-        if not factor.exact:
-            # convergence is not required: Newton's method judges by the true residual
-            return iterate(factor, MOST_PRODUCTS, np.inf)[0]
-        first = inverse(factor, wanted)
-        # corrects for the shift of neutral directions
-        second = first + inverse(factor, wanted - _cleared(tangent, tangent.apply(first)))
-        return second if np.all(np.isfinite(second)) else first
+        self._factor = build_factor(tangent)
+        # convergence is not required: Newton's method judges by the true residual
+        return iterate(self._factor, MOST_PRODUCTS, np.inf)[0]
 
     def determinant_sign(self, tangent: Linearisation) -> float:
         """Sign of the determinant of the Jacobian: 1, -1, or 0 where it is singular.
 
-        For a large slip space, the sign is that of the kept factorisation P times (-1)^k, with k the number of real
-        negative eigenvalues of J P^-1. Most eigenvalues are near 1, and Arnoldi's method finds the outliers first.
-        Where the outliers do not converge, this Jacobian is factorised instead of the kept one. Where they still do
-        not, the whole slip space is factorised, unless it is too large.
+        For a large joint, the sign is that of the kept factorisation P times (-1)^k, with k the number of real negative
+        eigenvalues of J P^-1. Most eigenvalues are near 1, and Arnoldi's method finds the outliers first. Where the
+        outliers do not converge, this Jacobian is factorised instead of the kept one, and then densely.
         """
-        kept = self._factor
-        if kept is not None and not kept.exact:
-            sign, settled = _judge(kept, tangent)
+        if self._factor is not None and not self._factor.exact:
+            sign, settled = _judge(self._factor, tangent)
             if settled:
                 return sign
         self._factor = factor = build_factor(tangent)
@@ -129,14 +179,8 @@ class JacobianSolver:
         sign, settled = _judge(factor, tangent)
         if settled:
             return sign
-        whole = build_slip_factor(tangent)
+        whole = build_dense_factor(tangent)
         return whole.sign if whole.exact else sign
-
-
-def _cleared(tangent: Linearisation, values: FloatArray) -> FloatArray:
-    """Values (n_rel, m), zero in the rows of the pairs that are not active, in place."""
-    values[tangent.passive_rows] = 0.0
-    return values
 
 
 def _judge(factor: Factor, tangent: Linearisation) -> tuple[float, bool]:

@@ -18,8 +18,8 @@ pairs does not change. `dp = r - (Z / eps - 1) dx` follows in all harmonics at o
 The stiffness of an elastic joint hardly changes with the harmonic, except near resonances of the structure. Their
 effect, and that of the truncation of the series, are left to GMRES.
 
-CPU s of an adaptive history of the dovetail to 1e5 cycles with the march, and with the slip space in its place: 16
-pairs 3.0 and 3.5, 48 pairs 4.8 and 10.5; 336 pairs to 2e4 cycles 35 and 59.
+CPU s of an adaptive history of the dovetail to 1e5 cycles with the march, and with a factorisation of the most
+important directions in its place: 16 pairs 3.0 and 3.5, 48 pairs 4.8 and 10.5; 336 pairs to 2e4 cycles 35 and 59.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from functools import lru_cache
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from solver.contact.coulomb import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
@@ -36,10 +37,11 @@ from solver.model import FloatArray, IntArray
 from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.joint import Joint
-from solver.structure.rough_forms import SingleArray
 
 MARCH_PERIODS = 2
 """Periods of the march: slip removes the influence of the start."""
+
+SingleArray = NDArray[np.float32]
 
 
 @dataclass(frozen=True)

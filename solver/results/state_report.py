@@ -9,7 +9,7 @@ from numba import njit
 
 from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
-from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.harmonic_balance.state import State
 from solver.model import ComplexArray, FloatArray
@@ -33,6 +33,12 @@ def periodic_state(joint: Joint, point: State) -> PeriodicState:
         start_history=np.array(at.history, order="C"),
         wear_depth=np.array(at.wear_depth, order="C"),
     )
+
+
+def evaluated(joint: Joint, state: PeriodicState) -> tuple[Balance, Evaluation]:
+    """The balance of a state of a joint whose gaps hold the wear, and its evaluation."""
+    balance = Balance(joint, state.start_history, np.zeros_like(state.wear_depth))
+    return balance, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
 
 
 @packable

@@ -15,9 +15,10 @@ that are open during the whole period are free: they need no law.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property
 
 import numpy as np
+from numba import njit
 from scipy.sparse import csr_array
 
 from solver.contact.coulomb import SEPARATED, STICK
@@ -27,7 +28,6 @@ from solver.model import BoolArray, FloatArray, IntArray, LinearModel
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Joint
 
-_PARTS = 32  # of a period, which has a power of two of samples
 _SAMPLES_AT_ONCE = 64  # of the contact law: bounds the memory of large joints
 
 
@@ -58,7 +58,7 @@ class Monodromy:
     @cached_property
     def _contact(self) -> tuple[FloatArray, FloatArray]:
         """Motion under unit contact forces (n, 3p), m/N, and the inverse (N, 3p, 3p) of the law for the forces."""
-        law, spread = self.law, np.asarray(self.select @ self.compliance).T
+        law, spread = self.law, np.ascontiguousarray((self.select @ self.compliance).T)
         flexibility = np.asarray(self.select @ spread)
         n_samples, n_pairs = law.by_force.shape[:2]
         blocks, pairs = flexibility.reshape(n_pairs, 3, 3 * n_pairs), np.arange(n_pairs)
@@ -93,31 +93,43 @@ class Monodromy:
 
     def apply(self, disturbance: FloatArray) -> FloatArray:
         """Disturbances (size, j) a period later."""
-        for n in range(len(self.law.by_force)):
-            disturbance = self._step(n, disturbance)
-        return disturbance
+        spread, inverse = self._contact
+        return pass_period(self._response, spread, inverse, self._law_of_past, self._places, disturbance)
 
     def matrix(self) -> FloatArray:
-        """The monodromy (size, size). Parts of the period of equal length are integrated side by side."""
-        length = len(self.law.by_force) // _PARTS
-        steps: FloatArray = np.broadcast_to(np.eye(self.size), (_PARTS, self.size, self.size))
-        for n in range(length):
-            steps = self._step(slice(n, None, length), steps)
-        return reduce(lambda before, after: after @ before, steps)
+        """The monodromy (size, size)."""
+        return self.apply(np.eye(self.size))
 
-    def _step(self, n: int | slice, disturbance: FloatArray) -> FloatArray:
-        """Disturbances (size, j) at sample n from those at the sample before; (k, size, j) for k samples n at once."""
-        now, before, speed, speed_before = np.split(disturbance, 4, axis=-2)
-        spread, inverse = self._contact
+
+@njit(cache=True)
+def pass_period(
+    response: FloatArray,
+    spread: FloatArray,
+    inverse: FloatArray,
+    law_of_past: FloatArray,
+    places: IntArray,
+    disturbance: FloatArray,
+) -> FloatArray:
+    """Disturbances (4n, j) through the N samples of a period; arguments as the properties of `Monodromy`."""
+    n, n_rows = response.shape[0], inverse.shape[1]
+    now, before = disturbance[:n].copy(), disturbance[n : 2 * n].copy()
+    speed, speed_before = disturbance[2 * n : 3 * n].copy(), disturbance[3 * n :].copy()
+    right = np.zeros((n_rows, disturbance.shape[1]))
+    for sample in range(inverse.shape[0]):
         # BDF2: v = 3/2 y + known; acceleration from v in the same way
         known = 0.5 * before - 2.0 * now
-        after = self._response @ np.concatenate([1.5 * known + 0.5 * speed_before - 2.0 * speed, known], axis=-2)
-        if inverse.size:
-            *of, _, j = disturbance.shape
-            past = np.concatenate([after, now, known, speed, np.zeros((*of, 1, j))], axis=-2)[..., self._places, :]
-            right = self._law_of_past[n] @ past.reshape(*of, -1, 12, j)
-            after = after - spread @ (inverse[n] @ right.reshape(*of, -1, j))
-        return np.concatenate([after, now, 1.5 * after + known, speed], axis=-2)
+        after = np.dot(response, np.concatenate((1.5 * known + 0.5 * speed_before - 2.0 * speed, known)))
+        if n_rows > 0:
+            past = np.concatenate((after, now, known, speed))
+            right[:] = 0.0
+            for row in range(n_rows):
+                for m in range(12):
+                    place = places[12 * (row // 3) + m]
+                    if place < 4 * n:
+                        right[row] += law_of_past[sample, row // 3, row % 3, m] * past[place]
+            after -= np.dot(spread, np.dot(inverse[sample], right))
+        now, before, speed, speed_before = after, now, 1.5 * after + known, speed
+    return np.concatenate((now, before, speed, speed_before))
 
 
 def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples: int) -> Monodromy:

@@ -12,7 +12,6 @@ import numpy as np
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, HarmonicStiffness, SharedStiffness
-from solver.structure.rough_forms import multiply_roughly
 
 DENSE_BYTES = 2e6
 """Bytes of the matrices of all harmonics up to which a product with each matrix is fastest: larger matrices do not fit
@@ -68,8 +67,8 @@ class CondensedStructure:
 
     def apply_roughly(self, displacement_h: FloatArray) -> FloatArray:
         """`Z_r u` to at least three digits in less time, for directions of Newton's method."""
-        static = np.ascontiguousarray(self.static_stiffness)
-        return multiply_roughly(static, self.moving.rough, np.ascontiguousarray(displacement_h))
+        # a joint that slides as a whole moves far: the static part in double precision
+        return from_complex(self.static_stiffness @ displacement_h[:, 0], self.moving.single.apply(displacement_h))
 
     def response_h(self, displacement_h: FloatArray) -> FloatArray:
         """Responses (n_response, 2H+1), m, from u (n_rel, 2H+1), m."""

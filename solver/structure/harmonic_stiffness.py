@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from typing import cast
 
 import numpy as np
 
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
 from solver.structure.fourier import to_complex
-from solver.structure.rough_forms import RoughStiffness, rough_of_each, rough_of_shared
 
 
 @dataclass(frozen=True)
@@ -25,13 +24,16 @@ class DenseStiffness:
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
-        moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
+        moving = np.ascontiguousarray(to_complex(displacement_h).T, self.dense.dtype)[:, :, None]
         return cast("ComplexArray", np.matmul(self.dense, moving)[:, :, 0].T)
 
     @cached_property
-    def rough(self) -> RoughStiffness:
-        """Z_r in single precision, for directions of Newton's method, not for the residual."""
-        return rough_of_each(self.dense)
+    def single(self) -> DenseStiffness:
+        """Z_r in single precision, for directions of Newton's method, not for the residual.
+
+        A product takes the time of reading the matrices from memory.
+        """
+        return DenseStiffness(self.dense.astype(np.complex64))
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class SharedStiffness:
 
     - linear, relative (n_rel,), others (n_i,): the structure, and its displacements of the pairs and all others.
     - rates (H,): n w, rad/s.
-    - held_compliance (H, n_i, n_i): `A_ii^-1`, m/N.
+    - held_compliance (H, n_i, n_i): `A_ii^-1`, m/N; in the precision of all products.
     """
 
     linear: LinearModel
@@ -57,18 +59,10 @@ class SharedStiffness:
     held_compliance: ComplexArray
 
     @cached_property
-    def _columns(self) -> FloatArray:
-        """Columns r (3, n, n_rel) of K, M, C, with rows r before rows i."""
-        return self._parts(np.concatenate([self.relative, self.others]), self.relative)
-
-    @cached_property
-    def _back(self) -> FloatArray:
-        """K_ri, M_ri, C_ri (3, n_rel, n_i)."""
-        return self._parts(self.relative, self.others)
-
-    def _parts(self, rows: IntArray, columns: IntArray) -> FloatArray:
-        parts = self.linear.stiffness, self.linear.mass, self.linear.damping
-        return np.stack([np.asarray(np.real(part), np.float64)[rows[:, None], columns] for part in parts])
+    def _parts(self) -> tuple[FloatArray, FloatArray]:
+        """Columns r (3, n, n_rel) of K, M, C, with rows r before rows i; and their blocks ri (3, n_rel, n_i)."""
+        kind = self.held_compliance.real.dtype.name
+        return _real_parts(self.linear, tuple(self.relative.tolist()), tuple(self.others.tolist()), kind)
 
     @property
     def dense(self) -> ComplexArray:
@@ -79,22 +73,21 @@ class SharedStiffness:
     def matrix(self, place: int) -> ComplexArray:
         """As in DenseStiffness."""
         rate, n_rel = self.rates[place], self.relative.size
-        columns, back = (k - rate**2 * m + 1j * rate * c for k, m, c in (self._columns, self._back))
+        columns, back = (k - rate**2 * m + 1j * rate * c for k, m, c in self._parts)
         held = self.held_compliance[place] @ columns[n_rel:]
         return cast("ComplexArray", columns[:n_rel] - back @ held)
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
         """As in DenseStiffness."""
-        n_rel = self.relative.size
-        forces = self._products(self._columns, to_complex(displacement_h))
+        n_rel, (columns, back) = self.relative.size, self._parts
+        forces = self._products(columns, to_complex(displacement_h))
         behind = np.matmul(self.held_compliance, forces[n_rel:].T[:, :, None])[:, :, 0].T
-        return forces[:n_rel] - self._products(self._back, behind)
+        return forces[:n_rel] - self._products(back, behind)
 
     @cached_property
-    def rough(self) -> RoughStiffness:
+    def single(self) -> SharedStiffness:
         """As in DenseStiffness."""
-        few = rough_of_shared(self.linear, self.relative, self.others, self.rates, self.held_compliance)
-        return rough_of_each(self.dense) if few is None else few
+        return replace(self, held_compliance=self.held_compliance.astype(np.complex64))
 
     def _products(self, parts: FloatArray, amplitudes: ComplexArray) -> ComplexArray:
         """`(K + i n w C - (n w)^2 M) u` (rows, H) of real parts K, M, C (3, rows, n) and complex u (n, H).
@@ -102,10 +95,24 @@ class SharedStiffness:
         One real product for all harmonics: real and imaginary parts are columns side by side.
         """
         _, n_rows, n = parts.shape
-        columns = np.ascontiguousarray(amplitudes).view(np.float64)
-        found = (parts.reshape(3 * n_rows, n) @ columns).view(np.complex128)
-        spring, inertia, drag = found.reshape(3, n_rows, self.rates.size)
-        return np.asarray(spring + 1j * self.rates * drag - self.rates**2 * inertia)
+        kind, rates = self.held_compliance.dtype, self.rates.astype(parts.dtype)
+        columns = np.ascontiguousarray(amplitudes, kind).view(parts.dtype)
+        found = (parts.reshape(3 * n_rows, n) @ columns).view(kind)
+        spring, inertia, drag = found.reshape(3, n_rows, rates.size)
+        return np.asarray(spring + 1j * rates * drag - rates**2 * inertia)
 
 
 HarmonicStiffness = DenseStiffness | SharedStiffness
+
+
+@lru_cache(maxsize=4)
+def _real_parts(
+    linear: LinearModel, relative: tuple[int, ...], others: tuple[int, ...], kind: str
+) -> tuple[FloatArray, FloatArray]:
+    """As `SharedStiffness._parts`, the same at all frequencies; kind: of the numbers, "float64" or "float32"."""
+    three = [np.real(part) for part in (linear.stiffness, linear.mass, linear.damping)]
+    columns, back = (
+        np.stack([np.asarray(part[np.ix_(rows, places)], kind) for part in three])
+        for rows, places in ((relative + others, relative), (relative, others))
+    )
+    return columns, back

@@ -54,11 +54,6 @@ class Joint:
         rows[self.component_index] = np.arange(self.component_index.size)
         return rows.reshape(-1, 3)
 
-    @cached_property
-    def pair_compliance(self) -> tuple[FloatArray, FloatArray]:
-        """Motion over force (n_contact,), m/N, of elastic pairs: normal and tangential."""
-        return 1.0 / self.penalty.normal, 1.0 / self.penalty.tangential
-
     @property
     def relative_penalty(self) -> FloatArray:
         """Penalty (n_rel,), N/m, of each relative displacement."""

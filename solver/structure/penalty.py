@@ -16,10 +16,11 @@ harmonic:
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
-from solver.model import BoolArray, FloatArray, Matrix, ReducedModel
+from solver.model import BoolArray, FloatArray, LinearModel, ReducedModel
 from solver.structure.condensation import condense, relative_indices
 
 INERTIAL_RATIO = 2.0
@@ -100,9 +101,9 @@ def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
     The diagonal is the stiffness of a pair that moves alone. Measured on the dovetail sector at resonance: three times
     the value takes four times the Newton iterations, half the value an equal number; all responses agree within 1 %.
     """
-    _, components = relative_indices(model.contact)
+    relative, components = relative_indices(model.contact)
     size = np.zeros((model.contact.n_contact, 2))
-    diagonal = np.real(np.diag(_condensed_at(model, rate)))
+    diagonal = _diagonal(model.harmonic_structure(1), tuple(relative.tolist()), rate, compliance=False)
     np.maximum.at(size, (components // 3, np.minimum(components % 3, 1)), diagonal)
     # a pair without such a displacement or without stiffness still needs a divisor
     return np.where(size > 0.0, size, 1.0)
@@ -121,11 +122,13 @@ def _mass_at(model: ReducedModel, rate: float) -> FloatArray:
 
 def compliance_at(model: ReducedModel, rate: float) -> FloatArray:
     """Compliance (n_rel,), m/N, of each relative displacement at a real rate, 1/s, with all others free."""
-    return np.asarray(np.real(np.diag(np.linalg.inv(_condensed_at(model, rate)))))
-
-
-def _condensed_at(model: ReducedModel, rate: float) -> Matrix:
     relative, _ = relative_indices(model.contact)
-    linear = model.harmonic_structure(1)
+    return _diagonal(model.harmonic_structure(1), tuple(relative.tolist()), rate, compliance=True)
+
+
+@lru_cache(maxsize=64)
+def _diagonal(linear: LinearModel, relative: tuple[int, ...], rate: float, *, compliance: bool) -> FloatArray:
+    """Diagonal of the condensed `K + s^2 M`, N/m, or of its inverse, m/N: the same for many states."""
     full = linear.stiffness + rate**2 * linear.mass
-    return condense(full, relative, np.zeros(full.shape[0])).stiffness
+    condensed = condense(full, np.array(relative, np.intp), np.zeros(full.shape[0])).stiffness
+    return np.asarray(np.real(np.diag(np.linalg.inv(condensed) if compliance else condensed)))

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import SMOOTH_CHANGE
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.march.steps import Lengths, take_step
 from solver.model import FloatArray
@@ -230,7 +230,7 @@ def step_across(work: WearingJoint, state: WearState, shortest: float, end: floa
 
 def is_smooth(state: WearState, step: Step) -> bool:
     """Whether the vibration changes so little over a step that the branch does not end within the step."""
-    return vibration_change(state.point.evaluation, step.state.point.evaluation) < CONTINUATION.smooth_change
+    return vibration_change(state.point.evaluation, step.state.point.evaluation) < SMOOTH_CHANGE
 
 
 def allowed_error(share: float, before: float, after: float, count: float, length: float) -> float:

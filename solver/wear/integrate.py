@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.state import Failure
 from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, describe_error
@@ -109,7 +109,7 @@ class Integration:
         work, budget = self.line.work, self.line.work.run.budget
         saved = budget.iterations
         while (ended := self._ended(state, course)) is None:
-            if budget.iterations > self.most_iterations + CONTINUATION.near_iterations * len(course.ends):
+            if budget.iterations > self.most_iterations + NEAR_ITERATIONS * len(course.ends):
                 ended = Failure(Outcome.MARCH_FAILED)
                 break
             after = guarded(partial(self._step, state, course))

@@ -18,8 +18,7 @@ import numpy as np
 
 from solver.contact.coulomb import STICK
 from solver.continuation.natural import follow_naturally
-from solver.continuation.options import CONTINUATION
-from solver.continuation.transient import relax_to_periodic
+from solver.continuation.transient import SEARCH_ITERATIONS, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
 from solver.model import FloatArray
@@ -38,7 +37,7 @@ def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -
 
     worn (n_contact,): depth of the new state, m. cycle: its count.
     """
-    work.run.budget.limit = work.run.budget.iterations + CONTINUATION.search_iterations
+    work.run.budget.limit = work.run.budget.iterations + SEARCH_ITERATIONS
     reached = _held(work, state, worn) or _on_another_branch(work, state, worn)
     work.run.budget.limit = float("inf")
     return reached if isinstance(reached, Failure) else work.noted(replace(reached, cycle=cycle, previous=None))

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 
-from solver.accuracy.reference import RTOL_RATIO, coarser, finer
+from solver.accuracy.reference import RTOL_RATIO, coarser
 from solver.clock import computing_time
 from solver.contact.wear_law import ARCHARD, WearLaw
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
 from solver.outcome import Outcome
-from solver.packing import Packed, pack, packable
+from solver.packing import packable
 from solver.results.history import StartState
 from solver.settings import Resolution, ToTheEnd, WearTarget
 from solver.structure.joint import Case
@@ -63,6 +63,22 @@ class SlowTime:
         return math.inf if isinstance(self.cycles, ToTheEnd) else float(self.cycles[-1])
 
     @property
+    def name(self) -> str:
+        """Tells apart histories from one start state with one wear coefficient and law."""
+        target = None if self.until is None else astuple(self.until)
+        return f"{self.steps!r} {self.end!r} {target!r}"
+
+    def adaptive_to(self, reached: float, rtol: float) -> SlowTime:
+        """The adaptive history with which one with given steps is compared, that has come to the count `reached`.
+
+        Equal for all histories with given steps to one last count; to another end it is no longer than needed.
+        """
+        known = self.end < math.inf and self.until is None
+        never = None if self.until is None else replace(self.until, value=math.inf)
+        cycles = self.cycles if known else np.array([0.0, reached])
+        return replace(self, steps=Adaptive(rtol), cycles=cycles, until=never)
+
+    @property
     def shifts(self) -> bool:
         """Whether the history ends at a shift of the resonance of the vibration."""
         return self.until is not None and self.until.quantity == "frequency_shift"
@@ -86,7 +102,7 @@ class Like:
 @packable
 @dataclass(frozen=True)
 class Saved:
-    """The progress of the computation of a history, from which the computation goes on.
+    """The progress of a history and its reference solution, from which both go on.
 
     state, course, iterations: of the present integration.
     fine: the finished history, while its reference solution is integrated; else None.
@@ -102,10 +118,10 @@ class Saved:
 
 @dataclass
 class Solutions:
-    """Integrates a history and its reference solution, one after the other.
+    """Integrates a history and, where its steps are adaptive, its reference solution, one after the other.
 
     case, start, asked: as in `history.integrate_wear`; the start state exists.
-    keep: called from time to time with the packed progress; None for no calls.
+    keep: called from time to time with the progress; None for no calls.
     saved: progress to go on from; None to begin.
     began: CPU time, s, at which the computation would have begun without an interruption.
     """
@@ -113,7 +129,7 @@ class Solutions:
     case: Case
     start: StartState
     asked: SlowTime
-    keep: Callable[[Packed], None] | None = None
+    keep: Callable[[Saved], None] | None = None
     saved: Saved | None = None
     began: float = field(init=False)
 
@@ -151,7 +167,7 @@ class Solutions:
         return replace(ended, failure=unstable or ended.failure, iterations=work.run.budget.iterations)
 
     def reference(self, fine: Ended, counts: FloatArray) -> Ended:
-        """Integrate the reference solution of a history, which is read at counts (n,) and at the ends of its steps."""
+        """Integrate the reference solution of an adaptive history, read at counts (n,) and at the ends of its steps."""
         assert fine.state is not None
         like = Like(fine.course.resolutions, fine.state.step_limit, fine.iterations)
         reached = min(fine.course.ends[-1], self.asked.end)
@@ -160,16 +176,15 @@ class Solutions:
         return self.follow(like, np.unique(compared[compared <= reached]), fine)
 
     def follow(self, like: Like, compared: FloatArray, fine: Ended | None = None) -> Ended:
-        """Integrate the reference solution of a history of which the start state may be another one.
+        """Integrate the reference solution of an adaptive history of which the start state may be another one.
 
         compared (n,): ascending counts at which it is read, the first 0.
         fine: the history, to be saved with the progress.
         """
         work, asked, end = self._joint(), self.asked, float(compared[-1])
-        other, ratio = (coarser, RTOL_RATIO) if asked.adaptive else (finer, 1.0)
-        resolutions = tuple((count, other(resolution, self.case.model)) for count, resolution in like.resolutions)
+        resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in like.resolutions)
         # a short history may consist of its first steps, which do not depend on rtol
-        steps = Adaptive(ratio * self.case.settings.rtol, 2.0 if asked.ends_at_last else 1.0)
+        steps = Adaptive(RTOL_RATIO * self.case.settings.rtol, 2.0 if asked.ends_at_last else 1.0)
         integration = Integration(
             WearLine(work, steps, end if asked.ends_at_last else math.inf, bounded=False),
             PlainCheck(resolutions, with_resonance=asked.shifts),
@@ -197,7 +212,7 @@ class Solutions:
     def _save(self, work: WearingJoint, state: WearState, course: Course, fine: Ended | None) -> None:
         """Pass the progress of an integration to `keep`."""
         if self.keep is not None:
-            self.keep(pack(Saved(state, course, work.run.budget.iterations, fine, self.spent)))
+            self.keep(Saved(state, course, work.run.budget.iterations, fine, self.spent))
 
 
 def begin_reference(work: WearingJoint, step_limit: float) -> WearState:
@@ -213,5 +228,5 @@ def begin_reference(work: WearingJoint, step_limit: float) -> WearState:
         return begun
     history = fine.start_history + 2.0 * (reference.start_history - fine.start_history)
     balance, first = Balance(work.at(begun), history, begun.depth), begun.point.evaluation.predicted_h
-    point = work.run.state(balance, first, most=CONTINUATION.near_iterations)
+    point = work.run.state(balance, first, most=NEAR_ITERATIONS)
     return begun if point is None else work.noted(replace(begun, point=point))

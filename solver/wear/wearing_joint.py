@@ -15,7 +15,7 @@ from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.period_events import left_out
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.continuation.largest_response import accepted_rise, rise_of_response, solve_at_peak
-from solver.continuation.options import CONTINUATION
+from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import solve_at_lag
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, final_history
@@ -44,7 +44,7 @@ class Fixed:
 
         start (n_rel, 2H+1): first predicted force, N. state: the state before. run, most: as in `Run.solve`.
         """
-        point = run.state(balance, start, most=most or CONTINUATION.near_iterations)
+        point = run.state(balance, start, most=most or NEAR_ITERATIONS)
         return None if point is None else replace(state, point=point)
 
     def error(self, _: WearState, __: float, ___: float) -> float:
@@ -75,7 +75,7 @@ class Following(Fixed):
         self, case: Case, balance: Balance, start: FloatArray, state: WearState, run: Run, most: int | None = None
     ) -> WearState | None:
         """As in `Fixed`; the frequency of the balance is the first one."""
-        lag, most = state.lag, most or CONTINUATION.near_iterations
+        lag, most = state.lag, most or NEAR_ITERATIONS
         if self.wanted.of == "peak":
             peak = solve_at_peak(case, balance, start, lag, run, most)
             found, lag = (None, lag) if peak is None else peak

@@ -38,9 +38,6 @@ ADAPTIVE_STEPS = 40
 STEPS_TO_THE_END = 100
 """Steps of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)."""
 
-ITERATIONS_TO_A_FINAL_STATE = 50
-"""Newton iterations of the scheme "final" without integration (4 to 35 pairs: 15 to 60)."""
-
 ITERATIONS_AN_ADAPTIVE_STEP = 7
 """Newton iterations of one adaptive step near the resonance (36 and 48 pairs: 4 to 13), with refused steps and the
 reference solution."""
@@ -51,7 +48,7 @@ of 20 on a slider, 18 to 26 of thousands on a dovetail, 42 of a million on a sli
 
 WAYS_OF_ONE_PAIR = 0.25
 """Ramps and sweeps of a joint of one pair, which slips: 2 of 14 missions with 20 missions, 12 of 84 with a million
-(`solver.missions.block_start`)."""
+(`solver.missions.block_run`)."""
 
 WAYS = 0.5
 """Newton iterations of the way to a block in a later mission, over those of the first one (dovetail with 16 pairs: 150
@@ -101,13 +98,17 @@ def iterations_of_mode(n_amplitudes: int) -> int:
     return ITERATIONS_OF_MODE + ITERATIONS_A_MODE_POINT * (n_amplitudes - 1)
 
 
-def iterations_of_history(scheme: str, cycles: float, step: float) -> int:
-    """Newton iterations of a history over so many cycles where the joint wears."""
-    if cycles > 0.0 and scheme == "final":
-        return ITERATIONS_TO_A_FINAL_STATE
-    if cycles > 0.0 and scheme == "adaptive":
-        return ITERATIONS_AN_ADAPTIVE_STEP * ADAPTIVE_STEPS
-    return ITERATIONS_A_STEP * (max(1, math.ceil(cycles / step)) if cycles < math.inf else STEPS_TO_THE_END)
+def iterations_of_histories(steps: Sequence[tuple[str, float]], cycles: float) -> int:
+    """Newton iterations of histories over so many cycles from one state where the joint wears.
+
+    steps: scheme and step of each. Those with given steps are compared with the adaptive history.
+    """
+    if cycles == 0.0:
+        return ITERATIONS_A_STEP
+    given = [step for scheme, step in steps if scheme not in ("adaptive", "final")]
+    n_steps = sum(max(1, math.ceil(cycles / step)) if cycles < math.inf else STEPS_TO_THE_END for step in given)
+    adaptive = ADAPTIVE_STEPS if cycles < math.inf else STEPS_TO_THE_END
+    return ITERATIONS_AN_ADAPTIVE_STEP * adaptive + ITERATIONS_A_STEP * n_steps
 
 
 def missions_computed(missions: float) -> int:

@@ -44,7 +44,7 @@ _OF_ONE_PAIR = 3
 """Relative displacements of one contact pair, at most."""
 
 _MOST = 0.95
-"""Largest share of a history that is said to be done before all of it is: the number of blocks is an estimate."""
+"""Largest share of a history that is said to be done before all of it is: the number of steps is an estimate."""
 
 _POINT = ("frequency", "wear_coefficient", "excitation_amplitude", "sweep")
 _FOR_THE_TABLE = ("worn_volume", "block_worn_volume")
@@ -128,7 +128,7 @@ class Mission(Task):
         )
         reached, n_computed = Reached(self, keep), itertools.count(1)
         # as many again for the reference solution
-        n_planned = 2 * len(blocks) * max(1, missions_computed(self.missions[-1]))
+        n_planned = 2 * max(1, missions_computed(self.missions[-1]))
 
         def note(progress: Packed) -> None:
             reached(progress)

@@ -35,6 +35,7 @@ from studyrunner.mpi.cost_model import CostKeys
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from solver.results.history import StartState, WearHistory
+    from solver.wear.solutions import SlowTime
 
 AT_REST = "history at rest"
 """Most general group of histories in which nothing wears, see `CostModel`."""
@@ -127,15 +128,50 @@ class Sweep(JointTask):
         return f"{how} to {self.frequencies[place]:.6g} Hz"
 
 
-@dataclass(frozen=True, kw_only=True)
-class History(JointTask):
-    """A wear history from a start state, and the histories of other points that are read from it.
+@dataclass(frozen=True)
+class Integrated:
+    """A history that is integrated, and the histories of other points that are read from it.
 
-    sweep, position: number of the sweep and place of the start state. frequency, Hz, excitation_amplitude, N,
-    direction, follow: of the start state.
+    scheme, largest_depth: as in `SlowTime`.
     histories: one result each. The first is integrated; it needs the most cycles.
     unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles. Step and scheme are then those of
         the first point.
+    """
+
+    scheme: str
+    largest_depth: float | None
+    histories: tuple[ScaledHistory, ...]
+    unworn: bool
+
+    @property
+    def wear_coefficient(self) -> float:
+        """Of the integrated history, 1/Pa."""
+        return self.histories[0].wear_coefficient
+
+    @property
+    def step(self) -> float:
+        """Of the integrated history, cycles."""
+        return self.histories[0].step
+
+    def counts(self, cycles: tuple[float, ...], scaled: ScaledHistory) -> tuple[float, ...]:
+        """Cycle counts of the integrated history at which a history is read, one for each of `cycles`."""
+        if self.unworn:
+            return (0.0,) * len(cycles)
+        return counts_of(cycles, scaled, self.histories[0], self.scheme not in ("adaptive", "final"))
+
+    def wear(self, scaled: ScaledHistory) -> tuple[float, float | None]:
+        """Wear coefficient of a history, and its step where the step matters."""
+        own_steps = self.unworn or self.scheme in ("adaptive", "final") or self.largest_depth is not None
+        return scaled.wear_coefficient, None if own_steps else scaled.step
+
+
+@dataclass(frozen=True, kw_only=True)
+class History(JointTask):
+    """Wear histories from a start state that share an adaptive history, each with those that are read from it.
+
+    sweep, position: number of the sweep and place of the start state. frequency, Hz, excitation_amplitude, N,
+    direction, follow: of the start state.
+    integrated: histories with one wear coefficient.
     cycles: cycle counts of the output of every history. to_the_end: integration until nothing wears any more; then
         `cycles` numbers the outputs. until: wear at which the history ends before the last count.
     loops: pairs whose fretting loops are among the variables.
@@ -149,10 +185,7 @@ class History(JointTask):
     frequency: float
     excitation_amplitude: float
     direction: str
-    scheme: str
-    largest_depth: float | None
-    histories: tuple[ScaledHistory, ...]
-    unworn: bool
+    integrated: tuple[Integrated, ...]
     cycles: tuple[float, ...]
     loops: tuple[int, ...]
     moves: bool = True
@@ -162,9 +195,14 @@ class History(JointTask):
     start: Packed | None = field(default=None, compare=False, repr=False)
 
     @property
+    def results(self) -> tuple[tuple[Integrated, int], ...]:
+        """For each place the integrated history, and the number among those that are read from it."""
+        return tuple((each, number) for each in self.integrated for number in range(len(each.histories)))
+
+    @property
     def order(self) -> tuple[int, ...]:
         """One place for each history."""
-        return tuple(range(len(self.histories)))
+        return tuple(range(len(self.results)))
 
     @property
     def waits_for(self) -> tuple[int, int]:
@@ -173,30 +211,20 @@ class History(JointTask):
 
     @property
     def wear_coefficient(self) -> float:
-        """Wear coefficient of the integrated history, 1/Pa."""
-        return self.histories[0].wear_coefficient
-
-    @property
-    def step(self) -> float:
-        """Step of the integrated history, cycles."""
-        return self.histories[0].step
+        """Of the integrated histories, 1/Pa."""
+        return self.integrated[0].wear_coefficient
 
     def points(self, place: int) -> tuple[Index, ...]:
         """Points that have the history at a place."""
-        return self.histories[place].points
-
-    def counts(self, scaled: ScaledHistory) -> tuple[float, ...]:
-        """Cycle counts of the integrated history at which a history is read, one for each of `cycles`."""
-        if self.unworn:
-            return (0.0,) * len(self.cycles)
-        return counts_of(self.cycles, scaled, self.histories[0], self.scheme not in ("adaptive", "final"))
+        integrated, number = self.results[place]
+        return integrated.histories[number].points
 
     @property
     def cost_keys(self) -> CostKeys:
-        """By motion, unknowns and start state, and by wear coefficient, step and scheme."""
+        """By motion, unknowns and start state, and by wear coefficient, steps and schemes."""
         kind = "history" if self.moves else AT_REST
         near, here = (kind, self.sweep, "near", self.position // _NEIGHBOURS), (kind, self.sweep, self.position)
-        wear = (kind, self.wear_coefficient, self.step, self.scheme)
+        wear = (kind, self.wear_coefficient, tuple((each.step, each.scheme) for each in self.integrated))
         return ((kind, (kind, self.n_unknowns), near, here), (wear, (wear, near)))
 
     def from_start(self, result: StartResult) -> History:
@@ -212,59 +240,66 @@ class History(JointTask):
         start = _name_of_start(self, identity, self.frequency)
         ends = tuple(None if each is None else astuple(each) for each in (self.until, self.to_the_end))
         kept = _name_of_kept(identity.record, self.cycles, self.loops, ends)
-        scheme = "" if self.unworn else self.scheme
-        own = (*self._wear(self.histories[0]), scheme, self.unworn, self.largest_depth, asdict(self.law))
-        wear = (self._wear(scaled) for scaled in self.histories)
-        return tuple(digest("history", start, kept, own, place > 0, each) for place, each in enumerate(wear))
-
-    def _wear(self, scaled: ScaledHistory) -> tuple[float, float | None]:
-        """Wear coefficient, and step where the step matters."""
-        own_steps = self.unworn or self.scheme in ("adaptive", "final")
-        own_steps = own_steps or (self.scheme == "explicit" and self.largest_depth is not None)
-        return scaled.wear_coefficient, None if own_steps else scaled.step
+        found = []
+        for each, number in self.results:
+            scheme = "" if each.unworn else each.scheme
+            own = (*each.wear(each.histories[0]), scheme, each.unworn, each.largest_depth, asdict(self.law))
+            found.append(digest("history", start, kept, own, number > 0, each.wear(each.histories[number])))
+        return tuple(found)
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
-        """All histories, read from one, as far as it went."""
+        """All histories, read from those that are integrated, as far as these went."""
         from studyrunner.kinds.wear_result import build_result
 
-        reached = Reached(self, keep)
-        history = self.integrate(self.joint.model(models), reached)
+        reached, progress = Reached(self, keep), None
+        needed: dict[Integrated, list[int]] = {}
         for place in self.places:
-            yield replace(build_result(self, history, place), progress=reached.after(history.outcome))
+            needed.setdefault(self.results[place][0], []).append(place)
+        histories = self.integrate(self.joint.model(models), tuple(needed), reached)
+        for (each, places), history in zip(needed.items(), histories, strict=True):
+            raise_fault(history.outcome, history.message)
+            # one that its time limit has ended goes on from there when it gets more
+            progress = progress or reached.after(history.outcome)
+            for place in places:
+                result = build_result(self, each, history, self.results[place][1])
+                yield replace(result, place=place, progress=progress)
 
-    def integrate(self, model: ReducedModel, keep: Keep) -> WearHistory:
-        """The integrated history, at all counts at which one of the histories is read."""
-        from solver.wear.control import steps_of
-        from solver.wear.history import integrate_wear
-        from solver.wear.solutions import SlowTime
-        from solver.wear.wearing_joint import Fixed, Following
+    def integrate(self, model: ReducedModel, integrated: tuple[Integrated, ...], keep: Keep) -> Iterator[WearHistory]:
+        """Integrated histories, at all counts at which one of the others is read."""
+        from solver.wear.history import integrate_together
 
         if self.start is None:
             raise TypeError(f"task without a start state: {self}")
+        asked = [self._asked(each) for each in integrated]
+        friction = self.joint.friction_coefficient
+        return integrate_together(model, friction, self.settings, unpack(self.start), asked, keep, self.resume)
+
+    def _asked(self, integrated: Integrated) -> SlowTime:
+        """What the solver integrates."""
+        from solver.wear.control import steps_of
+        from solver.wear.solutions import SlowTime
+        from solver.wear.wearing_joint import Fixed, Following
+
         counts: NDArray[np.float64] | ToTheEnd
-        if self.to_the_end is not None and not self.unworn:
+        if self.to_the_end is not None and not integrated.unworn:
             counts = self.to_the_end
         else:
             # a history begins at cycle 0, whether that count is kept or not
-            read = (self.counts(scaled) for scaled in self.histories)
+            read = (integrated.counts(self.cycles, scaled) for scaled in integrated.histories)
             counts = np.unique([0.0, *itertools.chain.from_iterable(read)])
-        asked = SlowTime(
-            self.wear_coefficient,
-            steps_of(self.scheme, self.step, self.settings.rtol, self.largest_depth),
+        return SlowTime(
+            integrated.wear_coefficient,
+            steps_of(integrated.scheme, integrated.step, self.settings.rtol, integrated.largest_depth),
             counts,
             law=self.law,
             until=self.until,
             loops=self.loops,
             where=Fixed() if self.follow is None else Following(self.follow),
         )
-        friction = self.joint.friction_coefficient
-        history = integrate_wear(model, friction, self.settings, unpack(self.start), asked, keep, self.resume)
-        raise_fault(history.outcome, history.message)
-        return history
 
-    def describe(self, place: int) -> str:  # noqa: ARG002
+    def describe(self, place: int) -> str:
         """Its frequency and scheme."""
-        return f"{self.frequency:.6g} Hz {self.scheme}"
+        return f"{self.frequency:.6g} Hz {self.results[place][0].scheme}"
 
 
 def _name_of_start(task: Sweep | History, identity: Identity, frequency: float) -> str:

@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from solver.settings import SolverSettings, ToTheEnd
-from studyrunner.kinds.estimate import iterations_of_history, iterations_of_sweep, seconds_an_iteration
+from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_an_iteration
 from studyrunner.kinds.sharing import EQUAL, IDLE_RTOL, Alike, ScaledHistory, describe_left_out, share_histories
 from studyrunner.kinds.task import Index, Joint, Task, joint_of, n_unknowns_of, settings_at
 from studyrunner.kinds.task_plan import TaskPlan
-from studyrunner.kinds.wear import History, Sweep
+from studyrunner.kinds.wear import History, Integrated, Sweep
 from studyrunner.scene.drawn_contacts import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import Realisation
@@ -26,6 +26,10 @@ _OF_SWEEP = ("excitation_amplitude", "sweep")
 """Axes of which each sweep has one value, beside those of the solver."""
 
 _OF_HISTORY = ("wear_coefficient", "step", "scheme")
+
+MOST_TOGETHER = 4
+"""Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
+one of them: with 4 a fifth more than with all, and another rank may take the rest."""
 
 _FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
 
@@ -155,23 +159,32 @@ class _Planner:
         self.causes += causes
         self.causes[IDLE_RTOL] += n_others * (n_points - n_parts)
         self.causes[EQUAL] += n_others * (n_parts - len(of_value))
+        together: dict[object, list[Integrated]] = {}
         for alike in tasks:
-            histories = []
-            for choices in alike.histories:
-                points = tuple(
-                    self._point(start, (wear, *choice[1:])) for choice in choices for start, wear in of_value[choice[0]]
-                )
-                wear, step, _ = choices[0]
-                histories.append(ScaledHistory(study.axes.wear_coefficient[wear], study.axes.step[step], points))
-            self._add_history(study, sweep, position, alike, tuple(histories))
+            each = self._integrated(study, alike, of_value)
+            alone = each.unworn or not study.solver.shortcuts
+            together.setdefault(alike if alone else each.wear_coefficient, []).append(each)
+        for integrated in together.values():
+            for begin in range(0, len(integrated), MOST_TOGETHER):
+                self._add_history(study, sweep, position, tuple(integrated[begin : begin + MOST_TOGETHER]))
 
-    def _add_history(
-        self, study: Study, sweep: Sweep, position: int, alike: Alike, histories: tuple[ScaledHistory, ...]
-    ) -> None:
+    def _integrated(self, study: Study, alike: Alike, of_value: Sequence[Sequence[tuple[_Start, int]]]) -> Integrated:
+        """A history, and those that are read from it. of_value: points, and their places, by wear coefficient."""
+        histories = []
+        for choices in alike.histories:
+            points = tuple(
+                self._point(start, (wear, *choice[1:])) for choice in choices for start, wear in of_value[choice[0]]
+            )
+            wear, step, _ = choices[0]
+            histories.append(ScaledHistory(study.axes.wear_coefficient[wear], study.axes.step[step], points))
         scheme = study.axes.scheme[alike.histories[0][0][2]]
-        cycles = 0.0 if alike.unworn else math.inf if study.to_the_end else study.cycles_kept[-1]
-        iterations = iterations_of_history(scheme, cycles, histories[0].step)
+        depth = study.slow_time.largest_depth if scheme == "explicit" else None
+        return Integrated(scheme, depth, tuple(histories), alike.unworn)
+
+    def _add_history(self, study: Study, sweep: Sweep, position: int, integrated: tuple[Integrated, ...]) -> None:
+        cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.cycles_kept[-1]
         end = ToTheEnd(len(study.cycles_kept), study.slow_time.final_share) if study.to_the_end else None
+        steps = [(each.scheme, each.step) for each in integrated]
         self.histories.append(
             History(
                 number=len(self.histories),
@@ -183,14 +196,11 @@ class _Planner:
                 excitation_amplitude=sweep.excitation_amplitude,
                 direction=sweep.direction,
                 settings=sweep.settings,
-                scheme=scheme,
-                largest_depth=study.slow_time.largest_depth if scheme == "explicit" else None,
-                histories=histories,
-                unworn=alike.unworn,
+                integrated=integrated,
                 cycles=study.cycles_kept,
                 variables=self._variables,
                 loops=study.outputs.loops,
-                cost=seconds_an_iteration(sweep.n_unknowns) * iterations,
+                cost=seconds_an_iteration(sweep.n_unknowns) * iterations_of_histories(steps, cycles),
                 n_unknowns=sweep.n_unknowns,
                 until=study.until,
                 follow=study.follow,
@@ -216,7 +226,8 @@ TIME = "to a factor of two, if every point wears; a point whose vibration jumps 
 def describe_tasks(tasks: Sequence[Task]) -> str:
     """Tasks in words."""
     sweeps = [task for task in tasks if isinstance(task, Sweep)]
-    n_histories = count(len(tasks) - len(sweeps), "wear history", "wear histories")
+    histories = [task for task in tasks if isinstance(task, History)]
+    n_histories = count(sum(len(task.integrated) for task in histories), "wear history", "wear histories")
     if not sweeps:
         return n_histories
     n_ramps = sum(sweep.direction == "ramp" for sweep in sweeps)

@@ -13,24 +13,26 @@ from solver.results.cut_off import describe_cut_off
 from solver.results.history import WearHistory
 from solver.results.verdict import judge, last_error
 from studyrunner.kinds.task import PointResult
-from studyrunner.kinds.wear import History
+from studyrunner.kinds.wear import History, Integrated
 from studyrunner.percent import describe_reach, show_count
 from studyrunner.variables import KEPT
 
 _ROUND_OFF = 1e-10
 
 
-def build_result(task: History, history: WearHistory, place: int = 0) -> PointResult:
+def build_result(task: History, integrated: Integrated, history: WearHistory, place: int = 0) -> PointResult:
     """What the result file holds of one history of a task: the output counts and variables that the task asks for.
+
+    integrated: the history that was integrated. place: number among those that are read from it.
 
     What is per cycle is per cycle of that history. It knows nothing of what came after its last count: jumps, errors,
     the end of the integrated history. What was computed of a history that ends early is kept. Effort is that of the
     integrated history.
     """
-    scaled, own = task.histories[place], task.histories[0]
+    scaled, own = integrated.histories[place], integrated.histories[0]
     slower = scaled.wear_coefficient / own.wear_coefficient if place else 1.0
-    endless = task.to_the_end is not None and not task.unworn
-    counts = history.cycles if endless else np.array(task.counts(scaled))
+    endless = task.to_the_end is not None and not integrated.unworn
+    counts = history.cycles if endless else np.array(integrated.counts(task.cycles, scaled))
     rows = np.arange(counts.size) if endless else np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
     known = rows[reached]
@@ -55,7 +57,7 @@ def build_result(task: History, history: WearHistory, place: int = 0) -> PointRe
         last = history.last_cycle / slower
     elif not whole:
         last = min(history.last_cycle / slower, last)
-    elif not outcome.complete and not task.unworn:
+    elif not outcome.complete and not integrated.unworn:
         last = min(history.last_cycle, last)
     depths = history.wear_depth[known]
     if not message and known.size and not outcome.complete:

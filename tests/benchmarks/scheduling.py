@@ -152,7 +152,7 @@ class RecordedCosts:
         least, most = self._marches[recorded]
         seconds = least * (most / least) ** np.log10(task.wear_coefficient / LEAST_WEAR)
         if self._moves[place]:
-            seconds *= self._n_steps * (1000.0 / task.step) / RECORDED_STEPS
+            seconds *= self._n_steps * sum(1000.0 / each.step for each in task.integrated) / RECORDED_STEPS
         return float(seconds) * self._factors[task.sweep] * float(self._history_factors[task.number])
 
     def _place(self, sweep: int, frequency: float) -> int:

@@ -152,7 +152,7 @@ def replay(
         else:
             seconds = history_seconds(task)
             longest_way = max(longest_way, ways[task.sweep, task.position] + seconds)
-            results.append((_history(task), seconds))
+            results += [(_history(task, place), seconds / task.n_results) for place in task.order]
         for result, seconds in results:
             now += seconds
             work += seconds
@@ -190,8 +190,8 @@ def replay(
     return Replay(n_ranks, work, last_end, longest_way, plan.n_points - progress.n_points)
 
 
-def _history(task: History) -> PointResult:
-    return PointResult(task.points(0), {"outcome": 0})
+def _history(task: History, place: int) -> PointResult:
+    return PointResult(task.points(place), {"outcome": 0}, place)
 
 
 def lognormal(rng: np.random.Generator, spread: float) -> float:

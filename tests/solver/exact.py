@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.refinement import refine
-from solver.continuation.arc_length import Arc, follow_arc
+from solver.continuation.arc_length import Arc
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.dlft import Balance
@@ -19,7 +19,7 @@ from solver.settings import SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, build_case
 from tests import references
-from tests.solver.models import scene
+from tests.solver.models import crossings, scene
 
 SLIDING = ("forward", "backward")
 SWEEP_STEP = 0.01  # rad/s
@@ -114,11 +114,8 @@ def first_found(exact: ExactState, case: Case, budget: Budget) -> State:
     run = Run(case.settings.tolerance, budget)
     at = State(point.evaluation, point.history, begin)
     for target in np.append(np.arange(begin + SWEEP_STEP, exact.omega, SWEEP_STEP), exact.omega):
-        followed, arrived = follow_naturally(balance_at, at, float(target), run)
-        arc = None if arrived else follow_arc(Arc(balance_at, followed, SWEEP_STEP, run), float(target))
-        reached = followed if arc is None else arc.state
-        assert reached is not None
-        at = reached
+        at, arrived = follow_naturally(balance_at, at, float(target), run)
+        at = at if arrived else next(crossings(Arc(balance_at, at, SWEEP_STEP, run), float(target)))
     return at
 
 

@@ -1,6 +1,6 @@
 """Small models for the tests of the solver, all seeded, and the textbook and dovetail scenes at a small size."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
+from solver.continuation.arc_length import Arc
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
@@ -190,6 +191,15 @@ def first_point(case: Case, omega: float, amplitude: float, wear_depth: FloatArr
     assert isinstance(point, State)
     assert point is not None
     return point
+
+
+def crossings(arc: Arc, target: float, toward: float = 0.0) -> Iterator[State]:
+    """States at which a branch passes a value of its parameter, the start left out."""
+    for before, reached, _ in arc.steps(toward or float(np.sign(target - arc.start.parameter))):
+        if (reached.parameter - target) * (before.parameter - target) <= 0.0 and before.parameter != target:
+            found = arc.state_at(before, reached, target)
+            assert found is not None
+            yield found
 
 
 def converged_state(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
-from solver.structure import condensation, rough_forms
+from solver.structure import condensation
 from solver.structure.condensation import build_structure, relative_indices
 from solver.structure.fourier import change_orders, from_complex, to_complex
 from solver.structure.frequency_slope import frequency_slope
@@ -16,7 +16,6 @@ from tests.solver.models import MASS, OMEGA, STIFFNESS, cyclic_model, definite, 
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
 HARMONICS = 3
 ORDERS = (1, 2, 3)
-MANY = tuple(range(1, 14))
 AMPLITUDE = 60.0
 
 
@@ -202,46 +201,3 @@ def only_pairs(linear, n_contact):
     square = {name: getattr(linear, name)[:n, :n] for name in ("mass", "damping", "stiffness")}
     loads = {name: getattr(linear, name)[:n] for name in ("load_static", "load_harmonic")}
     return replace(linear, **square, **loads, response=linear.response[:, :n])
-
-
-def structure_of(linear):
-    structure = build_structure(replace(scene("dovetail_sector", 13, mesh=1), linear={0: linear}), 1319.5, 0.5, MANY)
-    assert isinstance(structure.moving, SharedStiffness)
-    return structure
-
-
-def error(structure):
-    """Largest error of a force over the largest force."""
-    motion = np.random.default_rng(1).normal(size=(structure.static_force.size, 2 * len(MANY) + 1))
-    exact = structure.apply(motion)
-    return float(np.abs(structure.apply_roughly(motion) - exact).max() / np.abs(exact).max())
-
-
-@pytest.mark.parametrize(("directions", "least", "most"), [(6, 1e-5, 1e-3), (48, 0.0, 1e-6)])
-def test_few_motions_carry_the_mass(monkeypatch, directions, least, most):
-    monkeypatch.setattr(condensation, "DENSE_BYTES", 0.0)
-    monkeypatch.setattr(rough_forms, "ROUGH_DIRECTIONS", directions)
-    # one of its own: forms are kept by structure
-    structure = structure_of(replace(scene("dovetail_sector", 13, mesh=1).linear[0]))
-    rough = structure.moving.rough
-    assert rough.each.size == 0
-    assert least <= error(structure) < most
-    # the mass matters at the highest harmonic
-    moving = replace(structure.moving)
-    # the cached value
-    vars(moving)["rough"] = rough._replace(core=0.0 * rough.core)
-    still = replace(structure, moving=moving)
-    assert error(still) > 10.0 * rough_forms.ROUGH
-
-
-def test_where_many_motions_are_damped_in_their_own_way_each_harmonic_has_its_matrix(monkeypatch):
-    monkeypatch.setattr(condensation, "DENSE_BYTES", 0.0)
-    monkeypatch.setattr(rough_forms, "ROUGH_DIRECTIONS", 4)
-    model = scene("dovetail_sector", 13, mesh=1)
-    relative = model.contact.dofs.ravel()
-    root = np.random.default_rng(2).normal(size=(relative.size, relative.size))
-    damping = np.array(model.linear[0].damping)
-    damping[np.ix_(relative, relative)] = root @ root.T * np.abs(damping).max() / relative.size
-    structure = structure_of(replace(model.linear[0], damping=damping))
-    assert structure.moving.rough.each.shape == (13, relative.size, relative.size)
-    assert error(structure) < 1e-6

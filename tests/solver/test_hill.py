@@ -1,12 +1,12 @@
 """Stability of states on all three branches of a mass at a wall; signs of determinants against dense ones."""
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from itertools import islice
 
 import numpy as np
 import pytest
 
-from solver.continuation.arc_length import Arc, follow_arc
+from solver.continuation.arc_length import Arc
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
 from solver.newton.bordering import Bordered, bordered_step
@@ -16,7 +16,7 @@ from solver.newton.run import Run
 from solver.settings import SolverSettings
 from solver.stability.hill import is_stable
 from solver.structure.joint import build_case
-from tests.solver.models import converged_state, random_balance, random_model, scene
+from tests.solver.models import converged_state, crossings, random_balance, random_model, scene
 
 FORCE = 0.02
 SETTINGS = SolverSettings(21, 256)
@@ -27,28 +27,18 @@ def balance_at(omega, history):
     return Balance(CASE.joint(omega, FORCE), history, np.zeros(1))
 
 
-@lru_cache
-def crossings():
-    """States of the branch from 1.55 rad/s through both folds back to 1.55 rad/s, that lie at 1.3 and 1.55 rad/s."""
+def three_states():
+    """States at 1.55 rad/s of the branch from there through both folds."""
     state = converged_state(CASE.model, 0.0, FORCE, 1.55, SETTINGS)
     start = balance_at(1.55, state.start_history)
     at = start.evaluate(start.predict(state.displacement_h, state.contact_force_h))
-    found: dict[float, list[State]] = {1.3: [], 1.55: []}
-    for target, seen in found.items():
-
-        def collect(point, seen=seen):
-            seen.append(point)
-            return len(seen) == 2
-
-        begin = State(at, state.start_history, 1.55)
-        follow_arc(Arc(balance_at, begin, 0.08, Run(1e-8)), target, collect, toward=1.0)
-    found[1.55].insert(0, State(at, state.start_history, 1.55))
-    return found
+    begin = State(at, state.start_history, 1.55)
+    return [begin, *islice(crossings(Arc(balance_at, begin, 0.08, Run(1e-8)), 1.55, 1.0), 2)]
 
 
 @pytest.mark.slow
 def test_the_branches_have_alternating_stability():
-    upper, middle, lower = crossings()[1.55]
+    upper, middle, lower = three_states()
     stable = [is_stable(balance_at(1.55, at.history), at.evaluation, Run(1e-8)) for at in (upper, middle, lower)]
     assert stable == [True, False, True]
     sizes = [np.abs(point.evaluation.displacement_h).max() for point in (upper, middle, lower)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.accuracy.resolved_state import ResolvedState
-from solver.continuation.homotopy import HarmonicHomotopy, add_harmonics, compliances
+from solver.continuation.homotopy import add_harmonics, harmonic_homotopy
 from solver.loading_history.start_states import follow_branch
 from solver.newton.run import Run
 from solver.outcome import Outcome
@@ -33,13 +33,12 @@ def test_the_homotopy_begins_at_the_state_and_ends_at_the_balance(which):
     case, omega, amplitude, point = states()[which]
     joint = replace(case, resolution=RICH).joint(omega, amplitude)
     new = np.arange(5, 9)
-    at = point.evaluation
-    homotopy = HarmonicHomotopy(joint, at.history, at.wear_depth, new, *compliances(joint, new))
+    homotopy_at = harmonic_homotopy(joint, point.evaluation, new)
     start = change_orders(point.evaluation.predicted_h, case.resolution.orders, RICH.orders)
-    assert homotopy.at(0.0, point.history).evaluate(start).scaled_residual() <= 2e-8
-    assert homotopy.at(1.0, point.history).joint.structure is joint.structure
-    nearly = homotopy.at(1.0 - 1e-9, point.history).evaluate(start).residual
-    whole = homotopy.at(1.0, point.history).evaluate(start).residual
+    assert homotopy_at(0.0, point.history).evaluate(start).scaled_residual() <= 2e-8
+    assert homotopy_at(1.0, point.history).joint.structure is joint.structure
+    nearly = homotopy_at(1.0 - 1e-9, point.history).evaluate(start).residual
+    whole = homotopy_at(1.0, point.history).evaluate(start).residual
     assert nearly == pytest.approx(whole, rel=1e-5, abs=1e-6 * np.abs(whole).max())
 
 

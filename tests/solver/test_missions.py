@@ -12,9 +12,8 @@ from scipy.linalg import expm
 from solver import Block, MissionHistory, Outcome, Passage, SolverSettings, integrate_mission, march_wear
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.harmonic_balance.state import Failure
-from solver.missions import solutions
-from solver.missions.block_run import BlockCase, BlockRun, run_block
-from solver.missions.block_start import Begun
+from solver.missions import integrate as integrating
+from solver.missions.block_run import Begun, BlockCase, BlockRun, run_block
 from solver.missions.blocks import Mission
 from solver.missions.course import MissionCourse
 from solver.missions.history import integrate_missions
@@ -25,7 +24,6 @@ from solver.missions.passage import (
     Swept,
     SweptState,
     find_states,
-    half_width,
     in_order,
     interval_errors,
     parts_of,
@@ -177,8 +175,8 @@ def slipping(begin):
 def begun_again(block, depth):
     """A block at an even depth by its own way, and as at the depth 0 before."""
     mission, pairs = Mission((block,), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
-    first, own = (run_block(BlockCase(mission, 0, at * pairs, None, SETTINGS)) for at in (0.0, depth))
-    return own, run_block(BlockCase(mission, 0, depth * pairs, None, SETTINGS, begun=first.begun))
+    first, own = (run_block(BlockCase(mission, 0, at * pairs, SETTINGS)) for at in (0.0, depth))
+    return own, run_block(BlockCase(mission, 0, depth * pairs, SETTINGS, begun=first.begun))
 
 
 @pytest.mark.slow
@@ -226,9 +224,9 @@ def pairs():
     return replace(one, contact=contact)
 
 
-def exact_run(case, like=None):
+def exact_run(case):
     """The wear of `dW/dn = r - L W` through a block; the reference solution wears a little more."""
-    rate, loss = RATES[case.place] * (1.0 if like is None else 1.001), LOSS[case.place]
+    rate, loss = RATES[case.place] * (1.0 if case.like is None else 1.001), LOSS[case.place]
     slope = expm(-case.block.steady[1] * loss) - np.eye(2)
     # `r - L W` lies in the range of L but for uniform wear
     values, vectors = np.linalg.eigh(loss)
@@ -237,7 +235,7 @@ def exact_run(case, like=None):
     growth = vectors @ (decay * (vectors.T @ (rate - loss @ case.depth)))
     response = np.array([[complex(depth.sum())] for depth in (case.depth, case.depth + growth)])
     slope = slope if case.with_slope else None
-    return BlockRun(Failure(Outcome.CONVERGED), growth, response, np.abs(response), slope, like=Like((), 1.0, 1))
+    return BlockRun(growth, response, np.abs(response), slope, like=Like((), 1.0, 1))
 
 
 @pytest.fixture
@@ -245,11 +243,11 @@ def exact_blocks(monkeypatch):
     """Blocks of exactly known wear; the list has an entry for each run."""
     computed: list[int] = []
 
-    def run(case, like=None):
+    def run(case):
         computed.append(1)
-        return exact_run(case, like)
+        return exact_run(case)
 
-    monkeypatch.setattr(solutions, "run_block", run)
+    monkeypatch.setattr(integrating, "run_block", run)
     return computed
 
 
@@ -285,16 +283,21 @@ def test_two_thousand_missions_agree_with_missions_one_by_one(exact_blocks, cycl
     assert many.missions[-1] == many.steps.sum() == many.last_mission == 2000
 
 
-def test_a_step_is_of_second_order_and_its_error_is_known(exact_blocks):
+def test_a_step_is_of_second_order_and_its_error_is_known(monkeypatch):
     """After exact missions 0, H and 2H: against missions one by one."""
     mission = known_blocks((0, 64))
-    nodes = list(MissionCourse.unworn(2, 2).nodes)
+    monkeypatch.setattr("solver.missions.step.allowed_error", lambda *_: 1e-16)
+    nodes = list(MissionCourse.unworn(mission).nodes)
 
-    def run(place, depth, carried, with_slope):
-        return exact_run(BlockCase(mission, place, depth, carried, SETTINGS, with_slope))
+    def run(depth, with_slope):
+        runs = []
+        for place in (0, 1):
+            runs.append(exact_run(BlockCase(mission, place, depth, SETTINGS, with_slope=with_slope)))
+            depth = depth + runs[-1].growth
+        return tuple(runs)
 
     def step(before, length):
-        taken = attempt_step(mission, tuple(before), length, run, lambda *_: 1e-16)
+        taken = attempt_step(tuple(before), length, mission.area, run, 1.0)
         assert isinstance(taken, Step)
         return taken
 
@@ -315,11 +318,13 @@ def test_a_step_is_of_second_order_and_its_error_is_known(exact_blocks):
 def test_an_interrupted_mission_goes_on_to_the_last_bit(exact_blocks):
     mission, kept = known_blocks((0, 100, 301), 3.0), list[Packed]()
     whole = integrate_missions(mission, keep=kept.append)
-    n_runs = len(exact_blocks)
+    left = len(exact_blocks)
     for place in (0, 1, 5, len(kept) // 2, len(kept) - 2, len(kept) - 1):
         exact_blocks.clear()
         assert equal(integrate_missions(mission, resume=kept[place]), whole)
-        assert len(exact_blocks) == n_runs - place - 1
+        assert len(exact_blocks) < left
+        left = len(exact_blocks)
+    assert left == 0
 
 
 def equal(one, other):
@@ -346,15 +351,15 @@ def test_a_target_ends_the_missions(exact_blocks):
 def test_a_block_that_fails_at_once_is_computed_in_shorter_steps(monkeypatch):
     """And one that fails in a single mission ends the history there, with what was computed."""
 
-    def run(case, like=None):
+    def run(case):
         nonlocal deepest
-        found, depth = exact_run(case, like), float(case.depth.max())
-        if depth > limit or (like is None and depth > deepest + 4e-8):
-            return replace(found, failure=Failure(Outcome.MARCH_FAILED, "lost"))
+        found, depth = exact_run(case), float(case.depth.max())
+        if depth > limit or (case.like is None and depth > deepest + 4e-8):
+            return Failure(Outcome.MARCH_FAILED, "lost")
         deepest = max(deepest, depth + float(found.growth.max()))
         return found
 
-    monkeypatch.setattr(solutions, "run_block", run)
+    monkeypatch.setattr(integrating, "run_block", run)
     limit, deepest = 1.0, 0.0
     history = exactly_known((0, 60), 1.0)
     assert history.outcome is Outcome.CONVERGED
@@ -392,7 +397,7 @@ def test_missions_of_the_slider_agree_with_missions_one_by_one_and_go_on_to_the_
     np.testing.assert_array_equal(many.excitation_frequency, [[160.0, 160.0], [150.0, 150.0]])
     # less load, less friction: the vibration grows
     assert (np.diff(np.abs(once.response_end[:, :, 0]), axis=0)[1:] > 0.0).all()
-    assert equal(integrate_missions(mission, resume=kept[-4]), many)
+    assert equal(integrate_missions(mission, resume=kept[-3]), many)
 
 
 @pytest.mark.slow
@@ -450,18 +455,10 @@ def test_frequencies_of_a_passage_wear_one_after_the_other(order):
     np.testing.assert_allclose(slope @ [0.1, 0.0], end(np.array([0.1, 0.0])) - end(np.zeros(2)) - [0.1, 0.0], rtol=1e-3)
 
 
-def test_the_half_power_width_is_that_of_the_damping():
-    """A linear oscillator of 100 Hz and damping ratio 0.01, and no peak at the edge of the range."""
-    at = np.linspace(90.0, 110.0, 401)
-    peak = 1.0 / np.abs(1.0 - (at / 100.0) ** 2 + 0.02j * at / 100.0)
-    assert half_width(at, peak) == pytest.approx(0.01 * 100.0, rel=0.03)
-    assert half_width(at[:150], peak[:150]) == 0.0
-
-
 def passing(passage, wear=WEAR, settings=SETTINGS):
     """A passage of the damped slider."""
     block = Block(scene("sdof_slider", damping=6.0), passage, 10.0, FRICTION)
-    return BlockCase(Mission((block,), wear, (0, 1), settings), 0, np.zeros(1), None, settings)
+    return BlockCase(Mission((block,), wear, (0, 1), settings), 0, np.zeros(1), settings)
 
 
 @pytest.mark.slow
@@ -476,7 +473,7 @@ def test_a_vibration_is_late_by_its_decay_time():
     assert fast.sweep_rate == pytest.approx(7.0 / (30.0 / (2.0 * np.pi)) ** 2)
     assert slow.sweep_rate == pytest.approx(0.01 * fast.sweep_rate)
     # as if the largest wear over frequency were missed, or added, over the lag
-    states = states_at(case(7.0), Passage(180.0, 220.0, 7.0), np.linspace(190.0, 210.0, 41))
+    states = states_at(case(7.0), np.linspace(190.0, 210.0, 41))
     assert isinstance(states, list)
     most = max(float(each.density[0]) for each in states)
     assert fast.growth_error - slow.growth_error == pytest.approx(6.93 / 30.0 * most / fast.growth[0], rel=0.02)
@@ -489,7 +486,7 @@ def test_a_passage_wears_as_a_fixed_grid_of_frequencies():
     mission = case.mission
     history = integrate(mission.blocks, 1)
     grid = np.linspace(185.0, 215.0, 33)
-    fixed = states_at(case, passage, grid)
+    fixed = states_at(case, grid)
     assert isinstance(fixed, list)
     volume = trapezoid([float(of.density @ mission.area) for of in fixed], grid)
     bar = float(interval_errors(fixed, mission.area).sum()) + history.error_estimate * history.worn_volume[-1]
@@ -506,9 +503,10 @@ def test_the_reference_of_a_passage_takes_its_resolutions_and_estimates_no_error
     fine = run_passage(case)
     assert fine.like is not None
     assert len({resolution for _, resolution in fine.like.resolutions}) > 1
-    reference = run_passage(case, fine.like)
+    as_reference = replace(case, like=fine.like)
+    reference = run_passage(as_reference)
     assert reference.iterations < fine.iterations
-    known, estimated = (states_at(case, case.block.frequency, np.array([200.0]), like) for like in (fine.like, None))
+    known, estimated = (states_at(of, np.array([200.0])) for of in (as_reference, case))
     assert known[0].start.response_error == known[0].start.wear_rate_error == 0.0
     assert estimated[0].start.response_error > 0.0
     assert estimated[0].start.wear_rate_error > 0.0
@@ -524,7 +522,7 @@ def test_stability_is_tested_in_the_first_mission_and_in_the_last(monkeypatch):
     def unstable(_case, _joint, _at, _budget, every=True):
         tested.append(every)
 
-    for place in ("loading_history.frequency_sweep", "missions.block_start"):
+    for place in ("loading_history.frequency_sweep", "missions.block_run"):
         monkeypatch.setattr(f"solver.{place}.find_instability", unstable)
     blocks = (Block(scene("sdof_slider"), 161.0, 10.0, FRICTION, 500.0),)
     history = integrate(blocks, 3, largest_step=1)
@@ -536,15 +534,14 @@ def test_stability_is_tested_in_the_first_mission_and_in_the_last(monkeypatch):
 def swept_with(monkeypatch, density, depth, near=()):
     """A passage from 1 to 2 Hz with given wear, m/Hz, of the frequency, at a depth before, m."""
 
-    def states(_case, _passage, frequencies, _like):
+    def states(_case, frequencies):
         return [state(at, density(at), response=1e-3) for at in frequencies]
 
     monkeypatch.setattr("solver.missions.passage.states_at", states)
     passage = Passage(1.0, 2.0, 1e-4)
     block = Block(scene("sdof_slider"), passage, 10.0, FRICTION, begin="up")
-    mission, begun = Mission((block,), WEAR, (0, 1), SETTINGS), Begun(None, near) if near else None
-    case = BlockCase(mission, 0, np.array([depth]), None, SETTINGS, begun=begun)
-    swept = find_states(case, passage, None)
+    mission, begun = Mission((block,), WEAR, (0, 1), SETTINGS), Begun(near) if near else None
+    swept = find_states(BlockCase(mission, 0, np.array([depth]), SETTINGS, begun=begun))
     assert isinstance(swept, Swept)
     return swept
 

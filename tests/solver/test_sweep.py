@@ -10,7 +10,7 @@ from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.frequency_sweep import FIRST_ITERATIONS, FrequencySweep
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import find_origin
+from solver.loading_history.sweep_start import cell_of, find_origin
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.results.history import StartState
@@ -105,7 +105,7 @@ def test_progress_beyond_a_frequency_is_not_used_for_it():
 def test_a_sweep_begins_away_from_its_points_and_from_resonances(sweep):
     model = dovetail()
     for frequency in np.linspace(100.0, 500.0, 41):
-        origin = find_origin(model, float(frequency), sweep)
+        origin = find_origin(model, cell_of(float(frequency)), sweep)
         for start in origin.starts[:2]:
             ratio = start / frequency
             assert 0.49 < ratio <= 0.7001 if sweep == "up" else 1.2999 <= ratio < 1.86
@@ -128,7 +128,7 @@ def test_a_joint_without_grip_ends_within_bounded_effort():
 
 def test_a_first_state_that_more_harmonics_refuse_begins_no_sweep(monkeypatch):
     monkeypatch.setattr(sweep_module.Sweep, "_choose_resolution", lambda _: 0.6)
-    nodes = FrequencySweep(scene("sdof_slider"), 0.3, 1.0, "up", AUTOMATIC).sweep_in_cell(100.0)
+    nodes = FrequencySweep(scene("sdof_slider"), 0.3, 1.0, "up", AUTOMATIC).sweep_to(100.0)
     assert nodes.here is None
     assert nodes.state.failure is Outcome.UNSETTLED
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.linalg import expm
 
 from solver.continuation import transient
-from solver.continuation.arc_length import Arc, follow_arc
-from solver.continuation.options import CONTINUATION
+from solver.continuation.arc_length import Arc
+from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.static_state import solve_static_state
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
@@ -21,7 +21,7 @@ from solver.stability.hill import is_stable
 from solver.structure.fourier import change_orders
 from solver.structure.joint import build_case
 from tests.references import coulomb_orbit, slider_orbit
-from tests.solver.models import converged_state, first_point, scene
+from tests.solver.models import converged_state, crossings, first_point, scene
 from tests.solver.reconstruction import full_motion
 from tests.solver.test_natural import WALL_OMEGA, wall
 
@@ -100,7 +100,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
 
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
     start = first(0.03)
-    middle = follow_arc(Arc(balance_at, start, 0.03, Run(1e-9)), 0.03, grows, 1.0).state
+    middle = next(filter(grows, crossings(Arc(balance_at, start, 0.03, Run(1e-9)), 0.03, 1.0)))
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
     found = relax_to_periodic(
@@ -151,13 +151,13 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch)
     idle = np.zeros(1)
     rest = first_point(case, 0.8 * NATURAL, 0.0, idle)
     outcomes = []
-    for most in (CONTINUATION.search_iterations, 10):
-        monkeypatch.setattr(transient, "CONTINUATION", replace(CONTINUATION, search_iterations=most))
+    for most in (transient.SEARCH_ITERATIONS, 10):
+        monkeypatch.setattr(transient, "SEARCH_ITERATIONS", most)
         budget = Budget()
         outcome = relax_to_periodic(
             case, joint, idle, rest.evaluation, quiet, rest.history, Run(case.settings.tolerance, budget)
         )
         outcomes.append(Outcome.CONVERGED if isinstance(outcome, State) else outcome)
         # one step and one search for the periodic state may be under way
-        assert budget.iterations <= most + CONTINUATION.near_iterations + CONTINUATION.near_iterations
+        assert budget.iterations <= most + 2 * NEAR_ITERATIONS
     assert outcomes == [Outcome.CONVERGED, Outcome.UNSETTLED]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.harmonic_balance.state import Failure
-from solver.missions import solutions
+from solver.missions import integrate
 from solver.missions.block_run import BlockRun
 from solver.missions.blocks import Passage
 from solver.outcome import Outcome
@@ -52,22 +52,22 @@ class FakedBlocks:
         self.fails: dict[str, Outcome] = {}
         self.disturb: Any = lambda _: None
         for name in ("run_block", "run_passage"):
-            monkeypatch.setattr(solutions, name, self.run)
+            monkeypatch.setattr(integrate, name, self.run)
 
-    def run(self, case: Any, like: Any = None) -> BlockRun:
+    def run(self, case: Any) -> BlockRun | Failure:
         """Wear with the rate k_w P A (1 - W / _DEPTH); the reference solution wears by 0.1 % more."""
         self.disturb(len(self.computed))
         self.computed.append(case)
         block, contact = case.block, case.block.model.contact
         cycles = block.frequency.cycles if isinstance(block.frequency, Passage) else block.cycles
         rate = case.mission.wear_coefficient * block.excitation_amplitude * load_of(block) * block.ends[1] * 1e-5
-        rate = rate * (1.0 if like is None else 1.001) * (1.0 - (case.depth + contact.gap) / _DEPTH)
+        rate = rate * (1.0 if case.like is None else 1.001) * (1.0 - (case.depth + contact.gap) / _DEPTH)
         response = 1e-6 * block.excitation_amplitude * (1.0 + case.depth.sum() + np.array([[0.0], [1.0]]))
-        ended = Failure(self.fails.get(block.name, Outcome.CONVERGED), "")
+        if block.name in self.fails:
+            return Failure(self.fails[block.name])
         slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
         return BlockRun(
-            ended, cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, like=Like((), 1.0, 1),
-            iterations=7,
+            cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, like=Like((), 1.0, 1), iterations=7
         )  # fmt: skip
 
 

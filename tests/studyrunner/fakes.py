@@ -55,9 +55,10 @@ def fake_sweep(task: Sweep) -> Iterator[StartResult]:
 
 def fake_history(task: History, facts: SceneFacts = FACTS, seconds: float = 0.0, place: int = 0) -> PointResult:
     """A history whose values tell which of the task it is."""
-    scaled = task.histories[place]
+    integrated, number = task.results[place]
+    scaled = integrated.histories[number]
     fingerprint = float(np.dot(task.start.arrays[0], [1.0, 0.1, 0.01, 1e-3, 1e-5, 1.0, 1.0]))
-    fingerprint += scaled.wear_coefficient * 1e9 + scaled.step * 1e-4 + 0.5 * (task.scheme == "implicit")
+    fingerprint += scaled.wear_coefficient * 1e9 + scaled.step * 1e-4 + 0.5 * (integrated.scheme == "implicit")
     pause = seconds * (fingerprint * 7.7 % 1.0) ** 2
     time.sleep(pause)
     sizes = {"contact": len(facts.area), "response": len(facts.response_names)}

@@ -140,7 +140,8 @@ def test_an_interrupted_study_goes_on_to_the_last_bit(study_file, blocks, monkey
         run(study_file, overrides=few)
     blocks.disturb = lambda _: None
     found = run(study_file, overrides=few)
-    assert len(blocks.computed) == n_whole
+    # the step of the interruption is computed again
+    assert n_whole <= len(blocks.computed) < 1.3 * n_whole
     xr.testing.assert_identical(without_time(found), without_time(whole))
 
 

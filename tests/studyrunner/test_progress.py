@@ -114,7 +114,9 @@ def test_a_run_that_has_to_compile_says_so_once(compiles, tmp_path, monkeypatch,
 
 
 def plan_of():
-    overrides = ("axes.frequency={start=1, stop=2, num=8}", "axes.step=[100, 1000]", "axes.sweep=['up', 'down']")
+    wear = "axes.wear_coefficient=[1e-12, 7e-12]"
+    steps = ("axes.step=1000", "axes.scheme=implicit")
+    overrides = ("axes.frequency={start=1, stop=2, num=8}", wear, *steps, "axes.sweep=['up', 'down']")
     return build_tasks(read_study("sdof_slider", overrides), 2)
 
 

@@ -112,7 +112,8 @@ def ended_at(last, at, outcome=Outcome.CERTIFICATE_FAILED):
 
 def test_what_was_computed_of_a_point_that_failed_is_kept():
     failed = ended_at(50.0, history([0.0, 40.0, 80.0, 1e5]))
-    result = build_result(history_task("slow_time.outputs=[0, 40, 80, 20000]"), failed)
+    task = history_task("slow_time.outputs=[0, 40, 80, 20000]")
+    result = build_result(task, task.integrated[0], failed)
     assert totals_of(result, "outcome", "last_cycle", "error_estimate") == [7, 50.0, 0.03]
     for name in set(USUAL) - {"wear_rate_error"}:
         values = result.values[name]
@@ -129,12 +130,12 @@ def test_loops_are_read_at_the_counts_of_a_point():
     task = history_task("slow_time.outputs=[10, 20]", "outputs.loops=[0]")
     assert task.loops == (0,)
     loops = np.arange(3 * 2 * 3.0).reshape(3, 1, 2, 3)
-    result = build_result(task, history([0.0, 10.0, 20.0], loops=loops))
+    result = build_result(task, task.integrated[0], history([0.0, 10.0, 20.0], loops=loops))
     assert np.array_equal(result.values["loop_displacement"], loops[1:])
     assert np.array_equal(result.values["loop_force"], -loops[1:])
-    failed = build_result(task, ended_at(10.0, history([0.0, 10.0, 20.0], loops=loops)))
+    failed = build_result(task, task.integrated[0], ended_at(10.0, history([0.0, 10.0, 20.0], loops=loops)))
     assert np.array_equal(failed.values["loop_force"][0], -loops[1])
     assert np.isnan(failed.values["loop_force"][1]).all()
     unworn = history_task("slow_time.outputs=[10, 20]", "outputs.loops=[0]", "axes.wear_coefficient=0")
-    at_rest = build_result(unworn, history([0.0], loops=loops[:1]))
+    at_rest = build_result(unworn, unworn.integrated[0], history([0.0], loops=loops[:1]))
     assert np.array_equal(at_rest.values["loop_force"], -loops[[0, 0]])

@@ -135,7 +135,9 @@ def test_rtol_shares_sweeps_where_nothing_uses_it(overrides, n_sweeps):
     assert len(plan.sweeps) == n_sweeps
     points = Counter(point for task in plan.results for point in points_of(task))
     assert len(points) == points.total() == plan.n_points
-    assert sum(item.n_points for item in plan.left_out) == plan.n_points - len(plan.results)
+    assert sum(item.n_points for item in plan.left_out) == plan.n_points - sum(
+        len(task.integrated) for task in plan.results
+    )
     assert any(item.reason.startswith("rtol") for item in plan.left_out) == (n_sweeps in (1, 5))
 
 
@@ -170,9 +172,9 @@ def shared_task(*overrides):
 
 def test_each_history_has_its_own_counts_and_rates_back():
     task = shared_task()
-    found = [build_result(task, history(COUNTS), place) for place in range(3)]
+    found = [build_result(task, task.integrated[0], history(COUNTS), place) for place in range(3)]
     assert [result.place for result in found] == [0, 1, 2]
-    assert [result.points for result in found] == [scaled.points for scaled in task.histories]
+    assert [result.points for result in found] == [scaled.points for scaled in task.integrated[0].histories]
     assert [{point[1] for point in result.points} for result in found] == [{1}, {2}, {0}]
     assert all(len(result.points) == 2 for result in found)
     assert [result.values["worn_volume"].tolist() for result in found] == [[0.0, 4.0], [0.0, 2.0], [0.0, 1.0]]
@@ -195,12 +197,13 @@ def test_each_history_has_its_own_counts_and_rates_back():
 def test_histories_of_a_march_that_ended_early_are_results_all_the_same(last, outcomes, lasts):
     """Cycles 0 and 10 of the histories are 0, 10; 0, 4; 0, 2 cycles of the march."""
     ended = replace(history(COUNTS, Outcome.MARCH_FAILED), last_cycle=last, message="at cycle 9")
-    found = [build_result(shared_task(), ended, place) for place in range(3)]
+    (task, (own,)) = (shared_task(), shared_task().integrated)
+    found = [build_result(task, own, ended, place) for place in range(3)]
     assert [result.outcome for result in found] == outcomes
     np.testing.assert_allclose([result.values["last_cycle"] for result in found], lasts)
     for place, result in enumerate(found):
         there = np.isfinite(result.values["worn_volume"]).tolist()
-        assert there == [True, last >= shared_task().counts(shared_task().histories[place])[-1]]
+        assert there == [True, last >= own.counts(task.cycles, own.histories[place])[-1]]
         assert result.values["error_estimate"] == pytest.approx(0.03 * result.values["worn_volume"][there][-1])
     # the message of the march counts its own cycles
     assert found[0].values["message"] == "at cycle 9"
@@ -221,7 +224,8 @@ def test_histories_of_a_march_that_ended_early_are_results_all_the_same(last, ou
 )
 def test_a_scaled_history_is_inaccurate_by_its_own_counts(first, ended, expected):
     found = replace(history(COUNTS, ended), inaccurate_from=first, inaccurate_in="wear rate", inaccurate_error=0.04)
-    results = [build_result(shared_task(), replace(found, message="of it"), place) for place in range(3)]
+    task = shared_task()
+    results = [build_result(task, task.integrated[0], replace(found, message="of it"), place) for place in range(3)]
     assert [result.outcome for result in results] == expected
     assert results[0].values["message"] == "of it"
     # 4 cycles of the integrated history are 10 of the second, 2 of them 10 of the third
