@@ -135,6 +135,11 @@ def known_to(error: float, rtol: float) -> str:
     return f"is known to {short if float(short) > 100.0 * rtol else f'{100.0 * error:.6g}'} % only"
 
 
+def in_digits(value: float, digits: int = 6) -> str:
+    """Text of a number with so many significant digits, without an exponent below 1e15: 2000 for "2e+03"."""
+    return f"{float(f'{value:.{digits}g}'):.15g}"
+
+
 def describe_error(error: Exception) -> str:
     """Text of an unexpected error with file and line of its origin, in one line for the result file."""
     last = traceback.extract_tb(error.__traceback__)[-1:]

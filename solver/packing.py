@@ -8,7 +8,7 @@ to the last bit therefore continues from the unpacked value itself.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -58,57 +58,44 @@ def unpack(packed: Packed) -> Any:
     return _rebuilt(json.loads(packed.text), packed.arrays)
 
 
+def in_rows(value: T) -> T:
+    """The value with all arrays stored by rows (C order), as `unpack` returns them."""
+    return cast("T", unpack(pack(value)))
+
+
 def _described(value: object, arrays: list[NDArray[np.generic]]) -> object:
-    """JSON of a value; its arrays are appended to `arrays`."""
-    if isinstance(value, Outcome):
-        return {"outcome": int(value)}
+    """JSON of a value, whose lists are pairs of a kind and its content; the arrays are appended to `arrays`."""
     # np.float64 is a float too, but a plain float divides by zero differently
-    if value is None or (isinstance(value, bool | int | float | str) and not isinstance(value, np.generic)):
-        return value
     if isinstance(value, np.ndarray | np.generic):
         arrays.append(np.array(value, order="C"))
-        return {"scalar" if isinstance(value, np.generic) else "array": len(arrays) - 1}
-    if isinstance(value, tuple | list):
-        kind = "tuple" if isinstance(value, tuple) else "list"
-        return {kind: [_described(item, arrays) for item in value]}
-    if isinstance(value, dict):
-        return {"dict": {key: _described(item, arrays) for key, item in value.items()}}
+        return ["scalar" if isinstance(value, np.generic) else "array", len(arrays) - 1]
+    if isinstance(value, Outcome):
+        return ["outcome", int(value)]
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
     name = type(value).__name__
+    if isinstance(value, tuple | list):
+        return [name, [_described(item, arrays) for item in value]]
+    if isinstance(value, dict):
+        return {key: _described(item, arrays) for key, item in value.items()}
     if is_dataclass(value) and _CLASSES.get(name) is type(value):
-        items = {field.name: _described(getattr(value, field.name), arrays) for field in fields(value)}
-        return {"class": name, "fields": items}
+        return [name, {field.name: _described(getattr(value, field.name), arrays) for field in fields(value)}]
     raise TypeError(f"{name} is not a value that can be packed")
 
 
-def _rebuilt(node: Any, arrays: tuple[NDArray[np.generic], ...]) -> object:
-    if not isinstance(node, dict):
+def _rebuilt(node: Any, arrays: tuple[NDArray[np.generic], ...]) -> Any:
+    if isinstance(node, dict):
+        return {key: _rebuilt(item, arrays) for key, item in node.items()}
+    if not isinstance(node, list):
         return node
-    if "class" in node:
-        items = {name: _rebuilt(item, arrays) for name, item in node["fields"].items()}
-        return _CLASSES[node["class"]](**items)
-    ((kind, content),) = node.items()
+    kind, content = node
     if kind == "array":
         return np.array(arrays[content], order="C")
     if kind == "scalar":
         return arrays[content][()]
     if kind == "outcome":
         return Outcome(content)
-    if kind == "tuple":
-        return tuple(_rebuilt(item, arrays) for item in content)
-    if kind == "list":
-        return [_rebuilt(item, arrays) for item in content]
-    if kind == "dict":
-        return {key: _rebuilt(item, arrays) for key, item in content.items()}
-    raise ValueError(f"unknown kind of value: {kind}")
-
-
-def in_rows(value: T) -> T:
-    """The value with all arrays stored by rows (C order), as `unpack` returns them."""
-    found: Any = value
-    if isinstance(value, np.ndarray):
-        found = np.array(value, order="C")
-    elif isinstance(value, tuple):
-        found = tuple(in_rows(item) for item in value)
-    elif is_dataclass(value) and not isinstance(value, type):
-        found = replace(value, **{field.name: in_rows(getattr(value, field.name)) for field in fields(value)})
-    return cast("T", found)
+    if kind in ("tuple", "list"):
+        items = [_rebuilt(item, arrays) for item in content]
+        return tuple(items) if kind == "tuple" else items
+    return _CLASSES[kind](**_rebuilt(content, arrays))

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from solver.model import FloatArray
 from solver.outcome import Outcome
 
 if TYPE_CHECKING:
@@ -64,10 +62,13 @@ NOT_IN_DATASETS = {"dataset": False}
 class Presented:
     """A result over one dimension.
 
-    OVER: attribute with the values of this dimension, and name of the dimension in a Dataset.
+    OVER: name of the attribute with the values of this dimension, and name of the dimension in a Dataset.
+    SHOWN: three attributes that the text shows. DRAWN: attributes that the picture shows, each on an axis of its own.
     """
 
     OVER: ClassVar[tuple[str, str]]
+    SHOWN: ClassVar[tuple[str, str, str]]
+    DRAWN: ClassVar[tuple[str, ...]]
 
     def to_xarray(self) -> xr.Dataset:
         """All values, named as here, in SI units; `outcome` as words. Responses stay complex."""
@@ -94,171 +95,87 @@ class Presented:
         return xr.Dataset(data, {over: (over, points, {"units": _OF_VALUES.get(name, ("", "1"))[1]})})
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draws the main value over the dimension, into new axes of matplotlib if none are given. Returns the axes."""
+        """Draws the main values over the dimension, into new axes of matplotlib if none are given. Returns the axes."""
         if axes is None:
             from matplotlib import pyplot
 
             axes = pyplot.subplots()[1]
-        self._draw(axes)
+        at = getattr(self, self.OVER[0])
+        order = np.argsort(at)
+        for number, name in enumerate(self.DRAWN):
+            panel, values = axes.twinx() if number else axes, np.abs(getattr(self, name))[order]
+            panel.plot(at[order], values, f"C{number}" if number else "", marker=".")
+            if name == "worn_volume":
+                error = getattr(self, f"{name}_error")[order] * values
+                panel.fill_between(at[order], values - error, values + error, alpha=0.2)
+            panel.set_ylabel(f"{name.replace('_', ' ')} in {_OF_VALUES.get(name, ('', '1'))[1]}")
+        axes.set_xlabel(self.OVER[1].replace("_", " "))
         axes.grid(alpha=0.3)
         return axes
 
     def __repr__(self) -> str:
-        """Five lines."""
-        (_, first), *rows = self._rows()
-        return "\n".join((f"{type(self).__name__}: {first}", *(f"  {label:<12} {text}" for label, text in rows)))
+        """Five lines: points and outcomes, the ranges of three values, a message."""
+        own: Any = self
+        points, outcomes = getattr(self, self.OVER[0]), own.outcome
+        ends, messages = (each if isinstance(each, tuple) else (each,) for each in (outcomes, own.message))
+        words = ", ".join(f"{number} {outcome}" for outcome, number in Counter(ends).items())
+        rows = [(name, _span(getattr(self, name), _OF_VALUES.get(name, ("", "1"))[1])) for name in self.SHOWN]
+        rows.append(("message", next((text for text in messages if text), "none")))
+        first = f"{type(self).__name__}: {self.OVER[1]} {_span(points, '')}: {words}"
+        return "\n".join((first, *(f"  {name:<18} {text}" for name, text in rows)))
 
-    def _rows(self) -> Sequence[tuple[str, str]]:
-        raise NotImplementedError
 
-    def _draw(self, axes: Axes) -> None:
-        raise NotImplementedError
+def _span(values: Any, unit: str) -> str:
+    """Smallest and largest magnitude."""
+    known = np.abs(values)[~np.isnan(values)]
+    if not known.size:
+        return "none"
+    lowest, highest = float(known.min()), float(known.max())
+    words = f"{lowest:.6g}" if lowest == highest else f"{lowest:.6g} to {highest:.6g}"
+    return words if unit in ("", "1") else f"{words} {unit}"
 
 
 class PresentedHistory(Presented):
     """A wear history or a mission history."""
 
-    def _rows(self) -> Sequence[tuple[str, str]]:
-        own: Any = self
-        name, over = self.OVER
-        missions = over == "mission"
-        known = np.flatnonzero(np.isfinite(own.worn_volume))
-        reached = own.last_mission if missions else own.last_cycle
-        n_pairs = own.wear_depth.shape[1]
-        pairs = f"{n_pairs} contact pair" + "s" * (n_pairs != 1)
-        first = f"{own.outcome}, {reached:g} of {getattr(self, name)[-1]:g} {name}, {pairs}"
-        computed = ("computed", f"{own.newton_iterations} Newton iterations, {own.run_time:.3g} CPU s")
-        last = ("message", own.message) if own.message else computed
-        if not known.size:
-            return [("", first), ("worn volume", "none"), ("deepest", "none"), ("response", "none"), last]
-        end = known[-1]
-        depth = own.wear_depth[end]
-        response = own.response_end[:, -1] if missions else own.response
-        largest = np.abs(response[[known[0], end]]).max(axis=1)
-        within = f"within {100.0 * own.worn_volume_error[end]:.2g} %"
-        return [
-            ("", first),
-            ("worn volume", f"{1e9 * own.worn_volume[end]:.4g} mm3, {within}"),
-            ("deepest", f"{1e6 * depth.max():.4g} um, contact pair {depth.argmax()}"),
-            ("response", f"{largest[0]:.4g} m at first, {largest[1]:.4g} m at last (first harmonic)"),
-            last,
-        ]
-
-    def _draw(self, axes: Axes) -> None:
-        own: Any = self
-        name, _ = self.OVER
-        counts, volume = getattr(self, name), 1e9 * own.worn_volume
-        error = own.worn_volume_error * volume
-        (line,) = axes.plot(counts, volume)
-        axes.fill_between(counts, volume - error, volume + error, color=line.get_color(), alpha=0.2, label="error")
-        axes.set(xlabel=name, ylabel="worn volume in mm3", title=str(own.outcome))
+    SHOWN = ("worn_volume", "worn_volume_error", "wear_depth")
+    DRAWN = ("worn_volume",)
 
 
-class PresentedPoints(Presented):
-    """Independent points, each with an outcome of its own: a frequency response or a nonlinear mode."""
-
-    def _outcomes(self) -> str:
-        own: Any = self
-        counts = Counter(own.outcome)
-        return ", ".join(f"{number} {outcome}" for outcome, number in counts.items())
-
-    def _message(self) -> tuple[str, str]:
-        own: Any = self
-        return ("message", next((text for text in own.message if text), "none"))
-
-
-class PresentedResponse(PresentedPoints):
-    """A frequency response."""
+class PresentedResponse(Presented):
+    """A frequency response; each point has an outcome of its own."""
 
     OVER = ("frequency", "frequency")
-
-    def _rows(self) -> Sequence[tuple[str, str]]:
-        own: Any = self
-        size = np.abs(own.response)
-        known = np.isfinite(size).any()
-        point, place = np.unravel_index(np.nanargmax(size), size.shape) if known else (0, 0)
-        largest = f"{size[point, place]:.4g} m at {own.frequency[point]:.6g} Hz, response {place} (first harmonic)"
-        return [
-            ("", f"{size.shape[0]} points, {_span(own.frequency)} Hz, {size.shape[1]} responses"),
-            ("outcome", self._outcomes()),
-            ("largest", largest if known else "none"),
-            ("error", f"within {100.0 * np.nanmax(own.response_error):.2g} %" if known else "unknown"),
-            self._message(),
-        ]
-
-    def _draw(self, axes: Axes) -> None:
-        own: Any = self
-        order = np.argsort(own.frequency)
-        lines = axes.plot(own.frequency[order], np.abs(own.response[order]), marker=".")
-        if len(lines) > 1:
-            axes.legend(lines, [f"response {place}" for place in range(len(lines))])
-        axes.set(xlabel="frequency in Hz", ylabel="response in m (first harmonic)")
+    SHOWN = ("response", "response_error", "fold_frequency")
+    DRAWN = ("response",)
 
 
 class PresentedCurve(Presented):
     """A response curve through folds, over its points."""
 
     OVER = ("point", "point")
+    SHOWN = ("frequency", "excitation_amplitude", "response")
+    DRAWN = ("response",)
 
-    def _rows(self) -> Sequence[tuple[str, str]]:
-        own: Any = self
-        size, unit = np.abs(own.response), "Hz" if own.parameter == "frequency" else "N"
-        values = getattr(own, own.parameter)
-        span = f"{values[0]:.6g} to {values[-1]:.6g} {unit}" if values.size else f"no state: {own.outcome}"
-        largest, stability = "none", Counter(own.stability)
-        if values.size:
-            point, place = np.unravel_index(np.argmax(size), size.shape)
-            largest = f"{size[point, place]:.4g} m at {values[point]:.6g} {unit}, response {place} (first harmonic)"
-        return [
-            ("", f"{values.size} points, {span}, {np.count_nonzero(own.is_fold)} folds, {size.shape[1]} responses"),
-            ("outcome", str(own.outcome)),
-            ("largest", largest),
-            ("stability", ", ".join(f"{number} {kind}" for kind, number in stability.items()) or "unknown"),
-            ("message", own.message or "none"),
-        ]
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draws the responses over what varies along the curve, solid where they are stable. Returns the axes."""
+        if axes is None:
+            from matplotlib import pyplot
 
-    def _draw(self, axes: Axes) -> None:
+            axes = pyplot.subplots()[1]
         own: Any = self
         values, size = getattr(own, own.parameter), np.abs(own.response)
         stable = np.array(own.stability) == "stable"
         for place in range(size.shape[1]):
-            (line,) = axes.plot(values, size[:, place], ":", label=f"response {place}")
+            (line,) = axes.plot(values, size[:, place], ":")
             axes.plot(values, np.where(stable, size[:, place], np.nan), color=line.get_color())
-        axes.set(
-            xlabel="frequency in Hz" if own.parameter == "frequency" else "excitation amplitude in N",
-            ylabel="response in m (first harmonic)",
-            title="solid where stable",
-        )
+        axes.set(xlabel=f"{own.parameter.replace('_', ' ')} in {_OF_VALUES[own.parameter][1]}", ylabel="response in m")
+        return axes
 
 
-class PresentedMode(PresentedPoints):
-    """A nonlinear mode over its amplitude."""
+class PresentedMode(Presented):
+    """A nonlinear mode over its amplitude; each point has an outcome of its own."""
 
     OVER = ("amplitude", "modal_amplitude")
-
-    def _rows(self) -> Sequence[tuple[str, str]]:
-        own: Any = self
-        known = np.isfinite(own.frequency)
-        errors = (np.max(own.frequency_error[known], initial=0.0), np.max(own.damping_error[known], initial=0.0))
-        return [
-            ("", f"{known.size} points, {_span(own.amplitude)} m sqrt(kg), {self._outcomes()}"),
-            ("frequency", f"{_span(own.frequency[known])} Hz" if known.any() else "none"),
-            ("damping", f"{_span(100.0 * own.damping_ratio[known])} %" if known.any() else "none"),
-            ("error", f"within {errors[0]:.2g} Hz, {100.0 * errors[1]:.2g} % of critical damping"),
-            self._message(),
-        ]
-
-    def _draw(self, axes: Axes) -> None:
-        own: Any = self
-        order = np.argsort(own.amplitude)
-        amplitude, other = own.amplitude[order], axes.twinx()
-        axes.plot(amplitude, own.frequency[order], "C0", marker=".")
-        other.plot(amplitude, 100.0 * own.damping_ratio[order], "C1", marker=".")
-        axes.set_xlabel("modal amplitude in m sqrt(kg)")
-        axes.set_ylabel("natural frequency in Hz", color="C0")
-        other.set_ylabel("damping ratio in %", color="C1")
-
-
-def _span(values: FloatArray) -> str:
-    lowest, highest = float(values.min()), float(values.max())
-    return f"{lowest:.6g}" if lowest == highest else f"{lowest:.6g} to {highest:.6g}"
+    SHOWN = ("frequency", "damping_ratio", "damping_error")
+    DRAWN = ("frequency", "damping_ratio")

@@ -44,7 +44,7 @@ class WearTarget:
     """Wear at which a history ends.
 
     - quantity: "wear_depth" of the deepest pair, m; "worn_volume" of all pairs, m3; or "frequency_shift", the relative
-      change of the resonance of the vibration (`results.resonance`), up or down.
+      change of the resonance of the vibration (`results.state_report`), up or down.
     - value: above 0.
     """
 

@@ -12,10 +12,9 @@ from studies.scenes import BUNDLED, scene_parameters
 
 _PAGE = """# Bundled scenes
 
-The bundled scenes with their parameters, which are keys of `[scene]` in a study file: name, default, meaning, unit. A
-study may also name [a scene file or a finite-element model](OWN_MODEL.md). `run-study --scene-help dovetail_sector`
-prints one section; `python -m studies.scene_help` prints this page. `contact_stiffness` is explained in
-[rough joints](ROUGH_JOINTS.md)."""
+The keys in each section are keys of `[scene]` in a study file; `run-study --scene-help dovetail_sector` prints what each of
+them means, and its unit. A study may also name [a scene file or a finite-element model](OWN_MODEL.md).
+`contact_stiffness` is explained in [rough joints](ROUGH_JOINTS.md), `python -m studies.scene_help` prints this page."""
 
 
 def scene_help(model: str) -> str:
@@ -23,22 +22,38 @@ def scene_help(model: str) -> str:
 
     Raises SceneError where no bundled scene has this name.
     """
-    parameters = scene_parameters(model)
-    whole = inspect.getdoc(sys.modules[f"studies.scenes.{model}"]) or ""
-    lines = [f"## `{model}`", "", whole, "", inspect.getdoc(parameters) or "", ""]
-    for name, field in parameters.model_fields.items():
-        default = "" if field.default is None else f" = {_shown(field.default)}"
-        lines.append(f"- `{name}{default}`: {str(field.description).removesuffix(', 1').removesuffix(', -')}")
+    lines = [*_head(model), inspect.getdoc(scene_parameters(model)) or "", ""]
+    for key, meaning in _keys(model):
+        lines.append(f"- `{key}`: {meaning.removesuffix(', 1').removesuffix(', -')}")
     return "\n".join(lines)
-
-
-def _shown(default: object) -> str:
-    return f"{default:g}" if isinstance(default, float) else str(default).lower()
 
 
 def all_scenes() -> str:
     """The page of all bundled scenes, Markdown."""
-    return "\n\n".join([_PAGE, *(scene_help(model) for model in BUNDLED)]) + "\n"
+    sections = (
+        "\n".join([*_head(model), ", ".join(f"`{key.replace(' ', '')}`" for key, _ in _keys(model))])
+        for model in BUNDLED
+    )
+    return "\n\n".join([_PAGE, *sections]) + "\n"
+
+
+def _head(model: str) -> list[str]:
+    """Title and description."""
+    scene_parameters(model)  # imports the scene
+    return [f"## `{model}`", "", inspect.getdoc(sys.modules[f"studies.scenes.{model}"]) or "", ""]
+
+
+def _keys(model: str) -> list[tuple[str, str]]:
+    """Each key with its default, and its meaning."""
+    fields = scene_parameters(model).model_fields.items()
+    return [
+        (name + ("" if field.default is None else f" = {_shown(field.default)}"), str(field.description))
+        for name, field in fields
+    ]
+
+
+def _shown(default: object) -> str:
+    return f"{default:g}" if isinstance(default, float) else str(default).lower()
 
 
 if __name__ == "__main__":

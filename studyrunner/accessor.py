@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.result.grid import find_grid
+from studyrunner.result.opening import ENDED, outcome_words
 from studyrunner.statistics.study_statistics import worn_volume_statistics
 from studyrunner.study.toml_text import read_toml
 from studyrunner.summary.answer import Summary, summary
@@ -94,11 +95,7 @@ class FretwearAccessor:
 
     def outcomes(self) -> xr.DataArray:
         """How each point ended, as a word of `flag_meanings`; the sentence of each word is in `outcome.sentences`."""
-        outcome = self._dataset["outcome"]
-        numbers = np.atleast_1d(outcome.attrs["flag_values"]).tolist()
-        words = dict(zip(numbers, outcome.attrs["flag_meanings"].split(), strict=True))
-        named = [words.get(number, f"outcome_{number}") for number in outcome.values.ravel().tolist()]
-        return outcome.copy(data=np.array(named).reshape(outcome.shape)).drop_attrs(deep=False)
+        return outcome_words(self._dataset["outcome"])
 
     def loop(self, contact: int) -> xr.Dataset:
         """Relative displacement and contact force of a pair through a period, closed: the first phase again at 2 pi.
@@ -133,6 +130,8 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
     """
     if not datasets:
         raise ValueError("There are no results to join.")
+    in_words = all(ENDED in dataset.coords for dataset in datasets)
+    datasets = [dataset.drop_vars(ENDED, errors="ignore") for dataset in datasets]
     if dim is not None:
         datasets = [_with_axis(dataset, dim) for dataset in datasets]
     elif len({dataset.attrs.get("scene_sha256") for dataset in datasets}) > 1:
@@ -166,7 +165,7 @@ def join_results(datasets: Sequence[xr.Dataset], dim: str | None = None) -> xr.D
     common = {key: text for key, text in first.attrs.items() if all(one.attrs.get(key) == text for one in datasets)}
     history = [f"joined of {len(datasets)} results", *dict.fromkeys(str(one.attrs.get("history")) for one in datasets)]
     joined.attrs = {**common, "history": "\n".join(history)}
-    return joined
+    return joined.assign_coords({ENDED: outcome_words(joined["outcome"])}) if in_words else joined
 
 
 def _gap(name: str, array: xr.DataArray) -> Any:

@@ -180,8 +180,8 @@ def _show_plan(study: Study) -> int:
     before = largest_memory()
     planned = plan_scenes(study, _SlowSteps().say)
     built_with = largest_memory() - before
-    contacts = contact_changes(study, planned.scenes, [planned.facts[number] for number in planned.nearest])
-    plan = build_tasks(study, planned.n_displacements, contacts, planned.scenes)
+    contacts = contact_changes(study, planned.scenes, planned.facts)
+    plan = build_tasks(study, [each.n_displacements for each in planned.facts], contacts, planned.scenes)
     seconds = time.process_time() + planned.seconds_left
     lines = [format_plan(study, planned.largest, plan, built_with, seconds, planned.describe())]
     said = *remarks_of_study(study), *(("note", doubt) for doubt in doubts_of_study(study, planned.largest))
@@ -232,15 +232,14 @@ def _compute(ranks: Ranks, study: Study, options: Options) -> int:
         raise KeyboardInterrupt(ended.summary.describe_end(path, "the same command")) from None
     failed = summary.n_points - summary.n_complete
     counts = f"{count(summary.n_points, 'point')}, {summary.n_complete} computed, {failed} failed"
-    print(f"{path}: {counts}, {format_seconds(display.seconds)}", *_answer(study, target.path), sep="\n", flush=True)
+    print(f"{path}: {counts}, {format_seconds(display.seconds)}", *_answer(target.path), sep="\n", flush=True)
     return SOME_FAILED if failed else CONVERGED
 
 
-def _answer(study: Study, path: Path) -> tuple[str, ...]:
+def _answer(path: Path) -> tuple[str, ...]:
     """What came out, in lines, read from the result."""
     # where they are used: they take a second to load
     from studyrunner.result.opening import open_result
-    from studyrunner.study.room_for_wear import describe_room
     from studyrunner.summary.answer import summary
     from studyrunner.summary.lines import summary_lines
 
@@ -250,5 +249,4 @@ def _answer(study: Study, path: Path) -> tuple[str, ...]:
     except UserError as error:
         # the result is there all the same, but larger than what is read
         return (f"no summary: {error}",)
-    room = any(failure.word == "contact_cut_off" for failure in found.failures) and describe_room(study)
-    return (*summary_lines(found), *([f"{'':<12}{room}"] if room else []))
+    return tuple(summary_lines(found))

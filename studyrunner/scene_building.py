@@ -98,34 +98,36 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
     """
     scenes = find_scenes(study)
     seeing = ranks_that_see(ranks, new_partial(store.path))
-    if len(scenes.studies) > 1:
-        building = _Building(scenes, store, say)
-        serve_tasks(ranks, building, build_scene_task)
-        store.flush()
-        built = [building.found[number] for number in range(len(scenes.studies))]
-        with keys_as_given(study.scene_axes):
+    kept, notes = None, tuple[str, ...]()
+    with keys_as_given(study.scene_axes):
+        if len(scenes.studies) > 1:
+            building = _Building(scenes, store, say)
+            serve_tasks(ranks, building, build_scene_task)
+            store.flush()
+            built = [building.found[number] for number in range(len(scenes.studies))]
             for each in built:
                 if each.error is not None:
                     raise each.error
-        facts = tuple(each.facts for each in built if each.facts is not None)
-        variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
-        models = SceneModels(lambda number: _read(scenes.studies[number], store), seeing, store.path)
-        scenes = at_ratios(scenes, dict(enumerate(facts)))
-        return Scenes(scenes, facts, (*variables, *exact_answers(study)), None, notes, models)
-    one = scenes.studies[0] if study.mission else study
-    with keys_as_given(study.scene_axes):
-        model = build_study_scene(one, say, store)
-    if "natural_frequency" in study.scene_variables:
-        say("finding the natural frequencies of the scene")
-    variables, facts_of_one = (*build_scene_variables(one, model, store), *exact_answers(study)), describe_scene(model)
-    models = SceneModels(lambda _: model, seeing, store.path)
-    return Scenes(
-        at_ratios(scenes, {0: facts_of_one}), (facts_of_one,), variables, scene_to_keep(one, model), (), models
-    )
+            facts = tuple(each.facts for each in built if each.facts is not None)
+            variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
 
+            def read(number: int) -> ReducedModel:
+                one = scenes.studies[number]
+                return read_model(one, harmonics_to_build(one), store)
 
-def _read(study: Study, store: Store) -> ReducedModel:
-    return read_model(study, harmonics_to_build(study), store)
+        else:
+            one = scenes.studies[0] if study.mission else study
+            model = build_study_scene(one, say, store)
+            if "natural_frequency" in study.scene_variables:
+                say("finding the natural frequencies of the scene")
+            facts, variables = (describe_scene(model),), build_scene_variables(one, model, store)
+            kept = scene_to_keep(one, model)
+
+            def read(number: int) -> ReducedModel:  # noqa: ARG001
+                return model
+
+    models = SceneModels(read, seeing, store.path)
+    return Scenes(at_ratios(scenes, facts), facts, (*variables, *exact_answers(study)), kept, notes, models)
 
 
 class _Building(Office[SceneTask, SceneBuilt]):

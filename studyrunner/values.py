@@ -9,7 +9,7 @@ import decimal
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from fractions import Fraction as Rational
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar, cast
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -19,7 +19,6 @@ T = TypeVar("T", bound=Hashable)
 
 LONGEST_AXIS = 100_000
 """Values of an axis: the effective study, which lists them, is to be read again."""
-
 
 _LARGEST_WHOLE = 2.0**53
 
@@ -61,12 +60,13 @@ def listed(value: object) -> Sequence[Any]:
 
 def once(values: Iterable[T]) -> tuple[T, ...]:
     """The values in their order. Raises WrongValueError where one of them comes twice."""
-    seen: dict[T, None] = {}
-    for value in values:
+    seen: set[T] = set()
+    kept = tuple(values)
+    for value in kept:
         if value in seen:
             raise WrongValueError(value, "give every value once")
-        seen[value] = None
-    return tuple(seen)
+        seen.add(value)
+    return kept
 
 
 def ascending(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -76,17 +76,15 @@ def ascending(values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-def spread(value: object) -> tuple[object, ...]:
-    """The values of an axis: one, a list of them or {start, stop, num}."""
+def spread(value: object) -> tuple[Any, ...]:
+    """The values of an axis: one, a list of them or {start, stop, num}. Raises ValueError."""
     if isinstance(value, dict):
         if value.keys() - {"spacing"} != {"start", "stop", "num"}:
             raise ValueError("give a number, a list or {start, stop, num}")
         return Range.model_validate(value).values
-    if not isinstance(value, list | tuple):
-        return (value,)
-    if not value:
+    if isinstance(value, list | tuple) and not value:
         raise ValueError("give at least one value")
-    return tuple(value)
+    return tuple(listed(value))
 
 
 Positive = Annotated[float, Field(gt=0)]
@@ -147,8 +145,8 @@ def read_axis(value: object) -> tuple[Any, ...]:
     for each in values:
         if not isinstance(each, bool | int | float | str):
             raise WrongValueError(each, "give a number, true, false or a name, a list of them or {start, stop, num}")
-    if isinstance(value, dict) and all(isinstance(value[key], int) for key in ("start", "stop")):
-        values = tuple(int(each) if each == int(each) else each for each in cast("tuple[float, ...]", values))
+    if isinstance(value, dict) and isinstance(value["start"], int) and isinstance(value["stop"], int):
+        values = tuple(int(each) if each == int(each) else each for each in values)
     if len(values) > LONGEST_AXIS:
         raise WrongValueError(len(values), f"give at most {LONGEST_AXIS} values")
     return once(values)

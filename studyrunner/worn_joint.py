@@ -15,7 +15,7 @@ import xarray as xr
 
 from studyrunner.api import run_study
 from studyrunner.result.scene_pairs import depths, pairs_of_scene, tells_depth
-from studyrunner.result.view import Result, open_for_report
+from studyrunner.result.view import NO_VOLUME, Result, open_for_report
 from studyrunner.statistics.samples import DRAWN
 from studyrunner.study.sections import AxesSection, WearSection
 from studyrunner.study.study_file import read_study
@@ -27,6 +27,13 @@ _HOW = (
     "Computed again from the wear depths of the file: the joint is mounted worn, and the sweep leads to the frequency;"
     " its friction forces at the start are not those at the end of the wear history"
 )
+
+
+def has_worn_response(result: Result) -> bool:
+    """Whether a result is one of wear histories, of which something is worn, over frequencies or at the resonance."""
+    several = "frequency" in result.varying or "frequency_ratio" in result.varying or bool(result.followed)
+    needed = result.has("worn_volume", "response_amplitude") and result.blocks is None and not result.has_modes
+    return needed and several and bool(np.nanmax(result.worn, initial=0.0) > NO_VOLUME)
 
 
 def compute_worn_joint(
@@ -84,9 +91,10 @@ def compute_worn_joint(
             elif len(frequencies) == 1:
                 remedy = "give a result with several frequencies: this one has a single point of a curve"
                 raise UserError(str(path), "axes.frequency", frequencies[0], remedy)
-            if not result.followed:
+            if "frequency" in result.varying:
+                # the curve of the new joint is in the file
                 given["scene.worn"] = _depths(result, shown, last, only_last=True)
-            asked = {**given, "axes.frequency": frequencies}
+            asked = {**given, "axes.frequency_ratio": None, "axes.frequency": frequencies}
             asked["outputs.variables"] = ["response_amplitude", "response_error"]
             states = _run(result, asked, folder / "worn_joint_response.nc", progress)
             found["response"] = states[["response_amplitude", "response_error"]].transpose("cycle", "frequency", ...)

@@ -1,21 +1,19 @@
 """The certificate of a state: by how much the reported motion and force violate the equations of the problem.
 
 The numbers are computed from the reported state alone, not from the iteration that found the state. The samples of a
-period obey the contact law by construction. The Fourier series through these samples obeys the law except for the
-harmonics that are cut off. Each number measures what the samples and the series together can still get wrong:
+period obey the contact law by construction, their Fourier series only up to the harmonics that are cut off. Each number
+measures what samples and series together can still get wrong:
 
 - residual: equilibrium of the reported motion and force, the mean forces (static harmonic) included.
-- penetration: of the series of the motion, which is what a user plots, also between the samples. Relative to the
-  largest vibration (relative motion without its mean) in the joint, so that a large mean closing hides nothing. The
-  penetration falls as harmonics are added.
+- penetration: of the series of the motion, also between the samples, over the largest vibration (motion without its
+  mean) in the joint, so that a large mean closing hides nothing.
 - tension, cone_violation: of the samples, and of the Fejer mean of the series, which is the mean of its truncations.
   The Fejer kernel is positive and the friction cone is convex: the Fejer mean of any force that obeys the law lies in
   the cone, too. So the overshoot of a truncated rigid friction force, 18 % of its limit for any number of harmonics, is
-  no violation. Coefficients that no admissible force has are a violation.
+  no violation.
 - energy_error: work of the excitation on the joint, minus the work of the damping, minus the friction work of the slip
-  as it wears. The cut off harmonics do no work, so this is the error of the sampling. Relative to the largest of these
-  works and of the two following, each times a loss factor of 1e-3, which no structure notices: the elastic work, and
-  the work that the excitation could do at most.
+  as it wears: the error of the sampling. Relative to the largest of these works and of the two following, each times
+  `SMALL_WORK`: the elastic work, and the work that the excitation could do at most.
 - periodicity_error: change of the slip over a period.
 
 Largest values measured on good states (0 stands for below 1e-12):
@@ -28,10 +26,10 @@ Largest values measured on good states (0 stands for below 1e-12):
 | coarse dovetail, 2 N, lifting | 3, 5 | 2e-2, 1e-2 | 0 | 0 | 5e-4, 1e-4 | 8e-7 |
 | dovetail, 0.5 N, 209.5 to 211.5 Hz | 1 to 13 | 0 | 0 | 0 | 1e-4 | 1e-10 |
 
-All of these states hold within the limits of `VIOLATION_LIMITS`, except vibro-impact from 1.1 rad/s on with one
-harmonic, which is far off. The certificate does not measure the truncation error, see `solver.accuracy.refinement`.
-Tested faults that the certificate finds: a force 1e-5 off, a harmonic left out, friction that drives, a friction
-coefficient 10 % too large (15 % too small), slip that does not repeat by 2 % of the friction limit.
+All of these states hold within `VIOLATION_LIMITS`, except vibro-impact from 1.1 rad/s on with one harmonic, which is
+far off. The certificate does not measure the truncation error, see `solver.accuracy.refinement`. Tested faults that the
+certificate finds: a force 1e-5 off, a harmonic left out, friction that drives, a friction coefficient 10 % too large
+(15 % too small), slip that does not repeat by 2 % of the friction limit.
 """
 
 from __future__ import annotations
@@ -55,8 +53,8 @@ VIOLATION_LIMITS = {
     "energy_error": 0.05,
     "periodicity_error": 1e-3,
 }
-"""Limits of the violations; response and wear rate have error estimates instead. Largest ones of good states: see
-above, and friction 0.018 above its limit in a joint with five harmonics at fifty times its load."""
+"""Limits of the violations. Largest ones of good states: see above, and friction 0.018 above its limit in a joint with
+five harmonics at fifty times its load."""
 
 SMALL_WORK = 1e-3
 """Fraction of a larger work to which the error of a smaller one is relative. Slip work over the work of the excitation;
@@ -67,7 +65,7 @@ too small to influence any structure)."""
 @packable
 @dataclass(frozen=True)
 class Certificate:
-    """Violations of one state, all dimensionless; 0 is perfect. `failures` judges the first six.
+    """Violations of one state, all dimensionless; 0 is perfect. The first six have limits.
 
     residual: scaled residual of the equilibrium.
     penetration: over the largest relative motion.
@@ -98,28 +96,15 @@ class Certificate:
         }
 
     def holds(self, tolerance: float) -> bool:
-        """Whether equilibrium, contact law, energy and closure hold within their limits."""
+        """Whether equilibrium, contact law, energy and periodicity hold within their limits."""
         return not self.failures(tolerance)
 
     def sentence(self, tolerance: float) -> str:
         """The violations above their limits, with their values, in words for the user."""
-        failed = self.failures(tolerance)
-        if not failed:
-            return "The state obeys equilibrium, contact law and energy balance."
+        failed = self.failures(tolerance).items()
         return "; ".join(
-            f"{_MEANING[name]} {value:.2g}, more than {limit:.2g}" for name, (value, limit) in failed.items()
+            f"{name.replace('_', ' ')} {value:.2g}, more than {limit:.2g}" for name, (value, limit) in failed
         )
-
-
-_MEANING = {
-    "residual": "the scaled residual of the equilibrium is",
-    "penetration": "the surfaces penetrate each other by, as a fraction of the largest relative motion,",
-    "tension": "the contact pulls by, as a fraction of the largest normal force,",
-    "cone_violation": "friction exceeds its limit by, as a fraction of the largest limit,",
-    "energy_error": "the energy of a period is out of balance by, as a fraction of the work done,",
-    "periodicity_error": "the slip does not repeat from period to period: it drifts by, as a fraction of the force that"
-    " drives it,",
-}
 
 
 NOT_CERTIFIED = Certificate(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
@@ -128,23 +113,26 @@ NOT_CERTIFIED = Certificate(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan)
 
 def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
     """Certificate of an evaluated state, without truncation errors and stability, which need other states."""
-    force_t = evaluation.force_t
-    friction = joint.friction_coefficient
+    force_t, friction, law = evaluation.force_t, joint.friction_coefficient, joint.law
     largest = force_t[:, 0].max(axis=1, initial=0.0)
     normal = float(largest.max(initial=0.0))
     # without friction there is no limit to compare with: any tangential force is too much
     limit = float(friction_limit(friction, largest).max(initial=0.0)) if friction.any() else normal
-    drive = max(limit, joint.law.driving_force(evaluation))
-    smooth_t = _fejer_mean(joint, evaluation.force_h)
-    both = np.concatenate([force_t, smooth_t], axis=2)
+    both = np.concatenate([force_t, _fejer_mean(joint, evaluation.force_h)], axis=2)
     excess = np.hypot(both[:, 1], both[:, 2]) - friction_limit(friction[:, None], both[:, 0])
+    changed = law.change_force(evaluation)[largest > 0.0]
+    # motion (n_contact, 3, m), m, that the contact forces cause by the stiffness of the pairs alone
+    flexed = joint.to_pairs(joint.to_relative(law.motion(evaluation.force_h)))
     return Certificate(
         residual=_residual(joint, evaluation),
-        penetration=_penetration(joint, evaluation),
+        penetration=_penetration(joint, evaluation, flexed),
         tension=_relative(float((-both[:, 0]).max(initial=0.0)), normal),
         cone_violation=_relative(float(excess.max(initial=0.0)), limit),
-        energy_error=_energy_error(joint, evaluation),
-        periodicity_error=_relative(_periodicity_error(joint, evaluation), drive),
+        energy_error=_energy_error(joint, evaluation, flexed),
+        periodicity_error=_relative(
+            max(evaluation.periodicity_error, float(changed.max(initial=0.0))),
+            max(limit, law.driving_force(evaluation)),
+        ),
     )
 
 
@@ -180,29 +168,17 @@ def _residual(joint: Joint, evaluation: Evaluation) -> float:
     return max(evaluation.scaled_residual(), replace(evaluation, residual=left).scaled_residual(), hidden)
 
 
-def _vibrating(values_h: FloatArray) -> FloatArray:
-    """The series without its mean."""
-    moving = values_h.copy()
-    moving[..., 0] = 0.0
-    return moving
-
-
-def _flexed(joint: Joint, force_h: FloatArray) -> FloatArray:
-    """Motion (n_contact, 3, m), m, that the contact forces cause by the stiffness of the pairs alone."""
-    return joint.to_pairs(joint.to_relative(joint.law.motion(force_h)))
-
-
-def _penetration(joint: Joint, evaluation: Evaluation) -> float:
+def _penetration(joint: Joint, evaluation: Evaluation, flexed: FloatArray) -> float:
     """Largest penetration over the largest vibration: the relative one, or the elastic one by the contact forces."""
     closing = evaluation.displacement_h[:, 0].copy()
     closing[:, 0] -= joint.contact.gap + evaluation.wear_depth
     depth = _series(joint, closing[joint.contact.has_normal])
-    moved = np.linalg.norm(_series(joint, _vibrating(evaluation.displacement_h)), axis=1)
-    flexed = _flexed(joint, evaluation.force_h)
-    elastic = np.linalg.norm(_series(joint, _vibrating(flexed)), axis=1)
-    still = NEGLIGIBLE * np.abs(flexed[..., 0])  # as in `_amplitude`
-    size = max(float(part.max(initial=0.0)) for part in (moved, elastic, still))
-    return _relative(float(depth.max(initial=0.0)), size)
+    sizes = [NEGLIGIBLE * np.abs(flexed[..., 0])]  # as in `_amplitude`
+    for values_h in (evaluation.displacement_h, flexed):
+        vibrating = values_h.copy()
+        vibrating[..., 0] = 0.0
+        sizes.append(np.linalg.norm(_series(joint, vibrating), axis=1))
+    return _relative(float(depth.max(initial=0.0)), max(float(each.max(initial=0.0)) for each in sizes))
 
 
 def _work(joint: Joint, force: FloatArray, motion: FloatArray) -> float:
@@ -217,22 +193,14 @@ def _amplitude(values_h: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(np.linalg.norm(values_h[..., 1:], axis=-1), round_off))
 
 
-def _energy_error(joint: Joint, evaluation: Evaluation) -> float:
+def _energy_error(joint: Joint, evaluation: Evaluation, flexed: FloatArray) -> float:
     """Energy imbalance of a period over the largest work in it."""
     motion, force = joint.to_relative(evaluation.displacement_h), joint.to_relative(evaluation.force_h)
-    excitation = _work(joint, joint.structure.force_h(), motion)
-    damping = _work(joint, joint.structure.apply(motion), motion)
-    contact = _work(joint, force, motion)
+    load = joint.structure.force_h()
+    excitation, damping, contact = (_work(joint, each, motion) for each in (load, joint.structure.apply(motion), force))
     dissipation = float(joint.law.friction_work(evaluation).sum())
-    flexed = _flexed(joint, evaluation.force_h)
     elastic = np.pi * float((_amplitude(evaluation.force_h) * _amplitude(flexed)).sum())
     # largest possible work of the excitation: away from a resonance its actual work is almost zero
-    apparent = np.pi * float((_amplitude(joint.structure.force_h()) * _amplitude(motion)).sum())
+    apparent = np.pi * float((_amplitude(load) * _amplitude(motion)).sum())
     size = max(abs(excitation), abs(damping), abs(contact), dissipation, SMALL_WORK * max(elastic, apparent))
     return _relative(abs(excitation - damping - dissipation), size)
-
-
-def _periodicity_error(joint: Joint, evaluation: Evaluation) -> float:
-    """Change of the tangential state over the last period, N, of pairs that touch."""
-    touches = evaluation.force_t[:, 0].max(axis=1) > 0.0
-    return max(evaluation.periodicity_error, float(joint.law.change_force(evaluation)[touches].max(initial=0.0)))

@@ -1,16 +1,13 @@
 """The numbers of harmonics between which automatic settings choose, and how many more an error estimate needs.
 
-The list `HARMONIC_LEVELS` holds the highest harmonics of these resolutions. "One level up" means the
-next entry of this list.
+"One level up" means the next entry of `HARMONIC_LEVELS`. Two effects hide an error from a comparison with only a few
+more harmonics:
 
-Two effects hide an error from a comparison with only a few more harmonics:
-
-- a contact that is shorter than the period of the highest harmonic;
+- a contact that is shorter than the period of the highest harmonic: its force is nearly equal in all harmonics;
 - a structure that answers the higher harmonics otherwise than the penalty does. With the penalty E and the compliance
   G of a pair, the harmonics of the predicted force that are left out are `(1 - E_n G_n) lambda_n`
   (`solver.structure.penalty`). They need not decrease over the next few harmonics: the modal mass of a slider on a beam
-  falls from mode to mode, and a slider behind a stiff spring acts as a mass only up to the resonance of both. While
-  the highest harmonic lies below this range, states with a few more harmonics agree with each other and are all wrong.
+  falls from mode to mode, and a slider behind a stiff spring acts as a mass only up to the resonance of both.
 """
 
 from __future__ import annotations
@@ -28,8 +25,7 @@ dovetail, states with five and seven harmonics agree by chance (212 Hz: errors o
 with 5, 7 and 9)."""
 
 DISPLACEMENTS_OF_LIMITS = 144
-"""Number of relative displacements of the dovetail with 48 pairs, to which the limits of unknowns belong. For a larger
-joint the limits grow in proportion, so that they limit the harmonics and not the pairs."""
+"""Relative displacements of the dovetail with 48 pairs, to which the limits of unknowns belong."""
 
 STIFFNESS_MISMATCH = 0.25
 """Largest |1 - E G|: above, structure and penalty answer differently, and more harmonics are needed."""
@@ -44,9 +40,9 @@ def n_unknowns(resolution: Resolution, n_rel: int) -> int:
 
 
 def room_for(unknowns: float, n_rel: int) -> float:
-    """Limit of the unknowns of a joint: `unknowns` is the limit of one with 48 pairs, a larger joint may have more.
+    """Limit of the unknowns of a joint with `n_rel` relative displacements; `unknowns`: the limit with 48 pairs.
 
-    The limit grows with the number of displacements, so that the number of harmonics does not depend on the mesh.
+    The limit of a larger joint grows in proportion: it limits the harmonics and not the pairs.
     """
     return unknowns * max(1.0, n_rel / DISPLACEMENTS_OF_LIMITS)
 
@@ -74,43 +70,25 @@ def fewer(resolution: Resolution, settings: SolverSettings) -> Resolution:
     return Resolution(orders, samples)
 
 
-def levels_to_see(resolution: Resolution, contact: float, fewest: int) -> int:
-    """Levels up, at least `fewest`, to harmonics that resolve a contact which lasts a fraction `contact` of the period.
-
-    The force of a contact shorter than about half a period of the highest harmonic is nearly equal in all harmonics. A
-    few more harmonics then change almost nothing, however large the error is.
-    """
-    above = [highest for highest in HARMONIC_LEVELS if highest > resolution.highest]
-    blind = sum(highest * contact < 0.5 for highest in above)
-    return max(fewest, min(blind + 1, len(above)))
-
-
-def levels_to_reach(resolution: Resolution, highest: int, fewest: int) -> int:
-    """Levels up, at least `fewest`, to a resolution with the harmonic `highest`."""
-    return max(fewest, sum(resolution.highest < level <= highest for level in HARMONIC_LEVELS))
-
-
-def reaches(model: ReducedModel, omega: float, highest: int) -> bool:
-    """Whether |1 - E G| is below `STIFFNESS_MISMATCH` for all pairs and for all harmonics of the list above `highest`.
-
-    G is evaluated at real rates (growth instead of vibration), where the structure has no resonances.
-    omega: rad/s.
-    """
-    penalty = build_penalty(model, omega, highest)
-    _, component_index = relative_indices(model.contact)
-    pair, tangent = component_index // 3, np.minimum(component_index % 3, 1)
-    half_octaves = np.arange(0.0, 2.0 * np.log2(HARMONIC_LEVELS[-1] / (highest + 1)) + 1.0)
-    for rate in (highest + 1) * omega * 2.0 ** (0.5 * half_octaves):
-        acts = penalty.at_rate(rate)[pair, tangent]
-        if np.abs(1.0 - acts * compliance_at(model, rate)).max(initial=0.0) > STIFFNESS_MISMATCH:
-            return False
-    return True
+def levels_to(resolution: Resolution, highest: float) -> int:
+    """Levels up, at least two, to the first level with the harmonic `highest`."""
+    above = [level for level in HARMONIC_LEVELS if level > resolution.highest]
+    return max(2, min(sum(level < highest for level in above) + 1, len(above)))
 
 
 def reach(model: ReducedModel, omega: float, highest: int) -> int:
-    """Lowest harmonic of the list, not below `highest`, for which `reaches` holds; the last one where none does.
+    """Lowest harmonic of the levels, not below `highest`, beyond which |1 - E G| is small for all pairs.
 
-    omega: rad/s.
+    G is evaluated at real rates (growth instead of vibration), where the structure has no resonances. omega: rad/s.
+    The last level where |1 - E G| is small beyond none.
     """
-    above = (level for level in HARMONIC_LEVELS if level > highest)
-    return next((level for level in (highest, *above) if reaches(model, omega, level)), HARMONIC_LEVELS[-1])
+    _, component_index = relative_indices(model.contact)
+    pair, tangent = component_index // 3, np.minimum(component_index % 3, 1)
+    for level in (highest, *(level for level in HARMONIC_LEVELS if level > highest)):
+        penalty = build_penalty(model, omega, level)
+        half_octaves = np.arange(0.0, 2.0 * np.log2(HARMONIC_LEVELS[-1] / (level + 1)) + 1.0)
+        rates = (level + 1) * omega * 2.0 ** (0.5 * half_octaves)
+        apart = (1.0 - penalty.at_rate(rate)[pair, tangent] * compliance_at(model, rate) for rate in rates)
+        if all(np.abs(each).max(initial=0.0) <= STIFFNESS_MISMATCH for each in apart):
+            return level
+    return HARMONIC_LEVELS[-1]

@@ -38,21 +38,10 @@ def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:
 
 
 def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:
-    """Duration of the shortest contact of all pairs that open.
+    """Duration of the shortest contact of all pairs that open, as a fraction of the period; 1 where no pair opens.
 
-    Parameters
-    ----------
-    status_t
-        (n_contact, N), states of the pairs at the samples.
-    normal_force_t
-        (n_contact, N), N.
-    felt
-        Fraction of the largest normal force. Pairs whose force is lower all period long are left out.
-
-    Returns
-    -------
-    float
-        As a fraction of the period; 1 where no pair opens.
+    status_t, normal_force_t (n_contact, N): states of the pairs at the samples, and N. felt: fraction of the largest
+    normal force; pairs whose force is lower all period long are left out.
     """
     n_samples = status_t.shape[1]
     shortest = n_samples
@@ -68,10 +57,9 @@ def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float
 
 
 def left_out(orders: tuple[int, ...], evaluation: Evaluation) -> float:
-    """Fraction of the vibrating contact force in harmonics that the series of the state does not hold.
+    """Fraction of the vibrating contact force in harmonics other than `orders`, which only its samples hold.
 
-    The samples of the force hold harmonics up to half their number, the series holds the harmonics `orders` only. The
-    fraction beyond the series grows and falls with the error of the state, and needs no further solve.
+    The fraction grows and falls with the error of the state, and needs no further solve.
     """
     force_h = np.fft.rfft(evaluation.force_t, axis=2)[:, :, 1:]
     size = np.linalg.norm(force_h)

@@ -1,10 +1,8 @@
 """Estimated error of a state by its harmonics and samples, and the choice of both.
 
-The error of a state is estimated by solving the state again with more harmonics and with more samples. Each solve
-begins from the state. The change, times a safety factor for the rest of the series, is the error
-(`solver.accuracy.resolved_state`).
-
-Automatic settings take more harmonics or more samples until the estimate is below `rtol`:
+A state is solved again with more harmonics and with more samples. Each solve begins from the state. The change, times a
+safety factor for the rest of the series, is the error. Automatic settings take more harmonics or more samples until the
+error is below `rtol`:
 
 - A state without even harmonics goes on without them.
 - A state in which nothing slips or opens keeps the first harmonic only, which is then exact.
@@ -19,15 +17,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.error_estimate import NOTHING, Estimate
-from solver.accuracy.harmonic_levels import HARMONIC_LEVELS, MOST_UNKNOWNS, room_for, shifted
+from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
+from solver.accuracy.harmonic_levels import (
+    HARMONIC_LEVELS,
+    MOST_UNKNOWNS,
+    fewer,
+    levels_to,
+    reach,
+    room_for,
+    shifted,
+)
 from solver.accuracy.options import ACCURACY
-from solver.accuracy.period_events import nothing_happens
+from solver.accuracy.period_events import nothing_happens, shortest_contact
 from solver.accuracy.resolved_state import ResolvedState
 from solver.harmonic_balance.state import State
-from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, SMALL_JOINT
+from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, FORCING, SMALL_JOINT
 from solver.newton.run import Run
-from solver.settings import Resolution, SolverSettings
+from solver.settings import FINE_SAMPLES, Resolution
 from solver.structure.joint import Case, Joint
 
 MOST_MIXED_HARMONICS = 79
@@ -36,6 +42,12 @@ MOST_MIXED_HARMONICS = 79
 NODE_UNKNOWNS = 1600
 """Most unknowns of a node of a sweep: about those of the dovetail of 48 pairs with five harmonics (1584). Most unknowns
 of a small joint, too: impacts couple all harmonics, and no preconditioner helps."""
+
+COMPARED_UNKNOWNS = 3 * MOST_UNKNOWNS // 2
+"""Most unknowns of a balance that is solved to estimate an error."""
+
+FAR_UNKNOWNS = 400
+"""Most unknowns of a balance that only resolves a short contact, or the structure at higher harmonics."""
 
 MOST_SAMPLES = 8192
 """Most samples of a period that "auto" takes."""
@@ -73,7 +85,7 @@ def refine(
     excitation_amplitude: float,
     point: State,
     run: Run,
-    most: float | None = None,
+    most: float = MOST_UNKNOWNS,
     usual_work: float = 0.0,
 ) -> Refined:
     """Estimate the error of a state at fixed wear depth; refine the state to an error below rtol in automatic settings.
@@ -81,96 +93,138 @@ def refine(
     The result is the last state found, with its error, where none is accurate.
 
     case, point: the state and the case with its harmonics and samples. omega, excitation_amplitude: rad/s, N.
-    most: most unknowns of a joint of 48 pairs with more harmonics (`room_for`), by default `MOST_UNKNOWNS`.
+    most: most unknowns of a joint of 48 pairs with more harmonics (`room_for`).
     usual_work: N m, lower bound of the slip work to which errors are relative, for states with almost no slip.
     """
-    search = _Search(case.settings, run, run.budget.iterations, most or MOST_UNKNOWNS)
-    return search.refined(ResolvedState(case, case.joint(omega, excitation_amplitude), point, usual_work).at_rest(run))
+    given = ResolvedState(case, case.joint(omega, excitation_amplitude), point, usual_work)
+    return _Search(run, run.budget.iterations, most).refined(given.at_rest(run))
 
 
-@dataclass
+def state_difference(case: Case, joint: Joint, one: State, other: State) -> Estimate:
+    """Relative differences of response and wear rate of two states of one joint."""
+    return ResolvedState(case, joint, one).difference(ResolvedState(case, joint, other))
+
+
+@dataclass(frozen=True)
 class _Search:
     """The search for the harmonics and samples that a state needs.
 
-    settings: automatic harmonics and samples, and rtol.
-    run: tolerance and limits.
-    begun: Newton iterations at the start of the search.
-    most: as in `refine`.
-    faint: whether slip only shows with more samples than those of the given state.
+    run: tolerance and limits. begun: Newton iterations at the start of the search. most: as in `refine`.
     """
 
-    settings: SolverSettings
     run: Run
     begun: int
     most: float
-    faint: bool = False
 
     def refined(self, here: ResolvedState) -> Refined:
         """The state at the resolution that suffices, or the last state found."""
-        richer: ResolvedState | None = None
+        settings, faint = here.case.settings, False
         while True:
             if nothing_happens(here.point.evaluation):
                 linear = self._linear(here)
                 if isinstance(linear, Refined):
                     return linear
-                here, self.faint = linear, True
-                continue
-            if self.settings.harmonics == "auto":
-                here = here.without_even(self.run) or here.with_even(self.run) or here
-            by_samples, finer = here.samples_error(self.run)
-            by_harmonics, richer = self._harmonics_error(here, richer)
+                here, faint = linear, True
+            if settings.harmonics == "auto":
+                here = here.with_its_symmetry(self.run)
+            by_samples, finer = self._samples_error(here)
+            by_harmonics, richer = self._harmonics_error(here)
             estimate = by_samples + by_harmonics
-            if not self.settings.automatic:
+            if not settings.automatic:
                 known = estimate if np.isfinite(estimate.largest) else Estimate(np.nan, np.nan)
                 return Refined(here.case, here.point, known, True)
             holds = here.holds()
-            if holds and estimate.largest <= self.settings.rtol:
-                here, estimate = here.relaxed(estimate, self.run)
-                return Refined(here.case, here.point, estimate, True)
-            wanted = self._wanted(here, by_samples.largest, by_harmonics.largest, holds=holds)
+            if holds and estimate.largest <= settings.rtol:
+                return self._relaxed(here, estimate)
+            wanted = _wanted(here, by_samples.largest, by_harmonics.largest, holds=holds)
             following = self._next(here, wanted, finer, richer)
             if following is None:
                 # slip that only many samples show is no reason to reject an accurate motion
-                judged = estimate.response if self.faint else estimate.largest
-                return Refined(here.case, here.point, estimate, judged <= self.settings.rtol)
+                judged = estimate.response if faint else estimate.largest
+                return Refined(here.case, here.point, estimate, judged <= settings.rtol)
             here = following
 
     def _linear(self, here: ResolvedState) -> Refined | ResolvedState:
         """Result for a state in which nothing slips or opens, or the state with more samples that show some slip."""
-        if self.settings.harmonics == "auto" and here.case.resolution.orders != (1,):
-            here = here.solve_at(Resolution((1,), here.case.resolution.samples), self.run) or here
-        missed = here.missed_event(self.run)
-        if missed is None:
+        settings, samples = here.case.settings, here.case.resolution.samples
+        if settings.harmonics == "auto" and here.case.resolution.orders != (1,):
+            here = here.solve_at(Resolution((1,), samples), self.run) or here
+        # without an event the harmonics are exact, so that one solve with the finest samples is enough
+        orders = here.case.resolution.orders
+        finest = here.solve_at(Resolution(orders, max(FINE_SAMPLES, 2 * samples)), self.run)
+        if finest is None or nothing_happens(finest.point.evaluation):
             return Refined(here.case, here.point, NOTHING, True)
-        if self.settings.samples == "auto":
-            return missed
-        missing = here.difference(missed).times(ACCURACY.two_levels_safety)
-        accurate = not self.settings.automatic or missing.largest <= self.settings.rtol
-        return Refined(here.case, here.point, missing, accurate)
+        while settings.samples == "auto" and (samples := 2 * samples) < finest.case.resolution.samples:
+            level = here.solve_at(Resolution(orders, samples), self.run)
+            if level is not None and not nothing_happens(level.point.evaluation):
+                return level
+        if settings.samples == "auto":
+            return finest
+        missing = here.difference(finest).times(ACCURACY.two_levels_safety)
+        return Refined(here.case, here.point, missing, not settings.automatic or missing.largest <= settings.rtol)
 
-    def _harmonics_error(
-        self, here: ResolvedState, known: ResolvedState | None
-    ) -> tuple[Estimate, ResolvedState | None]:
-        """Error by missing harmonics, and the state with more harmonics that gave it."""
-        error, richer = here.harmonics_error(self.run, known)
-        above = shifted(here.case.resolution, 1)
+    def _samples_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
+        """Estimated error by missing samples, and the state with more samples that gave it.
+
+        The error depends on the position of an event (slip, stick, lift) between two of the N samples.
+
+        - Twice as many samples contain the sample next to an event, which may still be the next one. Then both states
+          have the same error. So the other state has 3 N + 2 samples, which share only the phases 0 and pi with the N.
+        - Many unknowns mean many events. Then 2 N samples suffice, with which the refinement can go on.
+        """
+        orders, samples = here.case.resolution.orders, here.case.resolution.samples
+        few = here.unknowns(here.case.resolution) <= EXPENSIVE_UNKNOWNS
+        finer = self._compared(here, Resolution(orders, 3 * samples + 2 if few else 2 * samples))
+        if finer is None:
+            return UNKNOWN, None
+        safety = ACCURACY.triple_samples_safety if few else ACCURACY.two_levels_safety
+        return here.difference(finer).times(safety), finer
+
+    def _harmonics_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
+        """Estimated error by missing harmonics, and the state with more harmonics that gave it.
+
+        The error is the difference to a state with more harmonics (`_levels_to_compare`), or with as many as are found;
+        else to one with fewer, which is larger. The error is unknown where the state with more harmonics does not
+        resolve the shortest contact.
+        """
+        resolution = here.case.resolution
+        seeing, levels = _levels_to_compare(here)
+        richer, found = self._levels_up(here, levels)
+        above = shifted(resolution, 1)
         cheap = here.unknowns(above) <= EXPENSIVE_UNKNOWNS and self._allowed(here, above)
-        if richer is None and self.settings.harmonics == "auto" and cheap:
+        if richer is None and here.case.settings.harmonics == "auto" and cheap:
             # impacts: Newton's method diverges from a warm start with more harmonics, although the state exists
-            richer = here.by_homotopy(above, self.run)
-            error = error if richer is None else here.difference(richer).times(ACCURACY.one_level_safety)
-        return error, richer
+            richer, found = here.by_homotopy(above, self.run), 1
+        if seeing > 2 and (richer is None or found < seeing):
+            return UNKNOWN, richer
+        below = shifted(resolution, -1)
+        other = richer
+        if other is None and below.highest < resolution.highest:
+            other = self._compared(here, below)
+        if other is None:
+            return UNKNOWN, None
+        single = richer is not None and found == 1
+        safety = ACCURACY.one_level_safety if single else ACCURACY.two_levels_safety
+        return here.difference(other).times(safety), richer
 
-    def _wanted(self, here: ResolvedState, by_samples: float, by_harmonics: float, *, holds: bool) -> Resolution:
-        """The next resolution: samples and harmonics whose error alone is more than half of rtol are refined."""
-        resolution, above = here.case.resolution, shifted(here.case.resolution, 1)
-        wanted = resolution
-        half = 0.5 * self.settings.rtol
-        if self.settings.harmonics == "auto" and (not holds or by_harmonics > half):
-            wanted = above if self.settings.samples == "auto" else Resolution(above.orders, resolution.samples)
-        if self.settings.samples == "auto" and by_samples > half:
-            wanted = Resolution(wanted.orders, 2 * resolution.samples)
-        return wanted
+    def _levels_up(self, here: ResolvedState, levels: int) -> tuple[ResolvedState | None, int]:
+        """The state so many levels up, at once or level by level, or as many as are found; and their number."""
+        above = [shifted(here.case.resolution, level) for level in range(1, levels + 1)]
+        room = room_for(COMPARED_UNKNOWNS, here.joint.component_index.size)
+        above = [each for each in above if here.case.model.holds(each.highest) and here.unknowns(each) <= room]
+        found = self._compared(here, above[-1]) if above else None
+        if found is not None or len(above) < 2:
+            return found, len(above)
+        for number, resolution in enumerate(above):
+            level = self._compared(found or here, resolution)
+            if level is None:
+                return found, number
+            found = level
+        return found, len(above)
+
+    def _compared(self, here: ResolvedState, resolution: Resolution) -> ResolvedState | None:
+        """The state with other harmonics and samples, as accurately as a comparison needs; None where not found."""
+        return here.solve_at(resolution, self.run.to(max(self.run.tolerance, FORCING * here.case.settings.rtol)))
 
     def _next(
         self, here: ResolvedState, wanted: Resolution, finer: ResolvedState | None, richer: ResolvedState | None
@@ -182,38 +236,74 @@ class _Search:
         limit = self.begun + REFINEMENT_WORK / here.unknowns(shifted(here.case.resolution, 2))
         if wanted == here.case.resolution or not self._allowed(here, wanted) or self.run.budget.iterations >= limit:
             return None
-        for known in (finer, richer):
-            if known is not None and known.case.resolution == wanted:
-                return known.solve_at(wanted, self.run)
-        found = here.solve_at(wanted, self.run)
-        if found is None and richer is not None and richer.case.resolution.highest > wanted.highest:
-            # from a state with more harmonics instead of fewer
-            found = richer.solve_at(wanted, self.run)
-        if found is None and richer is not None and self.settings.harmonics == self.settings.samples == "auto":
-            found = richer if self._allowed(here, richer.case.resolution) else None
-        return found
+        known = [state for state in (finer, richer) if state is not None]
+        exact = [state for state in known if state.case.resolution == wanted]
+        above = [state for state in known if state.case.resolution.highest > wanted.highest]
+        for start in exact or (here, *above):
+            if (found := start.solve_at(wanted, self.run)) is not None:
+                return found
+        both = here.case.settings.harmonics == here.case.settings.samples == "auto"
+        usable = richer is not None and not exact and both and self._allowed(here, richer.case.resolution)
+        return richer if usable else None
 
     def _allowed(self, here: ResolvedState, resolution: Resolution) -> bool:
         """Whether "auto" may take these harmonics and samples."""
-        if not here.case.model.holds(resolution.highest):
-            return False
-        n_rel = here.joint.component_index.size
+        n_rel, unknowns = here.joint.component_index.size, here.unknowns(resolution)
+        most = room_for(self.most, n_rel)
         # the contact law costs unknowns times samples
-        room = SAMPLES_OF_UNKNOWNS * room_for(self.most, n_rel)
-        if here.unknowns(resolution) * resolution.samples > room:
+        if unknowns * resolution.samples > SAMPLES_OF_UNKNOWNS * most:
             return False
-        small = n_rel <= SMALL_JOINT
-        most = room_for(min(self.most, NODE_UNKNOWNS) if small else self.most, n_rel)
+        if n_rel <= SMALL_JOINT:
+            most = min(most, NODE_UNKNOWNS)
         if resolution.highest > MOST_MIXED_HARMONICS:
             # more harmonics for friction without impacts only, whose harmonics are odd
-            if not all(order % 2 for order in resolution.orders):
-                return False
-            most = min(most, EXPENSIVE_UNKNOWNS)
-        # the two highest resolutions serve for a comparison only
-        in_levels = resolution.highest <= HARMONIC_LEVELS[-3]
-        return resolution.samples <= MOST_SAMPLES and in_levels and here.unknowns(resolution) <= most
+            most = min(most, EXPENSIVE_UNKNOWNS) if all(order % 2 for order in resolution.orders) else 0
+        # the two highest levels serve for a comparison only
+        in_levels = resolution.highest <= HARMONIC_LEVELS[-3] and here.case.model.holds(resolution.highest)
+        return in_levels and resolution.samples <= MOST_SAMPLES and unknowns <= most
+
+    def _relaxed(self, here: ResolvedState, estimate: Estimate) -> Refined:
+        """An accurate state with as few harmonics and samples as it needs.
+
+        The error is kept below a fraction of rtol, so that the next state does not need more harmonics at once.
+        """
+        enough = ACCURACY.kept_fraction * here.case.settings.rtol
+        while estimate.largest <= ACCURACY.kept_fraction * enough:
+            lower = fewer(here.case.resolution, here.case.settings)
+            level = here.solve_at(lower, self.run) if lower != here.case.resolution else None
+            if level is None:
+                break
+            larger = level.difference(here).times(ACCURACY.two_levels_safety) + estimate
+            if larger.largest > enough or not level.holds():
+                break
+            here, estimate = level, larger
+        return Refined(here.case, here.point, estimate, True)
 
 
-def state_difference(case: Case, joint: Joint, one: State, other: State) -> Estimate:
-    """Relative differences of response and wear rate of two states of one joint."""
-    return ResolvedState(case, joint, one).difference(ResolvedState(case, joint, other))
+def _levels_to_compare(here: ResolvedState) -> tuple[int, int]:
+    """Levels up that resolve the shortest contact, and levels up for a comparison; both at least two.
+
+    As far as cheap, the comparison resolves the shortest contact well, with one period of its highest harmonic (half a
+    period just resolves the contact), and structure and penalty agree beyond its highest harmonic (`reach`).
+    """
+    resolution, at, model = here.case.resolution, here.point.evaluation, here.case.model
+    levels = [shifted(resolution, level) for level in range(3, len(HARMONIC_LEVELS))]
+    cheap = 2 + sum(here.unknowns(each) <= FAR_UNKNOWNS and model.holds(each.highest) for each in levels)
+    if cheap == 2:
+        return 2, 2
+    contact = shortest_contact(at.status_t, at.force_t[:, 0], ACCURACY.negligible * here.case.settings.rtol)
+    highest = reach(model, here.joint.omega, resolution.highest)
+    seeing, far, reaching = (levels_to(resolution, wanted) for wanted in (0.5 / contact, 1.0 / contact, highest))
+    return min(seeing, cheap), min(max(far, reaching), cheap)
+
+
+def _wanted(here: ResolvedState, by_samples: float, by_harmonics: float, *, holds: bool) -> Resolution:
+    """The next resolution: samples and harmonics whose error alone is more than half of rtol are refined."""
+    resolution, settings = here.case.resolution, here.case.settings
+    wanted, half = resolution, 0.5 * settings.rtol
+    if settings.harmonics == "auto" and (not holds or by_harmonics > half):
+        above = shifted(resolution, 1)
+        wanted = above if settings.samples == "auto" else Resolution(above.orders, resolution.samples)
+    if settings.samples == "auto" and by_samples > half:
+        wanted = Resolution(wanted.orders, 2 * resolution.samples)
+    return wanted

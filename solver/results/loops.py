@@ -27,21 +27,10 @@ def loop_phases() -> FloatArray:
 
 
 def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
-    """Fretting loops of chosen pairs of a state.
+    """Relative displacement, m, and contact force, N, of chosen pairs of a state, both (n_pairs, LOOP_PHASES, 3).
 
-    Parameters
-    ----------
-    joint, evaluation
-        The joint and its converged state.
-    pairs
-        Indices of the chosen pairs.
-
-    Returns
-    -------
-    tuple of two FloatArray
-        Relative displacement, m, and contact force, N, both (n_pairs, LOOP_PHASES, 3). Components: normal, first and
-        second tangent; closing and compression are positive. Along a direction in which a pair has no displacement,
-        displacement and force are 0, but for a constant normal load.
+    Components: normal, first and second tangent; closing and compression are positive. Along a direction in which a
+    pair has no displacement, displacement and force are 0, but for a constant normal load.
     """
     chosen = list(pairs)
     displacement = evaluation.displacement_h[chosen] @ joint.basis.at(loop_phases())

@@ -16,8 +16,8 @@ from solver.model import ComplexArray, FloatArray
 from solver.packing import packable
 from solver.results.history import PeriodicState
 from solver.results.loops import contact_loops
-from solver.results.resonance import resonance_frequency
 from solver.settings import Resolution
+from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Joint
 
@@ -77,14 +77,7 @@ def report_state(
 ) -> StateReport:
     """Pressures, slip and responses of a converged state.
 
-    Parameters
-    ----------
-    joint, evaluation, certificate
-        The joint, its state, and the certificate of the state.
-    loops
-        Pairs with reported fretting loops.
-    with_resonance
-        Whether the resonance of the vibration is reported.
+    loops: pairs with reported fretting loops. with_resonance: whether the resonance of the vibration is reported.
     """
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
@@ -104,6 +97,27 @@ def report_state(
         resonance=resonance,
         resonance_error=slope * certificate.response_error,
     )
+
+
+def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, float]:
+    """Resonance w_r of the vibration, rad/s, and its relative change per relative change of the motion at most.
+
+    With x and F, the first harmonics of all displacements and of the excitation, `x^H` times Eq. (1) is
+    `w^2 x^H M x = Re x^H (K x + lambda) - Re x^H F`. At the resonance x with its contact forces needs no part of F in
+    phase with x: `w_r^2 = w^2 + Re (x^H F) / (x^H M x)`. For a linear oscillator w_r is the natural frequency, whatever
+    w is; for a joint that slips and opens a Rayleigh quotient with the contact forces of the state. The change is
+    `|x^H F| / (2 w_r^2 x^H M x)`. Both are NaN where no mass moves, or where w_r^2 is not positive.
+    """
+    linear = joint.model.harmonic_structure(1)
+    relative, _ = relative_indices(joint.contact)
+    force = joint.excitation_amplitude * linear.load_harmonic
+    first = to_complex(joint.to_relative(evaluation.displacement_h))[:, 0]
+    moved = whole_motion(linear, 1j * joint.omega, relative, force, first)
+    inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
+    if not inertia > 0.0:
+        return float("nan"), float("nan")
+    square = joint.omega**2 + work.real / inertia
+    return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2
 
 
 @njit(cache=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from solver.model import IntArray
-from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
+from solver.outcome import SENSITIVE_ERROR, Outcome, in_digits, known_to
 from solver.results.cut_off import describe_cut_off
 from solver.results.history import WearHistory
 
@@ -17,17 +17,9 @@ this fraction at most, far below any rtol. Dovetail, friction 0.3, 1 N: 5e-7 to 
 def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0) -> tuple[Outcome, str]:
     """Outcome of a complete history, judged at some of its counts, and a sentence about the outcome.
 
-    Parameters
-    ----------
-    history
-        The history that was integrated.
-    rows
-        Indices of the judged counts, ascending: all counts, or those of another history that is read from this one.
-    rtol
-        Wanted relative error.
-    slower
-        Ratio of the wear coefficients of the other and the integrated history: counts of the integrated history are
-        so many times larger.
+    rows: indices of the judged counts, ascending: all counts, or those of another history that is read from this one.
+    rtol: wanted relative error. slower: ratio of the wear coefficients of the other and the integrated history: counts
+    of the integrated history are so many times larger.
     """
     if not rows.size:
         return Outcome.CONVERGED, ""
@@ -75,6 +67,6 @@ def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> s
 def describe_hold(cycle: float) -> str:
     """Sentence with the count from which on a joint that slides as a whole is held."""
     return (
-        f"from cycle {cycle:.6g} on every pair slips and only friction holds the joint in one direction: its mean"
-        f" position is held there, by at most {HELD_FORCE:g} of the friction"
+        f"from cycle {in_digits(cycle)} on every pair slips and only friction holds the joint in one direction: its"
+        f" mean position is held there, by at most {HELD_FORCE:g} of the friction"
     )

@@ -19,7 +19,7 @@ from solver.settings import NEGLIGIBLE, Resolution
 from solver.stability.floquet import find_instability
 from solver.wear.jump import creeps, free_slide
 from solver.wear.state import Choice, WearState
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.wearing_joint import Following, WearingJoint
 
 LEFT_OUT_GROWN = 1.5
 """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
@@ -74,8 +74,10 @@ class FullCheck:
         if not certificate.holds(work.case.settings.tolerance):
             return Failure(Outcome.CERTIFICATE_FAILED)
         report = report_state(joint, at, certificate, self.loops, with_resonance=self.with_resonance)
-        error = work.where.error(chosen, estimate.response, work.case.settings.rtol)
-        return chosen, replace(report, excitation_frequency_error=error)
+        if isinstance(work.where, Following):
+            error = work.where.error(chosen, estimate.response, work.case.settings.rtol)
+            report = replace(report, excitation_frequency_error=error)
+        return chosen, report
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from solver.wear.check import Checked
 from solver.wear.control import WearLine
 from solver.wear.course import Course
 from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.wearing_joint import Following, WearingJoint
 
 T = TypeVar("T")
 
@@ -133,10 +133,11 @@ class Integration:
         return stored if isinstance(stored, Failure) else (self.line.begin(stored[0]), stored[1])
 
     def _step(self, state: WearState, course: Course) -> tuple[WearState, Course] | Failure:
-        step = self.line.step(state)
+        step, where = self.line.step(state), self.line.work.where
         if isinstance(step, Failure):
             return step
-        return self.line.work.where.out_of_range(step.state) or self._stored(step.state, course, step.error)
+        failure = where.out_of_range(step.state) if isinstance(where, Following) else None
+        return failure or self._stored(step.state, course, step.error)
 
     def _stored(self, state: WearState, course: Course, error: float) -> tuple[WearState, Course] | Failure:
         """Check a state and store it; error: local error of its step, m3."""

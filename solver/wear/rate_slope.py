@@ -24,6 +24,7 @@ from solver.model import BoolArray, FloatArray
 from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
 from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
+from solver.outcome import in_digits
 from solver.structure.joint import Joint
 
 LARGEST_MOVED_LOAD = 10.0
@@ -127,7 +128,8 @@ def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: fl
         return None
     # a hundredth of the limit; a usual step of the dovetail root moves 0.001 to 0.01 of the normal forces
     advised = length * LARGEST_MOVED_LOAD / 100.0 / fraction
+    on, times, most = in_digits(length, 3), in_digits(fraction, 2), in_digits(advised, 2)
     return (
-        f"wearing on for {length:.6g} cycles at once from cycle {cycle:.6g} on moves {float(f'{fraction:.2g}'):g} times"
-        f" the normal forces of the joint: at most {float(f'{advised:.2g}'):g} cycles at once would do"
+        f"wearing on for {on} cycles at once from cycle {in_digits(cycle)} on moves {times} times the normal forces"
+        f" of the joint: at most {most} cycles at once would do"
     )

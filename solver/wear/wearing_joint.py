@@ -47,14 +47,6 @@ class Fixed:
         point = run.state(balance, start, most=most or NEAR_ITERATIONS)
         return None if point is None else replace(state, point=point)
 
-    def error(self, _: WearState, __: float, ___: float) -> float:
-        """Error of the frequency of a state, Hz, by the relative error of its response and rtol."""
-        return 0.0
-
-    def out_of_range(self, _: WearState) -> Failure | None:
-        """The end of a history whose frequency leaves its range; None within."""
-        return None
-
     def lost(self, _: WearState, failure: Failure, /) -> Failure:
         """The end of a history where a search behind its last state has failed."""
         return failure
@@ -91,7 +83,7 @@ class Following(Fixed):
         return replace(state, point=point, omega=float(found.values[0]), lag=lag, half_width=half_width)
 
     def error(self, state: WearState, response_error: float, rtol: float) -> float:
-        """As in `Fixed`.
+        """Error of the frequency of a state, Hz, by the relative error of its response and rtol.
 
         The phase of the vibration, and so the phase lag, is wrong by as much as the amplitude. The amplitude is flat at
         its maximum: every amplitude that is less than the largest one by its error may be the largest one.
@@ -102,7 +94,7 @@ class Following(Fixed):
         return state.half_width * lag / (2.0 * math.pi)
 
     def out_of_range(self, state: WearState) -> Failure | None:
-        """As in `Fixed`."""
+        """The end of a history whose frequency leaves its range; None within."""
         frequency, wanted = state.omega / (2.0 * math.pi), self.wanted
         if wanted.low <= frequency <= wanted.high:
             return None

@@ -61,6 +61,15 @@ _SOFTEST, _STIFFEST = 5e5, 2e12
 """Young's moduli, Pa, from rubber to diamond. One of several materials may be stiffer, to stand for what is rigid."""
 
 
+def check_translations(matrices: Matrices) -> None:
+    """All rows are displacements of nodes. Raises SceneError."""
+    other = np.flatnonzero((matrices.direction < 0) | (matrices.direction > 2))
+    if other.size:
+        found = f"{matrices.files[0]}: node {matrices.node[other[0]]} has the dof {matrices.direction[other[0]] + 1}"
+        remedy = "export a model of solid elements: dofs 1 to 3; to reduced matrices belongs a table of nodes, .csv"
+        raise SceneError("matrices", found, remedy)
+
+
 def check_nodes_have_dofs(matrices: Matrices, nodes: IntArray, name: str) -> None:
     """Every node of a surface or set has all three dofs in the matrices.
 
@@ -84,7 +93,7 @@ def check_nodes_have_dofs(matrices: Matrices, nodes: IntArray, name: str) -> Non
     raise SceneError(
         "matrices",
         f"{name}: {n_missing} of {wanted.size} nodes {some} in {where} (tied or fixed)",
-        _EXPORT_FREE[matrices.code],
+        _EXPORT_FREE.get(matrices.code, "export without ties and boundary conditions"),
     )
 
 
@@ -112,7 +121,7 @@ def check_contact_removed(
     if apart.any():
         largest = abs(part.data[large][apart]).max() * units.stiffness
         found = f"the stiffness couples {names[0]} and {names[1]} ({largest:.1e} N/m)"
-        raise SceneError("matrices", found, _REMOVE_CONTACT[matrices.code])
+        raise SceneError("matrices", found, _REMOVE_CONTACT.get(matrices.code, "remove the contact between them"))
 
 
 def _share_element(deck: Deck, one: IntArray, other: IntArray) -> NDArray[np.bool_]:
@@ -234,7 +243,8 @@ def check_speed(deck: Deck, matrices: Matrices, units: Units) -> Rotation | None
         return rotation
     speed = math.sqrt(rotation.omega_squared)
     found = f"the deck spins at {speed:.6g} rad/s, the stiffness holds {math.sqrt(held):.6g}"
-    raise SceneError("matrices", found, _KEEP_PRESTRESS[matrices.code] if held == 0 else "give the files of one run")
+    remedy = _KEEP_PRESTRESS.get(matrices.code, "export the prestressed stiffness")
+    raise SceneError("matrices", found, remedy if held == 0 else "give the files of one run")
 
 
 def check_units(deck: Deck, mass: float | None, units: Units) -> None:

@@ -9,15 +9,25 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class ModelFiles:
-    """mesh: the deck or mesh. matrices: the files with the matrices, none where they are assembled here."""
+    """Files of a model.
+
+    mesh: the deck, mesh or table of nodes. matrices: the files with the matrices, none where they are assembled here.
+    recovery: the table of further responses; None of none.
+    """
 
     mesh: Path
     matrices: tuple[Path, ...] = ()
+    recovery: Path | None = None
+
+    @property
+    def has_faces(self) -> bool:
+        """Whether the mesh has faces that can be drawn."""
+        return self.mesh.suffix.lower() != ".csv"
 
     @property
     def all(self) -> tuple[Path, ...]:
         """All of them but what the deck includes."""
-        return (self.mesh, *self.matrices)
+        return (self.mesh, *self.matrices, *((self.recovery,) if self.recovery is not None else ()))
 
 
 def file_digest(path: Path) -> str:

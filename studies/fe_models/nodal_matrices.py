@@ -1,4 +1,4 @@
-"""Matrices of another program, row by row, in the order of the nodes of a mesh."""
+"""Matrices of another program, row by row, in the order of the nodes of a mesh, in SI units."""
 
 from __future__ import annotations
 
@@ -8,93 +8,50 @@ import numpy as np
 from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.finite_element.elements.solid_mesh import Rotation
+from studies.fe_models.matrices.matrices import Matrices
+from studies.fe_models.units import Units
 from studies.finite_element.joint_model import MatrixModel
-from studies.scene_error import SceneError
 
 
 @dataclass(frozen=True)
 class NodalMatrices:
-    """Matrices in the order of the nodes.
+    """A model of matrices with displacements node by node in x, y, z.
 
-    numbers (n_nodes,): nodes of the mesh, then those that only the matrices have. coordinates (n_nodes, 3): m, NaN for
-    the latter. stiffness, mass (3 n_nodes, 3 n_nodes): displacements node by node in x, y, z. missing (n_nodes, 3):
-    displacements that the matrices do not have; their rows are empty, and they must be held.
+    model: nodes of the mesh, then those that only the matrices have; rows that are no displacement of a node, as modal
+    coordinates, stand three by three behind them, as if of nodes without a place.
+    missing (n_nodes, 3): displacements that the matrices do not have; their rows are empty, and they must be held.
+    place (n_dof,): place of each row of the matrices in the displacements of the model.
     """
 
-    numbers: IntArray
-    coordinates: FloatArray
-    stiffness: sparse.csr_matrix
-    mass: sparse.csr_matrix
+    model: MatrixModel
     missing: BoolArray
-
-    def model(
-        self,
-        rotation: Rotation | None = None,
-        preload: FloatArray | None = None,
-        gravity: FloatArray | None = None,
-        extra: IntArray | None = None,
-    ) -> MatrixModel:
-        """The model of them. extra (m,): numbers of further nodes, without matrices; for the rest see MatrixModel."""
-        if extra is None or not len(extra):
-            return MatrixModel(self.coordinates, self.numbers, self.stiffness, self.mass, rotation, preload, gravity)
-        n = len(self.numbers) + len(extra)
-        forms = self.stiffness.copy(), self.mass.copy()
-        for form in forms:
-            form.resize((3 * n, 3 * n))
-        coordinates = np.vstack([self.coordinates, np.full((len(extra), 3), np.nan)])
-        return MatrixModel(coordinates, np.concatenate([self.numbers, extra]), *forms, rotation, preload, gravity)
+    place: IntArray
 
 
-def order_by_nodes(
-    stiffness: sparse.csr_matrix,
-    mass: sparse.csr_matrix,
-    node: IntArray,
-    direction: IntArray,
-    numbers: IntArray,
-    coordinates: FloatArray,
-) -> NodalMatrices:
-    """Matrices (n_dof, n_dof) in the order of the nodes of a mesh.
-
-    Parameters
-    ----------
-    stiffness, mass
-        Symmetric, both triangles, N/m and kg.
-    node, direction
-        (n_dof,): number of the node and direction 0 to 2 of every row.
-    numbers, coordinates
-        (n_mesh,), (n_mesh, 3): nodes of the mesh, m.
-
-    Raises
-    ------
-    SceneError
-        Where a displacement has two rows.
-    """
+def order_by_nodes(matrices: Matrices, units: Units, numbers: IntArray, coordinates: FloatArray) -> NodalMatrices:
+    """Matrices in the order of the nodes of a mesh. numbers (n_mesh,), coordinates (n_mesh, 3), m: its nodes."""
+    node, direction = matrices.node.copy(), matrices.direction.copy()
+    other = np.flatnonzero((direction < 0) | (direction > 2))
+    first = min(0, int(node.min(initial=0)), int(numbers.min(initial=0))) - 1
+    node[other], direction[other] = first - np.arange(len(other)) // 3, np.arange(len(other)) % 3
     extra = np.setdiff1d(node, numbers)
     everything = np.concatenate([numbers, extra]).astype(np.int64)
     order = np.argsort(everything)
-    place = order[np.searchsorted(everything, node, sorter=order)]
-    dof = 3 * place + direction
-    unique, count = np.unique(dof, return_counts=True)
-    if (count > 1).any():
-        twice = unique[count > 1][0]
-        raise SceneError(
-            "matrices",
-            f"displacement {twice % 3 + 1} of node {everything[twice // 3]} has more than one row",
-            "export every displacement once",
-        )
+    place = 3 * order[np.searchsorted(everything, node, sorter=order)] + direction
     n = 3 * len(everything)
-    missing = np.ones(n, dtype=np.bool_)
-    missing[dof] = False
 
-    def ordered(matrix: sparse.csr_matrix) -> sparse.csr_matrix:
+    def ordered(matrix: sparse.csr_array) -> sparse.csr_matrix:
         entries = matrix.tocoo()
-        return sparse.csr_matrix((entries.data, (dof[entries.row], dof[entries.col])), shape=(n, n))
+        return sparse.csr_matrix((entries.data * units.stiffness, (place[entries.row], place[entries.col])), (n, n))
 
-    return NodalMatrices(
-        numbers=everything,
+    missing = np.ones(n, dtype=np.bool_)
+    missing[place] = False
+    model = MatrixModel(
         coordinates=np.vstack([coordinates, np.full((len(extra), 3), np.nan)]),
-        stiffness=ordered(stiffness),
-        mass=ordered(mass),
-        missing=missing.reshape(-1, 3),
+        numbers=everything,
+        stiffness=ordered(matrices.stiffness),
+        mass=ordered(matrices.mass),
+        # seconds in all systems of units: N s/m from a damping as N/m from a stiffness
+        damping=None if matrices.damping is None else ordered(matrices.damping),
     )
+    return NodalMatrices(model, missing.reshape(-1, 3), place)

@@ -26,6 +26,11 @@ class Units:
         return self.mass  # mass / s2
 
     @property
+    def force(self) -> float:
+        """N."""
+        return self.mass * self.length  # mass length / s2
+
+    @property
     def density(self) -> float:
         """kg/m3."""
         return self.mass / self.length**3

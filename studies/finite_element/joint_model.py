@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import sparse
@@ -69,6 +69,7 @@ class MatrixModel:
     rotation: for the centrifugal load, which follows from the mass; None for a model at rest.
     preload (3 n_nodes,): constant forces beside the centrifugal ones, N.
     gravity (3,): acceleration of all mass, m/s2; None of none.
+    damping (3 n_nodes, 3 n_nodes): viscous, N s/m; None for that of a loss factor.
     """
 
     coordinates: FloatArray
@@ -78,6 +79,33 @@ class MatrixModel:
     rotation: Rotation | None = None
     preload: FloatArray | None = None
     gravity: FloatArray | None = None
+    damping: sparse.csr_matrix | None = None
+
+    @property
+    def forms(self) -> dict[str, sparse.csr_matrix]:
+        """Stiffness, mass and, where there is one, damping by name."""
+        found = {"stiffness": self.stiffness, "mass": self.mass}
+        return found if self.damping is None else {**found, "damping": self.damping}
+
+    def with_nodes(self, numbers: IntArray) -> MatrixModel:
+        """The same with further nodes (m,) that have no place and no matrices."""
+        n = len(self.numbers) + len(numbers)
+        forms = {name: form.copy() for name, form in self.forms.items()}
+        for form in forms.values():
+            form.resize((3 * n, 3 * n))
+        coordinates = np.vstack([self.coordinates, np.full((len(numbers), 3), np.nan)])
+        return replace(self, coordinates=coordinates, numbers=np.concatenate([self.numbers, numbers]), **forms)
+
+
+@dataclass(frozen=True)
+class RowMotion:
+    """A sum over displacements. weights (n,): of the first n displacements, node by node in x, y, z."""
+
+    weights: FloatArray
+
+    def row(self, n_nodes: int) -> FloatArray:
+        """Row (3 n_nodes,) that gives it from the nodal displacements."""
+        return np.pad(self.weights, (0, 3 * n_nodes - len(self.weights)))
 
 
 @dataclass(frozen=True)
@@ -130,7 +158,7 @@ class JointDefinition:
     contacts: tuple[ContactSurfaces, ...]
     held: BoolArray
     load: SetMotion
-    responses: Mapping[str, SetMotion]
+    responses: Mapping[str, SetMotion | RowMotion]
     cut: CutFaces | None = None
     along: FloatArray | None = None
     retainer: Retainer | None = None

@@ -110,10 +110,11 @@ def build_fe_scene(
     """Reduced model for the harmonics 0..n_harmonics.
 
     Displacements of the reduced model: first the relative ones, pair by pair normal (positive when the pair closes),
-    first and second tangent; then modal coordinates of the glued structure. The static load, that of the
-    rotation and the preload, enters nodal diameter 0 only, the unit harmonic load that of the excitation only. The
-    damping is `loss_factor / omega_1` times the stiffness without prestress where that is known, omega_1 the first
-    frequency of the glued structure, rad/s, at the nodal diameter of the excitation. Coriolis forces are left out.
+    first and second tangent; then modal coordinates of the glued structure. The static load, that of the rotation and
+    the preload, enters nodal diameter 0 only, the unit harmonic load that of the excitation only. The damping is that
+    of the model's matrices, else `loss_factor / omega_1` times the stiffness without prestress where that is known,
+    omega_1 the first frequency of the glued structure, rad/s, at the nodal diameter of the excitation. Coriolis forces
+    are left out.
 
     Raises SceneError where the model describes no possible joint.
     """
@@ -143,7 +144,7 @@ def build_fe_scene(
             stiffness = reduced.forms["stiffness"]
             linear[k] = LinearModel(
                 mass=reduced.forms["mass"],
-                damping=damping * reduced.forms.get("elastic", stiffness),
+                damping=reduced.forms.get("damping", damping * reduced.forms.get("elastic", stiffness)),
                 stiffness=_retained(stiffness, pairs, joint.retainer),
                 load_static=static.real * (k == 0),
                 load_harmonic=load.astype(complex) * (k == excited),
@@ -194,7 +195,7 @@ def prepare_model(
     pairs = pairs_of_sector(pairs, supports)
     ties = None if glued is None else ties_of_structure(glued, supports, pairs)
     if isinstance(model, MatrixModel):
-        return _prepare(model, {"stiffness": model.stiffness, "mass": model.mass}, joint, supports, pairs, ties)
+        return _prepare(model, model.forms, joint, supports, pairs, ties)
     progress("assembly of stiffness and mass")
     check_elements(model.mesh)
     elastic, mass = (model.padded(form) for form in (assemble_stiffness(model.mesh), assemble_mass(model.mesh)))

@@ -134,6 +134,6 @@ def _scene_attribute(model: str, name: str) -> Any:
 
 def _scene_module(model: str) -> ModuleType:
     if model not in BUNDLED:
-        remedy = f"give one of {', '.join(BUNDLED)}, or the path of a scene file or of a model (.inp, .msh, .cdb)"
+        remedy = f"give one of {', '.join(BUNDLED)}, or the path of a scene file or of a model (.inp, .msh, .cdb, .csv)"
         raise SceneError("model", f'no bundled scene is called "{model}"', remedy)
     return import_module(f"{__name__}.{model}")

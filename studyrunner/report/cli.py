@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rich.status import Status
 
     from studyrunner.report.drawing import Item
+    from studyrunner.result.view import Result
 
 WRITTEN, UNEXPECTED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 """Exit statuses."""
@@ -34,7 +35,7 @@ examples:
   study-report results/worn.nc -o figures     the same into the folder figures
   study-report dovetail.nc --vtu              also dovetail-report/root.pvd, the worn root for ParaView
   study-report dovetail.nc --point frequency=211.75,scheme=implicit    figures of single points show this one
-  study-report dovetail.nc --worn-response --loops 25    computes what the file does not hold of the worn joint
+  study-report dovetail.nc --loops 25         also fretting loops of pair 25, computed from the wear depths of the file
   study-report scar.nc --measured profile.csv the wear scar beside a measured one
 
 exit status:
@@ -82,9 +83,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
         help="the point that root, maps, loops and --vtu show (default: the most worn one)",
     )
     parser.add_argument(
-        "--worn-response",
-        action="store_true",
-        help="compute the response curve of the joint worn as that point",
+        "--no-compute", action="store_true", help="draw what the file holds, without the response of the worn joint"
     )
     parser.add_argument(
         "--loops",
@@ -168,13 +167,10 @@ def _report(options: argparse.Namespace) -> int:
             write_series = find_writer(result) if options.vtu else None
             folder = options.folder or Path(f"{options.result.stem}-report")
             _make_folder(folder)
-            page, what = folder / "index.html", _to_compute(options)
-            if any(what.values()):
-                from studyrunner.worn_joint import compute_worn_joint
-
-                status.stop()
-                result = replace(result, again=compute_worn_joint(options.result, folder, point=options.point, **what))
-                status.start()
+            page = folder / "index.html"
+            status.stop()
+            result = _compute(result, folder, options)
+            status.start()
             summary = write_page(result, _say(draw_report(result), status), page)
             series = write_series(folder) if write_series else None
     shown = f"{count(summary.n_drawings, 'figure')}, {count(summary.n_tables, 'table')}, {summary.n_missing} left out"
@@ -185,10 +181,21 @@ def _report(options: argparse.Namespace) -> int:
     return WRITTEN
 
 
-def _to_compute(options: argparse.Namespace) -> dict[str, Any]:
-    """What `compute_worn_joint` is asked for."""
-    names = {"loops": "loops", "response": "worn_response", "natural_frequencies": "natural_frequencies"}
-    return {name: getattr(options, option) for name, option in names.items()}
+def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Result:
+    """The result with what its file does not hold of the worn joint: what was asked for, and its response curve."""
+    from studyrunner.worn_joint import compute_worn_joint, has_worn_response
+
+    given: dict[str, Any] = {"path": options.result, "folder": folder, "point": options.point}
+    asked = {"loops": options.loops, "natural_frequencies": options.natural_frequencies}
+    again = compute_worn_joint(**given, **asked) if any(asked.values()) else {}
+    why = ""
+    if not options.no_compute and has_worn_response(result):
+        try:
+            again |= compute_worn_joint(**given, response=True)
+        except UserError as error:
+            # a report of what there is, where the scene is gone or the file has no depths
+            why = str(error)
+    return replace(result, again=again, no_worn_response=why)
 
 
 def _say(items: Iterable[Item], status: Status) -> Iterator[Item]:

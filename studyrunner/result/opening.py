@@ -37,6 +37,9 @@ _LONGEST_NAME, _LONGEST_SENTENCE = 120, 400
 _DEEPEST, _INTEGERS = 3, 2.0**63  # of what is nested in a study
 _REMEDY = "give a result file of run-study that is whole"
 
+ENDED = "ended"
+"""Coordinate of an opened result: `outcome` in words."""
+
 _WITHOUT_AXES = SCENE["mesh"] | SCENE["natural_frequency"] | {"stuck_frequency": STUCK_FREQUENCY}
 _OF_CONTACTS = {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
 _TEXTS = ("scheme", "sweep", "response", "component", "block")
@@ -54,10 +57,11 @@ class _WrongError(Exception):
 def open_result(path: str | Path) -> xr.Dataset:
     """Open a result file after a check that it is a result of `run-study`: sizes, dimensions and types.
 
-    The dataset is that of `xarray.open_dataset(path)`, read when it is needed, and has the accessor `fretwear`. Loops
-    have the dimension `loop_contact`, the pairs that have loops, in place of `contact`, along which most are NaN. The
-    file stays open until the dataset is closed: use it in a `with` statement, or call its `load` and `close`. A file
-    that is replaced meanwhile, by another run, stays as it was for this dataset.
+    The dataset is that of `xarray.open_dataset(path)`, read when it is needed, and has the accessor `fretwear`. Two
+    things are added for the reader: the coordinate `ended`, which is `outcome` in words; and loops have the dimension
+    `loop_contact`, the pairs that have loops, in place of `contact`, along which most are NaN. The file stays open
+    until the dataset is closed: use it in a `with` statement, or call its `load` and `close`. A file that is replaced
+    meanwhile, by another run, stays as it was for this dataset.
 
     Raises
     ------
@@ -65,18 +69,28 @@ def open_result(path: str | Path) -> xr.Dataset:
         Where there is no such file, it is no result of `run-study`, or it is damaged: one line.
     """
     opened = _open(path)[0]
+    # without axes of one value, which would leave no room for the words where the dataset is printed
+    kept = opened.assign_coords({ENDED: outcome_words(opened["outcome"]).squeeze(drop=True)})
     loops = [name for name in LOOPS if name in opened]
     asked = study_tables(opened.attrs).get("outputs", {}).get("loops")
     pairs = [pair for pair in opened["contact"].values.tolist() if isinstance(asked, list) and pair in asked]
-    if not loops or not pairs:
-        return opened
-    others = [name for name, array in opened.coords.items() if "contact" in array.dims and name != "contact"]
-    own = opened[loops].drop_vars(others).sel(contact=pairs).rename(contact="loop_contact")
-    own["loop_contact"].attrs["long_name"] = "index of a contact pair whose loops are kept, see outputs.loops"
-    kept = opened.drop_vars(loops).assign(own.data_vars)
+    if loops and pairs:
+        others = [name for name, array in kept.coords.items() if "contact" in array.dims and name != "contact"]
+        own = kept[loops].drop_vars(others).sel(contact=pairs).rename(contact="loop_contact")
+        own["loop_contact"].attrs["long_name"] = "index of a contact pair whose loops are kept, see outputs.loops"
+        kept = kept.drop_vars(loops).assign(own.data_vars)
     kept.encoding = opened.encoding
     kept.set_close(opened.close)
     return kept
+
+
+def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
+    """How each point ended, as a word of the attribute `flag_meanings` of `outcome`."""
+    numbers = np.atleast_1d(outcome.attrs.get("flag_values", ())).tolist()
+    words = dict(zip(numbers, str(outcome.attrs.get("flag_meanings", "")).split(), strict=False))
+    named = [words.get(number, f"outcome_{number}") for number in outcome.values.ravel().tolist()]
+    found = outcome.copy(data=np.array(named, dtype=np.str_).reshape(outcome.shape)).drop_attrs(deep=False)
+    return found.assign_attrs(long_name="how the computation of the point ended, in a word")
 
 
 def open_known(path: str | Path) -> xr.Dataset:

@@ -46,7 +46,7 @@ class Result(Points):
     of several, and how many the file has. blocks: of a result of missions what belongs to single blocks; in `dataset`
     missions then have the name of the cycles that they replace. chosen: values of axes of the point that figures of a
     single point show. measured: a worn profile to compare with. again: what was computed anew of the worn joint of the
-    shown point, see `studyrunner.worn_joint`.
+    shown point, see `studyrunner.worn_joint`. no_worn_response: why its response curve is not among them.
     """
 
     path: Path
@@ -56,6 +56,7 @@ class Result(Points):
     chosen: Mapping[str, float | str] = field(default_factory=dict)
     measured: Profile | None = None
     again: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    no_worn_response: str = ""
 
     # --- the file ---
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import cholesky
 
 from studyrunner.scatter.design import unit_design
-from studyrunner.scatter.section import Kind, Scattered, ScatterSection
+from studyrunner.scatter.section import Array, Distribution, Scattered, ScatterSection
 from studyrunner.user_error import WrongValueError
 
 _ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
@@ -28,38 +28,36 @@ class ScatteredPairs:
     """Contact pairs between which inputs may differ. surface (n_pairs,): labels. position (n_pairs, 3): m, or NaN."""
 
     surface: tuple[str, ...]
-    position: NDArray[np.float64]
+    position: Array
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """What the samples draw of an input: values, or offsets from the study's own value, or factors of it (`kind`).
-
-    values (samples,), or (samples, n_pairs) where pairs differ; unit of the input.
+    """What the samples draw of an input: standard normal scores (samples,), or (samples, n_pairs) where pairs differ,
+    of its distribution.
     """
 
-    values: NDArray[np.float64]
-    kind: Kind
+    score: Array
+    distribution: Distribution
 
-    def apply(self, own: ArrayLike) -> NDArray[np.float64]:
+    def apply(self, own: ArrayLike) -> Array:
         """The input (samples,) or (samples, n_pairs), of the study's own value: a number, or (n_pairs,).
 
         Without width it is the own value to the last bit.
         """
         own = np.asarray(own, dtype=np.float64)
-        values = self.values if own.ndim == 0 or self.values.ndim == 2 else self.values[:, None]
-        if self.kind == "offset":
-            return np.asarray(own + values)
-        return np.asarray(own * values if self.kind == "factor" else np.zeros_like(own) + values)
+        score = self.score if own.ndim == 0 or self.score.ndim == 2 else self.score[:, None]
+        return np.zeros_like(own + score) + self.distribution.at(own, score)
 
 
 def drawn(section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: ScatteredPairs) -> dict[str, Drawn]:
     """What the samples draw of each input that scatters, in the order of `section.inputs`.
 
-    own_values: of the study: a number, (n_pairs,), or (n_values, 1) for an axis; not needed where `kind` is "value".
+    own_values: of the study: a number, (n_pairs,), or (n_values, 1) for an axis; not needed for an absolute
+    distribution.
 
     Raises WrongValueError, with its key, where a draw is none that physics allows, positions that a correlation length
-    needs are missing, or a relative width is one of 0.
+    needs are missing, or a width is a share of 0.
     """
     from scipy.special import ndtri  # where it is used: it takes a while to load
 
@@ -75,19 +73,17 @@ def drawn(section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: S
             score = score[:, [labels.index(label) for label in pairs.surface]]
         elif scattered.correlation_length is not None:
             score = score @ _field(name, scattered.correlation_length, pairs).T
-        kind = scattered.distribution.kind
-        found[name] = Drawn(scattered.distribution.draw(score if scattered.of != "all pairs" else score[:, 0]), kind)
-        _check(name, scattered, found[name], 0.0 if kind == "value" else own_values[name])
+        found[name] = Drawn(score if scattered.of != "all pairs" else score[:, 0], scattered.distribution)
+        _check(name, scattered, found[name], own_values.get(name, 0.0))
     return found
 
 
 def largest_draw(scattered: Scattered, own: float, score: float) -> float:
     """The value of an input so many standard deviations up, or the same share of a uniform one. own: study's value."""
-    distribution = scattered.distribution
-    return float(Drawn(distribution.draw(np.array([score])), distribution.kind).apply(own)[0])
+    return float(scattered.distribution.at(np.array(own), np.array(score)))
 
 
-def _field(name: str, length: float, pairs: ScatteredPairs) -> NDArray[np.float64]:
+def _field(name: str, length: float, pairs: ScatteredPairs) -> Array:
     """Factor L (n_pairs, n_pairs) of a Gaussian field L z of unit variance, z independent.
 
     Correlation exp(-(r / length)^2 / 2) of two pairs of a surface at the distance r; surfaces are independent.
@@ -105,8 +101,9 @@ def _field(name: str, length: float, pairs: ScatteredPairs) -> NDArray[np.float6
 def _check(name: str, scattered: Scattered, draw: Drawn, own: ArrayLike) -> None:
     """Refuses draws that physics forbids. own: numbers, or rows of values of all pairs."""
     rows = np.atleast_2d(np.asarray(own, dtype=np.float64))
-    shown = scattered.distribution.model_dump()
-    if draw.kind == "factor" and (draw.values != 1.0).any() and not rows.any():
+    distribution = scattered.distribution
+    shown = distribution.model_dump(exclude_none=True)
+    if not distribution.is_absolute and not rows.any() and not draw.apply(0.0).any() and draw.apply(1.0).std() > 0.0:
         remedy = "give a width in the unit of the input: the study's own value is 0, of which a share is nothing"
         raise WrongValueError(shown, remedy, f"scatter.{name}")
     smallest = min(float(draw.apply(row).min()) for row in rows)

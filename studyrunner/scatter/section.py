@@ -3,111 +3,109 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, model_serializer, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from studyrunner.values import NotNegative, Positive, Section, Whole, Wrong
 
+Array = NDArray[np.float64]
 Method = Literal["sobol", "latin_hypercube", "random", "saltelli"]
-Kind = Literal["value", "offset", "factor"]
-"""What is drawn of an input: its values, or offsets from, or factors of the study's own value."""
 Of = Literal["all pairs", "each surface", "each pair"]
 
 OF_PAIRS = ("area", "friction_coefficient", "gap")
 """Inputs that may differ between the contact pairs; named as in a scene file."""
 
 
-class _Table(Section):
-    """A table that is written without the keys that nothing is given for."""
+class Distribution(Section):
+    """A distribution. LOCATION: key of its location, which is the study's own value where it is left out.
 
-    @model_serializer(mode="wrap")
-    def _without_empty_keys(self, serialize: Any) -> dict[str, object]:
-        return {key: value for key, value in serialize(self).items() if value is not None}
+    WIDTHS: sets of keys of which one has to be given.
+    """
+
+    LOCATION: ClassVar[str]
+    WIDTHS: ClassVar[tuple[tuple[str, ...], ...]]
+
+    @model_validator(mode="after")
+    def _check(self) -> Distribution:
+        given = {key for key in type(self).model_fields if getattr(self, key) is not None} - {self.LOCATION}
+        if given not in [{*keys} - {self.LOCATION} for keys in self.WIDTHS]:
+            raise ValueError(f"give either {', or '.join(' and '.join(keys) for keys in self.WIDTHS)}")
+        return self
+
+    @property
+    def is_absolute(self) -> bool:
+        """Whether the location is given."""
+        return getattr(self, self.LOCATION) is not None
+
+    def at(self, own: Array, score: Array) -> Array:
+        """What is drawn, of standard normal scores. own: the study's own value, in the unit of the input."""
+        raise NotImplementedError
 
 
-class Normal(_Table):
-    """Normal distribution. mean: unit of the input; the study's own value where it is left out."""
+class Normal(Distribution):
+    """Normal distribution. mean, std: unit of the input. relative_std: share of the mean."""
+
+    LOCATION = "mean"
+    WIDTHS = (("std",), ("relative_std",))
 
     mean: float | None = None
     std: NotNegative | None = None
     relative_std: NotNegative | None = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if (self.std is None) == (self.relative_std is None):
-            raise ValueError("give either std, in the unit of the input, or relative_std")
-        return self
-
-    @property
-    def kind(self) -> Kind:
-        """As `Kind` says."""
-        return "value" if self.mean is not None else "offset" if self.std is not None else "factor"
-
-    def draw(self, score: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What is drawn, of standard normal scores and in their shape."""
-        centre = {"value": self.mean or 0.0, "offset": 0.0, "factor": 1.0}[self.kind]
+    def at(self, own: Array, score: Array) -> Array:
+        """As `Distribution.at`."""
         if self.std is not None:
-            return centre + self.std * score
-        return centre + (self.relative_std or 0.0) * abs(centre) * score
+            return (own if self.mean is None else self.mean) + self.std * score
+        share = (self.relative_std or 0.0) * score
+        return own * (1.0 + share) if self.mean is None else self.mean + abs(self.mean) * share
 
 
-class Lognormal(_Table):
-    """Lognormal distribution. median: unit of the input; the study's own value where it is left out.
+class Lognormal(Distribution):
+    """Lognormal distribution. median: unit of the input.
 
     factor: ratio of the 84 % quantile to the median, exp of the standard deviation of the logarithm.
     """
 
+    LOCATION = "median"
+    WIDTHS = (("factor",),)
+
     median: Positive | None = None
     factor: Annotated[float, Field(ge=1)] = Field(description="1 or more")
 
-    @property
-    def kind(self) -> Kind:
-        """As `Kind` says."""
-        return "factor" if self.median is None else "value"
-
-    def draw(self, score: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What is drawn, of standard normal scores and in their shape."""
-        return (self.median or 1.0) * self.factor**score
+    def at(self, own: Array, score: Array) -> Array:
+        """As `Distribution.at`."""
+        return (own if self.median is None else self.median) * self.factor**score
 
 
-class Uniform(_Table):
+class Uniform(Distribution):
     """Uniform distribution from low to high, or of this half width around the study's own value; unit of the input."""
+
+    LOCATION = "low"
+    WIDTHS = (("low", "high"), ("half_width",))
 
     low: float | None = None
     high: float | None = None
     half_width: NotNegative | None = None
 
     @model_validator(mode="after")
-    def _check(self) -> Self:
-        ends = (self.low, self.high)
-        if ends.count(None) != (0 if self.half_width is None else 2):
-            raise ValueError("give either low and high, or half_width")
-        if self.low is not None and self.high is not None and self.low >= self.high:
-            raise ValueError("give a high above low")
+    def _check_ends(self) -> Uniform:
+        if (self.low is None) != (self.high is None) or (self.high is not None and self.low >= self.high):
+            raise ValueError("give low and a high above low")
         return self
 
-    @property
-    def kind(self) -> Kind:
-        """As `Kind` says."""
-        return "offset" if self.low is None else "value"
-
-    def draw(self, score: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What is drawn, of standard normal scores and in their shape."""
+    def at(self, own: Array, score: Array) -> Array:
+        """As `Distribution.at`."""
         from scipy.special import ndtr  # where it is used: it takes a while to load
 
-        share = ndtr(score)
         if self.low is not None and self.high is not None:
-            return np.asarray(self.low + (self.high - self.low) * share)
-        return np.asarray((self.half_width or 0.0) * (2.0 * share - 1.0))
+            return self.low + (self.high - self.low) * ndtr(score)
+        return own + (self.half_width or 0.0) * (2.0 * ndtr(score) - 1.0)
 
 
-Distribution = Normal | Lognormal | Uniform
-
-
-class Scattered(_Table):
+class Scattered(Section):
     """How one input scatters: its distribution, what has a draw of its own, and the correlation length, m."""
 
     normal: Normal | None = None

@@ -38,13 +38,8 @@ class Computed(Protocol):
 class InMemory(dict[str, Packed]):
     """A `Computed` without a file, for commands that leave nothing behind."""
 
-    def keep_computed(self, key: str, value: Packed) -> None:
-        """Keeps a value."""
-        self[key] = value
-
-    def read_computed(self, key: str) -> Packed | None:
-        """What was kept; None where there is nothing."""
-        return self.get(key)
+    keep_computed = dict.__setitem__
+    read_computed = dict.get
 
 
 def model_once(study: Study, n_harmonics: int, computed: Computed, build: Callable[[], ReducedModel]) -> ReducedModel:
@@ -77,32 +72,14 @@ def read_model(study: Study, n_harmonics: int, computed: Computed) -> ReducedMod
 
 
 def frequencies_once(study: Study, computed: Computed) -> NaturalFrequencies:
-    """Natural frequencies of a bundled scene: those of an earlier run, and what that run had left to compute.
-
-    An interrupted run loses `LEAST_SECONDS` of work at most.
-    """
-    key, scene = _key("natural frequencies", study), study.scene
-    known = _read(key, computed, lambda packed: NaturalFrequencies(*unpack(packed)))
-    began = last = time.monotonic()
-
-    def keep(found: NaturalFrequencies, since: float) -> None:
-        nonlocal last
-        if time.monotonic() > since + LEAST_SECONDS:
-            computed.keep_computed(key, pack((found.nodal_diameters, found.frequencies)))
-            last = time.monotonic()
-
-    found = scene_frequencies(scene.model, scene.parameters, known, lambda found: keep(found, last))
-    keep(found, began)
-    return found
-
-
-def _read(key: str, computed: Computed, unpacked: Callable[[Packed], T]) -> T | None:
-    """A value that an earlier run has kept; None where there is none, or a damaged one, or one of another version."""
-    known = computed.read_computed(key)
-    if known is not None:
-        with contextlib.suppress(ValueError, KeyError, TypeError, IndexError, AttributeError):
-            return unpacked(known)
-    return None
+    """Natural frequencies of a bundled scene, computed or from an earlier run."""
+    return _once(
+        _key("natural frequencies", study),
+        computed,
+        lambda: scene_frequencies(study.scene.model, study.scene.parameters),
+        lambda found: pack((found.nodal_diameters, found.frequencies)),
+        lambda packed: NaturalFrequencies(*unpack(packed)),
+    )
 
 
 def _once(
@@ -112,9 +89,11 @@ def _once(
     packed: Callable[[T], Packed | None],
     unpacked: Callable[[Packed], T],
 ) -> T:
-    known = _read(key, computed, unpacked)
+    known = computed.read_computed(key)
     if known is not None:
-        return known
+        # what is damaged, or of another version, is computed again
+        with contextlib.suppress(ValueError, KeyError, TypeError, IndexError, AttributeError):
+            return unpacked(known)
     began = time.monotonic()
     found = compute()
     if time.monotonic() > began + LEAST_SECONDS and (value := packed(found)) is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from studyrunner.user_error import UserError, WrongValueError
 
 ContactChange = tuple[tuple[str, tuple[float, ...]], ...]
 """Names of arrays of the contact interface with their values for all pairs, in place of those of the scene."""
+
+_Values = dict[str, NDArray[np.float64]]
 
 
 def contact_changes(
@@ -49,42 +51,28 @@ def _of_parts(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> tu
 
 def drawn_pairs(
     study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]
-) -> Iterator[tuple[Study, SceneFacts, dict[str, NDArray[np.float64]]]]:
+) -> Iterator[tuple[Study, SceneFacts, _Values]]:
     """For each part of a study its variant, its scene, and drawn values (n_contact,) of the inputs of pairs.
 
     facts: of each scene. Raises UserError where a sample draws a value that is none.
     """
     n_samples = 1 if study.scatter is None else study.scatter.realisations
     for place, variant in enumerate(study.variants or (study,)):
-        drawn: tuple[SceneFacts, dict[str, NDArray[np.float64]]] | None = None
+        # scenes of samples mostly have the same pairs, and then the same draws
+        drawn: dict[Hashable, _Values] = {}
         for sample, number in enumerate(scenes.numbers[place * n_samples : (place + 1) * n_samples]):
             own = facts[number]
-            # scenes of samples mostly have the same pairs, and then the same draws
-            if drawn is None or not _draws_alike(drawn[0], own):
-                drawn = own, pair_values(variant, own) if scatters_pairs(study) else {}
-            yield variant, own, {name: each[sample] for name, each in drawn[1].items()}
+            values = own.gap, own.friction_coefficient
+            key = own.pairs, *(None if each is None else each.tobytes() for each in values)
+            if key not in drawn:
+                drawn[key] = pair_values(variant, own) if scatters_pairs(study) else {}
+            yield variant, own, {name: each[sample] for name, each in drawn[key].items()}
 
 
 def scatters_pairs(study: Study) -> bool:
     """Whether samples draw values of contact pairs."""
     inputs = {} if study.scatter is None else study.scatter.inputs
     return any(is_of_pairs(name, each) for name, each in inputs.items())
-
-
-def _draws_alike(one: SceneFacts, other: SceneFacts) -> bool:
-    """Whether the pairs of two scenes draw the same values."""
-    if one is other:
-        return True
-    frictions = [
-        None if each.friction_coefficient is None else each.friction_coefficient.tolist() for each in (one, other)
-    ]
-    return (
-        one.surface == other.surface
-        and np.array_equal(one.position, other.position, equal_nan=True)
-        and np.array_equal(one.area, other.area)
-        and np.array_equal(one.gap, other.gap)
-        and frictions[0] == frictions[1]
-    )
 
 
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
@@ -97,7 +85,7 @@ def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
         raise UserError(study.source, "scene.worn.depth", error.value, error.remedy) from None
 
 
-def pair_values(study: Study, facts: SceneFacts) -> dict[str, NDArray[np.float64]]:
+def pair_values(study: Study, facts: SceneFacts) -> _Values:
     """Values (n_samples, n_contact) of the inputs that belong to pairs. study: with one scene. Raises UserError."""
     friction = facts.friction_coefficient
     if friction is None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,6 +55,11 @@ class SceneFacts:
     edge: NDArray[np.bool_] | None = None
     gap: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     friction_coefficient: NDArray[np.float64] | None = None
+
+    @cached_property
+    def pairs(self) -> Hashable:
+        """Where and how large the contact pairs are; equal for scenes with the same pairs."""
+        return self.surface, self.position.tobytes(), self.area.tobytes()
 
 
 def _silent(_: str) -> None:

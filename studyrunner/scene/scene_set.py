@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,7 +68,7 @@ def _key(study: Study) -> str:
     return json.dumps([scene.model, scene_parameters_of(study), where, harmonics_to_build(study)], sort_keys=True)
 
 
-def at_ratios(scenes: SceneSet, facts: Mapping[int, SceneFacts]) -> SceneSet:
+def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
     """The same with excitation frequencies in Hz, where the study gives their ratios. facts: of each scene.
 
     Raises UserError where a scene has no natural frequency with the joint stuck.
@@ -100,11 +100,9 @@ def check_blocks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) ->
     """Raises UserError where the blocks of a mission do not have equal pairs. facts: of each scene."""
     for numbers in scenes.of_blocks:
         for block, number in zip(study.mission, numbers, strict=True):
-            if not _same_pairs(facts[numbers[0]], facts[number]):
-                remedy = (
-                    f"give parameters with which it has the contact pairs of {study.mission[0].name}: wear is carried"
-                )
-                raise UserError(study.source, f"mission.{block.name}", None, f"{remedy} from block to block")
+            if facts[numbers[0]].pairs != facts[number].pairs:
+                remedy = f"give parameters with which it has the contact pairs of {study.mission[0].name}, which wear"
+                raise UserError(study.source, f"mission.{block.name}", None, remedy)
 
 
 def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
@@ -141,8 +139,9 @@ class PairArrays:
 
 def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | None = None) -> PairArrays:
     """Positions, areas and labels of the pairs of all scenes of a study. facts: of each scene of `find_scenes`."""
-    one = facts[0]
-    if all(_same_pairs(one, each) for each in facts[1:]):
+    names, numbers = axes_of_difference(study, scenes or find_scenes(study), [each.pairs for each in facts])
+    if not names:
+        one = facts[0]
         return PairArrays(("contact",), one.position, one.area, np.array(one.surface), None)
     n_contact = max(len(each.area) for each in facts)
     shape = (len(facts), n_contact)
@@ -151,9 +150,6 @@ def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | No
     for number, each in enumerate(facts):
         own = slice(len(each.area))
         position[number, own], area[number, own], surface[number, own] = each.position, each.area, each.surface
-    names, numbers = axes_of_difference(
-        study, scenes or find_scenes(study), lambda a, b: _same_pairs(facts[a], facts[b])
-    )
     exists = np.isfinite(area[numbers])
     return PairArrays((*names, "contact"), position[numbers], area[numbers], surface[numbers], exists)
 
@@ -163,33 +159,24 @@ def stuck_frequencies_of(
 ) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     """First natural frequencies, Hz, with the joint stuck: axes along which they differ, and values along these."""
     found = np.array([each.stuck_frequency for each in facts])
-    if np.unique(found).size == 1:
-        return (), found[0]
-    names, numbers = axes_of_difference(study, scenes, lambda a, b: np.array_equal(found[a], found[b], equal_nan=True))
+    names, numbers = axes_of_difference(study, scenes, [each.tobytes() for each in found])
     return names, found[numbers]
 
 
 def axes_of_difference(
-    study: Study, scenes: SceneSet, are_equal: Callable[[int, int], bool]
+    study: Study, scenes: SceneSet, keys: Sequence[Hashable]
 ) -> tuple[tuple[str, ...], NDArray[np.intp]]:
     """Names of the axes along which something differs between the scenes, and numbers of scenes along these axes.
 
-    are_equal: whether two scenes, given by number, are equal in it.
+    keys: of each scene, equal where the scenes are equal in it.
     """
-    numbers = np.array(scenes.numbers).reshape([len(values) for values in study.axes_of_parts.values()])
+    first: dict[Hashable, int] = {}
+    alike = np.array([first.setdefault(key, number) for number, key in enumerate(keys)])
+    numbers = alike[list(scenes.numbers)].reshape([len(values) for values in study.axes_of_parts.values()])
     names = []
     for place, name in reversed(list(enumerate(study.axes_of_parts))):
-        first = np.broadcast_to(numbers.take([0], axis=place), numbers.shape)
-        if all(a == b or are_equal(a, b) for a, b in zip(first.flat, numbers.flat, strict=True)):
+        if (numbers == numbers.take([0], axis=place)).all():
             numbers = numbers.take(0, axis=place)
         else:
             names.append(name)
     return tuple(reversed(names)), numbers
-
-
-def _same_pairs(one: SceneFacts, other: SceneFacts) -> bool:
-    return (
-        one.surface == other.surface
-        and np.array_equal(one.position, other.position, equal_nan=True)
-        and np.array_equal(one.area, other.area)
-    )

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from pydantic import BaseModel
 
-from studies.scene_answers import WearQuestion
+from studies.scene_answers import ExactAnswer, WearQuestion
 from studies.scenes import changed_keys, scene_answer
 from studyrunner.coordinates import SCENE
 from studyrunner.scene.scene_set import SceneSet, axes_of_difference
@@ -32,23 +32,14 @@ def join_scene_variables(
         if len({each.values.shape for each in variables}) > 1:
             left_out.append(first.name)
             continue
-        names, numbers = axes_of_difference(
-            study,
-            scenes,
-            lambda a, b, v=variables: _equal(v[a], v[b]),  # type: ignore[misc]
-        )
-        if not names:
-            joined.append(first)
-            continue
-        values = np.stack([each.values for each in variables])[numbers]
-        entry = replace(first.entry, dimensions=(*names, *(first.entry.dimensions or (first.name,))))
-        joined.append(replace(first, entry=entry, values=values, coordinate=False))
+        names, numbers = axes_of_difference(study, scenes, [each.values.tobytes() for each in variables])
+        if names:
+            values = np.stack([each.values for each in variables])[numbers]
+            entry = replace(first.entry, dimensions=(*names, *(first.entry.dimensions or (first.name,))))
+            first = replace(first, entry=entry, values=values, coordinate=False)
+        joined.append(first)
     notes = [f"{', '.join(left_out)}: left out of the result, as the scenes differ in their sizes"] if left_out else []
     return tuple(joined), tuple(notes)
-
-
-def _equal(one: SceneVariable, other: SceneVariable) -> bool:
-    return np.array_equal(one.values, other.values, equal_nan=one.values.dtype.kind == "f")
 
 
 def exact_answers(study: Study) -> tuple[SceneVariable, ...]:
@@ -98,29 +89,17 @@ def _changed(study: Study) -> frozenset[str]:
 def _answers(study: Study) -> dict[str, np.ndarray]:
     axes, changed = study.axes, _changed(study)
     (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
-    answers = [
-        [
-            scene_answer(
-                study.scene.model,
-                study.scene.parameters,
-                WearQuestion(
-                    frequency,
-                    amplitude,
-                    np.array(axes.wear_coefficient),
-                    np.array(study.cycles_kept),
-                    study.wear_law,
-                    depth,
-                    changed,
-                ),
-            )
-            for amplitude in axes.excitation_amplitude
-        ]
-        for frequency in axes.frequency
-    ]
+    counts, given = np.array(study.cycles_kept), np.array(axes.wear_coefficient)
+
+    def answer(frequency: float, amplitude: float) -> ExactAnswer:
+        asked = WearQuestion(frequency, amplitude, given, counts, study.wear_law, depth, changed)
+        return scene_answer(study.scene.model, study.scene.parameters, asked)
+
+    answers = [[answer(one, other) for other in axes.excitation_amplitude] for one in axes.frequency]
     others = (1,) * (len(study.own_axes) - 3)
     found = {}
     for name in SCENE["exact"]:
-        values = np.array([[getattr(answer, name.removeprefix("exact_")) for answer in row] for row in answers])
+        values = np.array([[getattr(each, name.removeprefix("exact_")) for each in row] for row in answers])
         # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
         values = np.swapaxes(values, 1, 2)
         found[name] = values.reshape(*values.shape[:3], *others, *values.shape[3:])

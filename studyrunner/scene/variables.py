@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +15,7 @@ from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import scene_has, scene_mesh
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.scene.computed import Computed, InMemory, frequencies_once
+from studyrunner.scene.computed import Computed, frequencies_once
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS, Variable
@@ -51,21 +50,16 @@ def check_outputs(study: Study, model: ReducedModel) -> None:
         if pair >= n_contact:
             remedy = f"give indices from 0 to {n_contact - 1}, the contact pairs of the scene"
             raise UserError(study.source, "outputs.loops", pair, remedy)
-    size = 8.0 * loop_numbers(study)
-    if size > _LARGEST_HISTORY:
-        remedy = f"give fewer pairs or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
-        raise UserError(study.source, "outputs.loops", list(loops), remedy)
-    sizes = {
-        **study.sizes,
-        "cycle": len(study.cycles_kept),
-        "contact": n_contact,
-        "response": len(model.response_names),
-    }
+    own = {"contact": n_contact, "response": len(model.response_names), "cycle": len(study.cycles_kept)}
+    sizes = {**own, **study.sizes}
+    of_loops = 8.0 * loop_numbers(study)
     # the variables of the certificate are there whether they are asked for or not
-    size += 8.0 * sum(math.prod(sizes[name] for name in entry.dimensions) for entry in study.variables.values())
+    size = of_loops + 8.0 * sum(math.prod(sizes[name] for name in each.dimensions) for each in study.variables.values())
     if size > _LARGEST_HISTORY:
-        remedy = f"give fewer: one point would take {1e-9 * size:.1f} GB"
-        raise UserError(study.source, "slow_time.outputs", len(study.cycles_kept), remedy)
+        loops_alone = of_loops > _LARGEST_HISTORY
+        key, value = ("loops", list(loops)) if loops_alone else ("outputs", len(study.cycles_kept))
+        remedy = f"give fewer{' pairs or slow_time.outputs' if loops_alone else ''}: one point would take {1e-9 * size:.1f} GB"
+        raise UserError(study.source, f"{'outputs' if loops_alone else 'slow_time'}.{key}", value, remedy)
     if "natural_frequency" in study.scene_variables and not _has_frequencies(study):
         with _user_errors(study):
             stuck_frequencies(model)
@@ -73,31 +67,21 @@ def check_outputs(study: Study, model: ReducedModel) -> None:
 
 def loop_numbers(study: Study) -> int:
     """Numbers in the loops of one point."""
-    each = LOOP_PHASES * len(LOOP_COMPONENTS) * len(LOOPS)
-    return len(study.outputs.loops) * len(study.cycles_kept) * each
+    return len(study.outputs.loops) * len(study.cycles_kept) * LOOP_PHASES * len(LOOP_COMPONENTS) * len(LOOPS)
 
 
-def build_scene_variables(
-    study: Study, model: ReducedModel, computed: Computed | None = None
-) -> tuple[SceneVariable, ...]:
+def build_scene_variables(study: Study, model: ReducedModel, computed: Computed) -> tuple[SceneVariable, ...]:
     """What the study asks of its scene, but exact answers. Natural frequencies of a bundled sector take some seconds.
 
-    computed: holds those of an earlier run.
-
-    Raises
-    ------
-    UserError
-        Where the scene cannot give them.
+    computed: holds those of an earlier run. Raises UserError where the scene cannot give them.
     """
-    asked = study.scene_variables
-    kept = InMemory() if computed is None else computed
+    found: list[SceneVariable] = []
     with _user_errors(study):
-        return tuple(
-            variable
-            for name, build in (("mesh", _mesh), ("natural_frequency", partial(_frequencies, kept)))
-            if name in asked
-            for variable in build(study, model)
-        )
+        if "mesh" in study.scene_variables:
+            found += _mesh(study)
+        if "natural_frequency" in study.scene_variables:
+            found += _frequencies(computed, study, model)
+    return tuple(found)
 
 
 @contextmanager
@@ -132,7 +116,7 @@ def build_mesh(study: Study) -> SurfaceMesh | None:
     return read_mesh(scene.path, scene.group)
 
 
-def _mesh(study: Study, _: ReducedModel) -> Iterator[SceneVariable]:
+def _mesh(study: Study) -> Iterator[SceneVariable]:
     mesh = build_mesh(study)
     if mesh is None:
         raise SceneError("variables", "mesh", "leave it out: the scene has none")

@@ -1,7 +1,7 @@
 """Quantiles and probabilities of samples, and what each input decides, with confidence intervals.
 
 The intervals are of independent samples. Samples of a Sobol' sequence or a Latin hypercube fill the distribution more
-evenly: their intervals are wider than necessary.
+evenly: their intervals are wider than necessary. Each estimate has ends and an interval (..., d, 2), see `band_of`.
 
 By hand: `scipy.stats.sobol_indices`, which is used, takes no samples without a value; `scipy.stats.spearmanr` gives no
 interval; the intervals of quantiles in `scipy.stats` are of one set of samples a call.
@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple
 
 import numpy as np
 from scipy.stats import beta, binom, norm, rankdata, sobol_indices
 
 from studyrunner.scatter.design import SaltelliLayout
-from studyrunner.statistics.samples import Array, Band, SampleValues, band_of
+from studyrunner.statistics.samples import Array, SampleValues, band_of
 
 FEWEST = 10
 """Samples, or base samples of a Saltelli design, below which no input is ranked: the interval of a rank correlation
@@ -30,7 +29,7 @@ _EQUAL = 1e-12
 """Share of a value by which samples differ that are equal."""
 
 
-def quantiles(values: SampleValues, probabilities: Sequence[float], confidence: float) -> Band:
+def quantiles(values: SampleValues, probabilities: Sequence[float], confidence: float) -> tuple[Array, Array]:
     """Quantiles (..., d) without interpolation: of n samples the one of rank ceil(n probability).
 
     The interval lies between two samples whose ranks follow from the binomial distribution, whatever the distribution
@@ -49,7 +48,7 @@ def quantiles(values: SampleValues, probabilities: Sequence[float], confidence: 
     return band_of(estimate, values)
 
 
-def exceedance(values: SampleValues, thresholds: Array, confidence: float) -> Band:
+def exceedance(values: SampleValues, thresholds: Array, confidence: float) -> tuple[Array, Array]:
     """Probabilities (..., d) of values above d thresholds, with the intervals of Clopper and Pearson (1934)."""
     n, tail = values.low.shape[-1], 0.5 * (1.0 - confidence)
 
@@ -62,15 +61,19 @@ def exceedance(values: SampleValues, thresholds: Array, confidence: float) -> Ba
     return band_of(estimate, values)
 
 
-def rank_correlations(inputs: Array, values: SampleValues, confidence: float) -> Band:
+def rank_correlations(inputs: Array, values: SampleValues, confidence: float) -> tuple[Array, Array]:
     """Spearman's rank correlations (..., d) of inputs (n, d) with values (..., n); NaN where nothing varies or n is
     below `FEWEST`. Intervals by Fisher's transformation (Bonett and Wright 2000).
     """
     n = len(inputs)
-    of_inputs = _normed_ranks(inputs.T)
+
+    def scores(y: Array) -> Array:
+        ranks = rankdata(y, axis=-1) - 0.5 * (n + 1)
+        length = np.linalg.norm(ranks, axis=-1, keepdims=True)
+        return np.asarray(ranks / np.where(length > 0.0, length, 1.0))
 
     def estimate(y: Array) -> tuple[Array, Array, Array]:
-        found = np.clip(_normed_ranks(y) @ of_inputs.T, -1.0, 1.0)
+        found = np.clip(scores(y) @ scores(inputs.T).T, -1.0, 1.0)
         margin = norm.ppf(0.5 + 0.5 * confidence) * np.sqrt((1.0 + 0.5 * found**2) / (n - 3.0))
         # that of 1 is infinite: the largest of other ranks, with two neighbours exchanged
         most = 1.0 - 12.0 / (n**3 - n)
@@ -83,7 +86,7 @@ def rank_correlations(inputs: Array, values: SampleValues, confidence: float) ->
 
 def saltelli_indices(
     layout: SaltelliLayout, inputs: Array, values: SampleValues, confidence: float
-) -> tuple[Band, Band]:
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
     """First and total Sobol' indices (..., d): share of the variance that an input decides alone, and with the others.
 
     layout: which of the n rows of inputs (n, d) and values (..., n) is what. NaN as in `rank_correlations`, with base
@@ -110,16 +113,8 @@ def saltelli_indices(
         ends = np.clip([found, found - margin, found + margin], 0.0, 1.0)
         return _where_varying(y, *ends.reshape(3, *y.shape[:-1], 2 * d))
 
-    whole = astuple(band_of(estimate, values.limited, inputs))
-    return Band(*(each[..., :d] for each in whole)), Band(*(each[..., d:] for each in whole))
-
-
-def _normed_ranks(values: Array) -> Array:
-    """Ranks (..., n) less their mean, with a sum of squares of 1; 0 for equal values."""
-    ranks = rankdata(values, axis=-1)
-    ranks -= ranks.mean(axis=-1, keepdims=True)
-    length = np.sqrt((ranks**2).sum(axis=-1, keepdims=True))
-    return np.asarray(np.divide(ranks, length, out=np.zeros_like(ranks), where=length > 0.0))
+    ends, interval = band_of(estimate, values.limited, inputs)
+    return (ends[..., :d, :], interval[..., :d, :]), (ends[..., d:, :], interval[..., d:, :])
 
 
 def _where_varying(y: Array, *estimates: Array) -> tuple[Array, Array, Array]:
@@ -128,5 +123,5 @@ def _where_varying(y: Array, *estimates: Array) -> tuple[Array, Array, Array]:
     return value, low, high
 
 
-def _unknown(values: SampleValues, d: int) -> Band:
-    return Band(*[np.full((*values.low.shape[:-1], d), math.nan)] * 6)
+def _unknown(values: SampleValues, d: int) -> tuple[Array, Array]:
+    return (nothing := np.full((*values.low.shape[:-1], d, 2), math.nan)), nothing.copy()

@@ -22,8 +22,15 @@ def describe_volumes(point: xr.Dataset) -> str:
     share = 100.0 * (probabilities[-1] - probabilities[0])
     text = f"{share:.4g} % of {int(point['n_samples'])} samples wear {_range(ends[0, 0], ends[-1, 1])} mm3"
     if 0.5 in probabilities:
-        middle = int(np.flatnonzero(probabilities == 0.5)[0])
-        text += f", median {_range(*ends[middle])} mm3 ({_error(point, middle)})"
+        middle = ends[probabilities == 0.5][0]
+        moved = point["worn_volume_quantile_error"].values[probabilities == 0.5][0] * _MM3
+        # how far the ends move, apart from what samples without a value may have
+        finite = np.isfinite(middle)
+        by = np.abs(moved[finite] - middle[finite])
+        error = "not known"
+        if finite.any() and np.isfinite(by).all():
+            error = show_percent(float(by.sum() / middle[finite].sum()) if by.any() else 0.0)
+        text += f", median {_range(*middle)} mm3 (numerical error {error})"
     text += f"; {n_without} have no volume that can be trusted" if n_without else ""
     n_lower, n_upper = point["group_size"].values.tolist()
     if n_upper:
@@ -35,23 +42,8 @@ def describe_volumes(point: xr.Dataset) -> str:
 
 
 def _range(low: float, high: float, *, digits: str = ".3g") -> str:
-    if math.isinf(high):
-        return f"above {low:{digits}}"
     first, last = f"{low:{digits}}", f"{high:{digits}}"
-    return first if first == last else f"{first} to {last}"
-
-
-def _error(point: xr.Dataset, middle: int) -> str:
-    """Numerical error of the median: how far its ends move, apart from what samples without a value may have."""
-    ends = point["worn_volume_quantile"].values[middle]
-    finite = np.isfinite(ends)
-    moved = np.abs(point["worn_volume_quantile_error"].values[middle][finite] - ends[finite])
-    if not (finite.any() and np.isfinite(moved).all()):
-        return "numerical error not known"
-    return f"numerical error {show_percent(float(moved.sum() / ends[finite].sum()) if moved.any() else 0.0)}"
-
-
-# --- which input decides ---
+    return f"above {first}" if math.isinf(high) else first if first == last else f"{first} to {last}"
 
 
 def measure_of(statistics: xr.Dataset) -> str | None:
@@ -68,9 +60,7 @@ def _measured(point: xr.Dataset) -> tuple[Array, Array]:
 
 def leading_input(point: xr.Dataset) -> int:
     """Place of the input with the largest estimate, whatever its uncertainty; the first where there is none."""
-    if measure_of(point) is None:
-        return 0
-    return int(np.argmax(np.abs(np.nan_to_num(_measured(point)[0])).max(axis=1)))
+    return int(np.argmax(np.abs(np.nan_to_num(_measured(point)[0])).max(axis=1))) if measure_of(point) else 0
 
 
 def deciding_input(point: xr.Dataset) -> int | None:

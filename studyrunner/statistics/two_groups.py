@@ -56,10 +56,14 @@ def two_groups(values: SampleValues) -> Groups | None:
     order = np.argsort(values.low[known], kind="stable")
     sample, error = values.low[known][order], values.error[known][order]
     gap, number = np.diff(sample), np.arange(len(sample) - 1)
-    chance = np.maximum(
-        _chance(gap, number, sample[:-1] - sample[:1]), _chance(gap, number[::-1], sample[-1:] - sample[1:])
-    )
-    passes = (chance * len(gap) < _FALSE_ALARMS) & (gap > error[:-1] + error[1:])
+
+    def chance(spacings: NDArray[np.intp], length: Array) -> Array:
+        # of a gap beside so many spacings of this length in all, if they are of one density
+        share = np.divide(length, length + gap, out=np.ones(len(gap)), where=length + gap > 0.0)
+        return np.asarray(share**spacings)
+
+    both = np.maximum(chance(number, sample[:-1] - sample[:1]), chance(number[::-1], sample[-1:] - sample[1:]))
+    passes = (both * len(gap) < _FALSE_ALARMS) & (gap > error[:-1] + error[1:])
     passes &= np.minimum(number, number[::-1]) >= _FEWEST_SPACINGS
     if not passes.any():
         return None
@@ -69,28 +73,19 @@ def two_groups(values: SampleValues) -> Groups | None:
     return Groups(lower, upper, is_upper, is_upper | (values.high < upper))
 
 
-def _chance(gap: Array, number: NDArray[np.intp], length: Array) -> Array:
-    """Probability of a gap beside so many spacings of this length in all on one side, if they are of one density."""
-    share = np.divide(length, length + gap, out=np.ones(len(gap)), where=length + gap > 0.0)
-    return np.asarray(share**number)
-
-
 def density(values: SampleValues, groups: Groups | None, grid: Array) -> Array:
     """Density of the samples with a value at the points of a grid (m,): Gaussian kernels, Silverman's width.
 
     The width is of each group alone, so that both peaks stay as sharp as they are. NaN for samples that are all equal.
     """
     known = values.is_known
-    parts = [known] if groups is None else [known & ~groups.is_upper, known & groups.is_upper]
+    upper = np.zeros_like(known) if groups is None else groups.is_upper
     whole = np.zeros(grid.shape)
-    for part in parts:
-        sample = values.low[part]
-        width = 1.06 * sample.std() * len(sample) ** -0.2 if len(sample) else 0.0
-        # equal samples: as narrow a peak as the grid shows
-        width = max(width, 0.5 * float(np.ptp(grid)) / len(grid))
-        if len(sample) == 0 or width == 0.0:
-            return np.full(grid.shape, np.nan)
-        whole += norm.pdf(grid[:, None], sample, width).sum(axis=1) / np.count_nonzero(known)
+    for sample in (values.low[known & ~upper], values.low[known & upper]):
+        if len(sample):
+            # equal samples: as narrow a peak as the grid shows
+            width = max(1.06 * sample.std() * len(sample) ** -0.2, 0.5 * float(np.ptp(grid)) / len(grid)) or np.nan
+            whole += norm.pdf(grid[:, None], sample, width).sum(axis=1) / known.sum()
     return whole
 
 

@@ -12,7 +12,6 @@ from studyrunner.study.sections import AxesSection
 from studyrunner.user_error import UserError
 from studyrunner.values import Positive, Section, Wrong, listed
 
-_PASSAGE = ("start", "stop", "rate")
 _NO_KEYS = ("model", "worn", "mesh")
 
 
@@ -23,11 +22,9 @@ def _check_name(value: str) -> str:
 
 
 def _check_passage(value: dict[str, float]) -> dict[str, float]:
-    if value.keys() != set(_PASSAGE):
-        raise ValueError("give {start = Hz, stop = Hz, rate = Hz/s} for a passage")
-    if value["start"] == value["stop"]:
-        raise ValueError("give a stop that differs from start: the frequency runs from one to the other")
-    return {name: value[name] for name in _PASSAGE}
+    if value.keys() != {"start", "stop", "rate"} or value["start"] == value["stop"]:
+        raise ValueError("give {start = Hz, stop = another Hz, rate = Hz/s} for a passage")
+    return {name: value[name] for name in ("start", "stop", "rate")}
 
 
 class MissionBlock(Section):
@@ -57,43 +54,32 @@ class MissionBlock(Section):
         """A block has one frequency and one duration."""
         if self.frequency is not None and self.engine_order is not None:
             yield Wrong("engine_order", self.engine_order, "leave it out, or frequency: give one of both")
-        if not self.is_passage:
-            if self.cycles is None and self.seconds is None:
-                yield Wrong("cycles", None, "missing: give cycles or seconds, the duration of the block in one mission")
-            elif self.cycles is not None and self.seconds is not None:
-                yield Wrong("cycles", self.cycles, "leave it out, or seconds: give one, the duration of the block")
-            return
-        for key in ("cycles", "seconds"):
-            if getattr(self, key) is not None:
-                yield Wrong(key, getattr(self, key), "leave it out: a passage takes as long as its rate says")
-        if self.begin != "sweep":
-            yield Wrong("begin", self.begin, 'give "sweep", or leave it out: a passage is a sweep')
+        durations = {key: getattr(self, key) for key in ("cycles", "seconds") if getattr(self, key) is not None}
+        if self.is_passage:
+            for key, value in durations.items():
+                yield Wrong(key, value, "leave it out: a passage takes as long as its rate says")
+            if self.begin != "sweep":
+                yield Wrong("begin", self.begin, 'give "sweep", or leave it out: a passage is a sweep')
+        elif not durations:
+            yield Wrong("cycles", None, "missing: give cycles or seconds, the duration of the block in one mission")
+        elif len(durations) > 1:
+            yield Wrong("cycles", self.cycles, "leave it out, or seconds: give one, the duration of the block")
 
     @property
     def is_passage(self) -> bool:
         """Whether the frequency runs."""
         return isinstance(self.frequency, dict)
 
-    @property
-    def has_frequency(self) -> bool:
-        """Whether the block has a frequency of its own."""
-        return self.frequency is not None or self.engine_order is not None
-
     def gives(self, name: str) -> bool:
         """Whether the block gives a value of its own to an axis."""
-        if name == "frequency":
-            return self.has_frequency
-        return name in self.parameters or (name in OWN_AXES and getattr(self, name) is not None)
+        own = self.engine_order is not None and name == "frequency"
+        return own or name in self.parameters or (name in OWN_AXES and getattr(self, name) is not None)
 
     def cycles_at(self, frequency: float) -> float:
         """Cycles of the block in one mission. frequency: of steady vibration, Hz."""
         if isinstance(self.frequency, dict):
-            start, stop, rate = (self.frequency[name] for name in _PASSAGE)
-            return abs(stop**2 - start**2) / (2.0 * rate)
-        if self.cycles is not None:
-            return self.cycles
-        assert self.seconds is not None
-        return self.seconds * frequency
+            return abs(self.frequency["stop"] ** 2 - self.frequency["start"] ** 2) / (2.0 * self.frequency["rate"])
+        return self.cycles if self.cycles is not None else (self.seconds or 0.0) * frequency
 
     def as_table(self) -> dict[str, Any]:
         """The block as the study file has it."""
@@ -152,7 +138,7 @@ def _read_block(table: Mapping[str, Any], place: str, scene: type[BaseModel], fo
 
 def _wrong_beside(before: MissionBlock, block: MissionBlock, axes: Mapping[str, Any]) -> Iterator[Wrong]:
     """What of a block does not fit to the block before and to [axes]."""
-    if not block.has_frequency and "frequency" not in axes:
+    if not block.gives("frequency") and "frequency" not in axes:
         yield Wrong("frequency", None, "missing: give it here, or as axes.frequency for all blocks without one")
     if block.begin == "continue":
         theirs, ours = before.parameters, block.parameters
@@ -173,11 +159,8 @@ def check_used_axes(axes: Sequence[str], blocks: Sequence[MissionBlock], found: 
 
 def engine_frequency(block: MissionBlock, parameters: BaseModel, source: str) -> float:
     """Frequency of a block with an engine order, Hz. parameters: of its scene. Raises UserError."""
-    assert block.engine_order is not None
-    speed = dict(parameters).get("rotation_speed")
+    speed, order = dict(parameters).get("rotation_speed"), block.engine_order or 0.0
     if not isinstance(speed, int | float) or speed <= 0.0:
-        remedy = "give a frequency: the scene has no rotation_speed"
-        if speed is not None:
-            remedy = "give rotation_speed above 0, rpm, which the engine order multiplies, or a frequency"
-        raise UserError(source, f"mission.{block.name}.engine_order", block.engine_order, remedy)
-    return block.engine_order * float(speed) / 60.0
+        remedy = "give scene.rotation_speed above 0, rpm, which the engine order multiplies, or a frequency"
+        raise UserError(source, f"mission.{block.name}.engine_order", order, remedy)
+    return order * float(speed) / 60.0

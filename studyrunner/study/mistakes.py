@@ -28,13 +28,13 @@ class Mistakes:
         self.source = source
         self._found: dict[str, UserError] = {}
 
-    def __bool__(self) -> bool:
-        """Whether there is a mistake."""
-        return bool(self._found)
-
     def __contains__(self, key: str) -> bool:
         """Whether there is a mistake under this key."""
         return key in self._found
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._found)
 
     def add(self, key: str, value: object, remedy: str) -> None:
         """One mistake; the first one counts of several under one key."""
@@ -78,63 +78,56 @@ def check_table(
 
     Raises UserError with all that is wrong in the table.
     """
-    found = Mistakes(source)
-    # tables of scenes are made for other callers as well, and take this from their caller
-    strict = None if issubclass(kind, Section) else True
-    checked: Checked | None = None
-    wrong: Iterator[Wrong] = iter(())
+    found, wrong = Mistakes(source), iter(())
     try:
-        checked = kind.model_validate(table, strict=strict)
+        # tables of scenes are made for other callers as well, and take this from their caller
+        checked = kind.model_validate(table, strict=None if issubclass(kind, Section) else True)
         wrong = checked.rules() if isinstance(checked, Section) else wrong
     except ValidationError as error:
-        wrong = wrong_keys(error, kind, table, others)
+        wrong = _wrong_keys(error, kind, table, others)
     for key, value, remedy in wrong:
         found.add(f"{prefix}.{key}" if key else prefix, value, remedy)
     found.raise_any()
-    assert checked is not None
     return checked
 
 
-def wrong_keys(
-    error: ValueError, kind: type[BaseModel], table: Mapping[str, object], others: Sequence[str] = ()
+def _wrong_keys(
+    error: ValidationError, kind: type[BaseModel], table: Mapping[str, object], others: Sequence[str]
 ) -> Iterator[Wrong]:
-    """What is wrong in a table, once for each key, from what `kind` raises of it. Keys are those below the table."""
+    """What is wrong in a table, once for each key; the keys are those below the table."""
     of_keys: dict[str, list[dict[str, Any]]] = {}
-    for details in _flat(error):
+    for details in flat_errors(error):
         places = _places(table, details)
-        details["places"] = [place for place in places if isinstance(place, str)]
+        details["names"] = [place for place in places if isinstance(place, str)]
         key = "".join(f"[{place}]" if isinstance(place, int) else f".{place}" for place in places)[1:]
         of_keys.setdefault(key, []).append(details)
-    # of a key that takes several kinds of values, the kinds that fit as far as can be
-    deepest = {key: max(len(each["loc"]) for each in found) for key, found in of_keys.items()}
-    wrong = [each for found in of_keys.values() for each in found if each["type"] == "extra_forbidden"]
-    meant = {".".join((*each["places"][:-1], _nearest(kind, each["places"], others))) for each in wrong}
+    unknown = [found[0]["names"] for found in of_keys.values() if found[0]["type"] == "extra_forbidden"]
+    meant = {".".join((*names[:-1], _nearest(kind, names, others))) for names in unknown}
     for key, found in of_keys.items():
-        if any(other.startswith((f"{key}.", f"{key}[")) for other in of_keys):
-            continue
-        if found[0]["type"] == "missing" and key in meant:
-            continue
-        yield _wrong(kind, key, [each for each in found if len(each["loc"]) == deepest[key]], others)
+        below = any(other.startswith((f"{key}.", f"{key}[")) for other in of_keys)
+        if not below and not (found[0]["type"] == "missing" and key in meant):
+            # of a key that takes several kinds of values, the kinds that fit as far as can be
+            deepest = max(len(each["loc"]) for each in found)
+            yield _wrong(kind, key, [each for each in found if len(each["loc"]) == deepest], others)
 
 
 def _wrong(kind: type[BaseModel], key: str, found: Sequence[Mapping[str, Any]], others: Sequence[str]) -> Wrong:
-    details = found[0]
+    details, names = found[0], found[0]["names"]
     # a key without a description of its own is part of one with a description
-    names = details["places"]
     described = [_fields(kind, names[:depth]).get(each) for depth, each in enumerate(names)]
     description = next((field.description for field in reversed(described) if field and field.description), None)
     unit = f" ({re.sub(', [-1]$', '', description)})" if description else ""
     if details["type"] == "extra_forbidden":
-        return Wrong(key, details["input"], f"unknown key, give {_nearest(kind, details['places'], others)}")
+        return Wrong(key, details["input"], f"unknown key, give {_nearest(kind, names, others)}")
     if details["type"] == "missing":
-        if isinstance(details["loc"][-1], int):
-            return Wrong(key, details["input"], f"give more values{unit}")
-        return Wrong(key, None, f"missing: give it{unit}")
+        of_list = isinstance(details["loc"][-1], int)
+        return Wrong(
+            key, details["input"] if of_list else None, f"{'give more' if of_list else 'missing: give it'}{unit}"
+        )
     cause = details.get("ctx", {}).get("error")
-    if isinstance(cause, WrongValueError):
-        return Wrong(cause.key or key, cause.value, cause.remedy + unit)
-    if isinstance(cause, SceneError):
-        return Wrong(cause.key or key, Verbatim(cause.value), cause.remedy + unit)
+    if isinstance(cause, WrongValueError | SceneError):
+        value = Verbatim(cause.value) if isinstance(cause, SceneError) else cause.value
+        return Wrong(cause.key or key, value, cause.remedy + unit)
     may_be_axis = key in (kind.AXES if issubclass(kind, Section) else kind.model_fields)
     if isinstance(details["input"], list) and details["type"] in _SINGLE and may_be_axis:
         return Wrong(key, details["input"], f"give one value here, or the list as axes.{key}{unit}")
@@ -142,17 +135,12 @@ def _wrong(kind: type[BaseModel], key: str, found: Sequence[Mapping[str, Any]], 
     return Wrong(key, details["input"], f"give {', or '.join(remedies)}{unit}")
 
 
-def _flat(error: ValueError, above: tuple[str | int, ...] = ()) -> Iterator[dict[str, Any]]:
+def flat_errors(error: ValidationError) -> Iterator[dict[str, Any]]:
     """All that is wrong, with its way from the table, also in tables that were checked on the way."""
-    if not isinstance(error, ValidationError):
-        yield {"loc": above, "type": "value_error", "msg": str(error), "input": None, "ctx": {"error": error}}
-        return
     for details in error.errors(include_url=False):
-        cause, way = details.get("ctx", {}).get("error"), (*above, *details["loc"])
-        if isinstance(cause, ValidationError):
-            yield from _flat(cause, way)
-        else:
-            yield {**details, "loc": way}
+        cause = details.get("ctx", {}).get("error")
+        inner = flat_errors(cause) if isinstance(cause, ValidationError) else [{**details, "loc": ()}]
+        yield from ({**each, "loc": (*details["loc"], *each["loc"])} for each in inner)
 
 
 def _places(table: object, details: Mapping[str, Any]) -> list[str | int]:
@@ -163,8 +151,8 @@ def _places(table: object, details: Mapping[str, Any]) -> list[str | int]:
     places: list[str | int] = []
     inner: object = table
     for number, part in enumerate(details["loc"], 1):
-        last = number == len(details["loc"])
-        if isinstance(inner, Mapping) and (part in inner or (last and details["type"] == "missing")):
+        is_missing = number == len(details["loc"]) and details["type"] == "missing"
+        if isinstance(inner, Mapping) and (part in inner or is_missing):
             places.append(part)
             inner = inner.get(part)
         elif isinstance(inner, list | tuple) and isinstance(part, int):
@@ -179,14 +167,11 @@ def _fields(kind: type[BaseModel], names: Sequence[str]) -> Mapping[str, FieldIn
     """Keys of the table that `names` lead to, none where it is no table with keys of its own."""
     tables = [kind]
     for name in names:
-        tables = [inner for each in tables for inner in tables_in(_annotation(each, name))]
+        fields = [each.model_fields.get(name) for each in tables]
+        extra = [each.EXTRA if issubclass(each, Section) else None for each in tables]
+        inner = [one.annotation if one else other for one, other in zip(fields, extra, strict=True)]
+        tables = [table for each in inner for table in tables_in(each)]
     return {name: field for each in tables for name, field in each.model_fields.items() if not field.exclude}
-
-
-def _annotation(kind: type[BaseModel], name: str) -> object:
-    if name in kind.model_fields:
-        return kind.model_fields[name].annotation
-    return kind.EXTRA if issubclass(kind, Section) else None
 
 
 def tables_in(annotation: object) -> list[type[BaseModel]]:

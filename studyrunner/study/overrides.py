@@ -19,8 +19,6 @@ Table = dict[str, Any]
 _INSTEAD = {"axes.frequency": "frequency_ratio", "axes.frequency_ratio": "frequency"}
 """Keys under [axes] that stand in each other's place."""
 
-_BARE_WORD = re.compile(r"[^\s\"'\[\]{}=,#]+")
-
 
 def override(table: Table, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
     """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
@@ -37,10 +35,15 @@ def override(table: Table, overrides: str | Sequence[str] | Mapping[str, object]
 
 def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> None:
     """Sets the key of a dotted name. source, shown: where the user gave it, and how it is called there."""
-    names = key.split(".")
-    place: Table = table
+    names, place = key.split("."), table
     if names[0] == "mission" and len(names) > 1 and isinstance(table.get("mission"), list):
-        place, names = _block_called(table["mission"], names, value, source, shown), names[2:]
+        blocks = [block for block in table["mission"] if isinstance(block, dict)]
+        called = {str(block.get("name")): block for block in blocks}
+        block = called.get(names[1]) or {str(number): each for number, each in enumerate(blocks)}.get(names[1])
+        if block is None or len(names) < 3:
+            remedy = f"give mission.NAME.KEY with the name of a block: {', '.join(called)}"
+            raise UserError(source, shown, value, remedy)
+        place, names = block, names[2:]
     for name in names[:-1]:
         inner = place.setdefault(name, {})
         if not isinstance(inner, dict):
@@ -62,22 +65,11 @@ def _set_key(table: Table, key: str, value: object, source: str, shown: str) -> 
                 given.pop(names[1], None)
 
 
-def _block_called(blocks: Any, names: Sequence[str], value: object, source: str, shown: str) -> Table:
-    """The block of a mission that a dotted name begins with, by its name or its number from 0 on."""
-    if len(names) < 3:
-        raise UserError(source, shown, value, "give mission.NAME.KEY with the name of a block")
-    for number, block in enumerate(blocks):
-        if isinstance(block, dict) and names[1] in (block.get("name"), str(number)):
-            return block
-    called = [str(block.get("name")) for block in blocks if isinstance(block, dict)]
-    raise UserError(source, shown, value, f"there is no such block: give one of {', '.join(called)}")
-
-
 def _value_of(key: str, text: str) -> object:
     try:
         parsed = read_toml(f"value = {text}".encode(), "")
     except UserError:
-        if _BARE_WORD.fullmatch(text):
+        if re.fullmatch(r"[^\s\"'\[\]{}=,#]+", text):
             return text
         remedy = "give a TOML value or a bare word"
         if text[:1] in ("[", "{"):

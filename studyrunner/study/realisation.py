@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel
 
 from studyrunner.scatter.drawn_values import Drawn, ScatteredPairs, drawn
-from studyrunner.scatter.section import OF_PAIRS, Scattered, ScatterSection
+from studyrunner.scatter.section import OF_PAIRS, Scattered
 from studyrunner.study.kinds import NUMBERS
 from studyrunner.study.mission import MissionBlock
 from studyrunner.study.mistakes import nearest_name
-from studyrunner.study.room_for_wear import with_room_for_wear, with_room_of_all
+from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, WrongValueError
 from studyrunner.values import Wrong
@@ -50,11 +50,12 @@ def realise(study: Study) -> tuple[Realisation, ...]:
         Where a sample draws a value that is none.
     """
     places = itertools.product(*(range(len(axis.values)) for axis in study.scene_axes))
-    parts = []
-    for variant, place in zip(study.variants or (study,), places, strict=True):
-        samples = _samples(variant)
-        parts += [Realisation(part, (*place, *sample)) for part, sample in samples]
-    return tuple(parts)
+    variants = zip(study.variants or (study,), places, strict=True)
+    return tuple(
+        Realisation(part, (*place, *([] if study.scatter is None else [sample])))
+        for variant, place in variants
+        for sample, part in enumerate(_samples(variant))
+    )
 
 
 def draw_inputs(study: Study) -> dict[str, NDArray[np.float64]]:
@@ -62,15 +63,11 @@ def draw_inputs(study: Study) -> dict[str, NDArray[np.float64]]:
 
     study: without axes that are keys of [scene] or [wear]. Raises UserError.
     """
-    section = study.scatter
-    if section is None:
-        return {}
-    own: dict[str, ArrayLike] = {name: _own_value(study, name) for name in section.inputs}
-    found = _draw(study, section, own, _NO_PAIRS)
+    own, found = _draw(study, {}, _NO_PAIRS)
     return {
         name: np.array([each.apply(value) for value in np.ravel(own[name])]).squeeze(axis=() if name in NUMBERS else 0)
-        for name, each in found.items()
-        if not is_of_pairs(name, section.inputs[name])
+        for name, (each, scattered) in found.items()
+        if not is_of_pairs(name, scattered)
     }
 
 
@@ -81,15 +78,13 @@ def draw_pairs(
 
     study: without axes that are keys of [scene] or [wear]. own_values: of the scene, (n_pairs,). Raises UserError.
     """
-    section = study.scatter
-    if section is None:
-        return {}
-    own: dict[str, ArrayLike] = {name: _own_value(study, name) for name in section.inputs}
-    own |= {name: own_values[name] for name in own if name in own_values}
-    found = _draw(study, section, own, pairs)
-    of_pairs = [name for name in found if is_of_pairs(name, section.inputs[name])]
-    shape = (section.realisations, len(pairs.surface))
-    return {name: np.broadcast_to(found[name].apply(own_values[name]), shape) for name in of_pairs}
+    _, found = _draw(study, own_values, pairs)
+    n_samples = 1 if study.scatter is None else study.scatter.realisations
+    return {
+        name: np.broadcast_to(each.apply(own_values[name]), (n_samples, len(pairs.surface)))
+        for name, (each, scattered) in found.items()
+        if is_of_pairs(name, scattered)
+    }
 
 
 def is_of_pairs(name: str, scattered: Scattered) -> bool:
@@ -106,9 +101,12 @@ def wrong_scatter(study: Study) -> Iterator[Wrong]:
     if of_pairs and "exact" in study.outputs.variables:
         remedy = f"leave it out: the closed form knows nothing of the {of_pairs[0]} that [scatter] draws for each pair"
         yield Wrong("outputs.variables", "exact", remedy)
-    known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *_numbers_of(study)]
+    fields = type(study.scene.parameters).model_fields
+    # numbers with fractions
+    floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
+    known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *floats, *study.wear.numbers]
     for name, scattered in section.inputs.items():
-        key, drawn, absolute = f"scatter.{name}", scattered.distribution, scattered.distribution.kind == "value"
+        key, given, absolute = f"scatter.{name}", scattered.distribution, scattered.distribution.is_absolute
         if name not in known:
             yield Wrong(key, None, f"unknown input, give {nearest_name(name, known)}")
         if name == "frequency" and study.follow is not None:
@@ -117,30 +115,15 @@ def wrong_scatter(study: Study) -> Iterator[Wrong]:
         several = name in NUMBERS and len(getattr(study.axes, name)) > 1
         if absolute and (several or any(axis.name == name for axis in study.scene_axes)):
             remedy = f"give one value of axes.{name}, or a distribution around the study's own values, as {{std = ...}}"
-            yield Wrong(key, drawn.model_dump(), remedy)
+            yield Wrong(key, given.model_dump(exclude_none=True), remedy)
         for block in study.mission:
-            if name == "frequency" and block.gives(name):
-                remedy = f"leave it out: the block {block.name} has a frequency of its own"
-                yield Wrong(key, drawn.model_dump(), remedy)
-            elif absolute and block.gives(name):
-                remedy = f"give a distribution around own values, as {{std = ...}}: the block {block.name} gives one"
-                yield Wrong(key, drawn.model_dump(), remedy)
-
-
-def check_draws(study: Study) -> None:
-    """Raises UserError where a sample draws a value that is none. study: without axes of [scene] or [wear]."""
-    for name, values in draw_inputs(study).items():
-        if name not in (*NUMBERS, *study.wear.numbers):
-            # other parameters of the scene may not fit to one that is drawn
-            for extreme in (values.min(), values.max()):
-                _with_parameters(study, {name: float(extreme)})
-
-
-def _numbers_of(study: Study) -> list[str]:
-    """Inputs of [scene] and [wear] that are numbers with fractions."""
-    fields = type(study.scene.parameters).model_fields
-    floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
-    return [*floats, *study.wear.numbers]
+            if block.gives(name) and (absolute or name == "frequency"):
+                other = "leave it out" if name == "frequency" else "give a distribution around own values"
+                yield Wrong(
+                    key,
+                    given.model_dump(exclude_none=True),
+                    f"{other}: the block {block.name} gives a {name} of its own",
+                )
 
 
 def block_of_input(study: Study, name: str) -> MissionBlock | None:
@@ -150,65 +133,58 @@ def block_of_input(study: Study, name: str) -> MissionBlock | None:
     return study.mission[0] if study.mission and all(block.gives(name) for block in study.mission) else None
 
 
-def _own_value(study: Study, name: str) -> ArrayLike:
+def _own_value(study: Study, name: str, scattered: Scattered) -> ArrayLike:
     """The study's own value of an input; 1, for any, where the contact pairs have their own."""
     if block_of_input(study, name) is not None:
-        return _own_value(study.block_studies[0], name)
+        return _own_value(study.block_studies[0], name, scattered)
     if name in NUMBERS:
         return np.array(getattr(study.axes, name))[:, None]
     value = {**dict(study.scene.parameters), **study.wear.numbers}.get(name)
     if isinstance(value, float | int):
         return float(value)
-    assert study.scatter is not None
-    scattered = study.scatter.inputs[name]
-    if scattered.distribution.kind != "value" and not is_of_pairs(name, scattered):
+    if not scattered.distribution.is_absolute and not is_of_pairs(name, scattered):
         remedy = "give the middle of the distribution as well: the study has no value of its own"
         raise UserError(study.source, f"scatter.{name}", None, remedy)
     return 1.0
 
 
 def _draw(
-    study: Study, section: ScatterSection, own: Mapping[str, ArrayLike], pairs: ScatteredPairs
-) -> dict[str, Drawn]:
+    study: Study, own_values: Mapping[str, NDArray[np.float64]], pairs: ScatteredPairs
+) -> tuple[dict[str, ArrayLike], dict[str, tuple[Drawn, Scattered]]]:
+    """Own values, and what is drawn, of each input; nothing where nothing scatters."""
+    section = study.scatter
+    if section is None:
+        return {}, {}
+    own: dict[str, ArrayLike] = {name: _own_value(study, name, each) for name, each in section.inputs.items()}
+    own |= {name: own_values[name] for name in own if name in own_values}
     try:
-        return drawn(section, own, pairs)
+        return own, {name: (each, section.inputs[name]) for name, each in drawn(section, own, pairs).items()}
     except WrongValueError as error:
         raise UserError(study.source, error.key or "scatter", error.value, error.remedy) from None
 
 
-def _samples(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
-    """The study in each sample, and the index of the sample; the study itself where nothing scatters."""
+def _samples(study: Study) -> Iterator[Study]:
+    """The study with what each sample draws; the study itself where nothing scatters."""
     if study.scatter is None:
-        yield study, ()
+        yield study
         return
-    blocks = zip(*(_samples(block) for block in study.block_studies), strict=True)
-    for part, of_blocks in zip(
-        _drawn_studies(study), blocks if study.block_studies else itertools.repeat(()), strict=False
-    ):
-        given = tuple(block for block, _ in of_blocks)
-        # blocks have equal pairs, with room for the wear of all
-        yield (with_room_of_all(part[0].model_copy(update={"block_studies": given})), part[1]) if given else part
-
-
-def _drawn_studies(study: Study) -> Iterator[tuple[Study, tuple[int, ...]]]:
-    """The study with what each sample draws."""
-    assert study.scatter is not None
     values = draw_inputs(study)
-    axes = [name for name in values if name in NUMBERS]
     of_wear = [name for name in values if name in study.wear.numbers]
     of_scene = [name for name in values if name not in (*NUMBERS, *of_wear)]
+    blocks = [_samples(block) for block in study.block_studies]
     for sample in range(study.scatter.realisations):
-        update: dict[str, object] = {"scatter": None}
-        if axes:
-            drawn_axes = {name: tuple(values[name][:, sample].tolist()) for name in axes}
-            update["axes"] = study.axes.model_copy(update=drawn_axes)
+        of_axes = {name: tuple(values[name][:, sample].tolist()) for name in values if name in NUMBERS}
+        update: dict[str, object] = {"scatter": None, "axes": study.axes.model_copy(update=of_axes)}
         if of_scene:
             parameters = _with_parameters(study, {name: float(values[name][sample]) for name in of_scene})
             update["scene"] = study.scene.model_copy(update={"parameters": parameters})
         if of_wear:
             update["wear"] = study.wear.with_numbers({name: float(values[name][sample]) for name in of_wear})
+        if blocks:
+            update["block_studies"] = tuple(next(block) for block in blocks)
         part = study.model_copy(update=update)
-        yield with_room_for_wear(part) if of_scene and not study.mission else part, (sample,)
+        # a scene of its own has room for what this sample wears, blocks have equal pairs
+        yield with_room_for_wear(part) if blocks or of_scene else part
 
 
 def _with_parameters(study: Study, values: Mapping[str, float]) -> BaseModel:

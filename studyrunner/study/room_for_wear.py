@@ -19,22 +19,21 @@ def with_room_for_wear(study: Study) -> Study:
     """The study with a scene that has room for what it wears; the same where its scene needs none, or says itself.
 
     Of a study with samples the scene has room for nearly all of them. Where parameters of the scene scatter, each
-    sample has a scene of its own (`realise`), with room for what this sample wears; the study is then the same.
+    sample has a scene of its own (`realise`), with room for what this sample wears; the study is then the same. Blocks
+    of a mission have room for the wear of all of them, in equal pairs.
     """
+    if study.mission:
+        return _with_room_in_blocks(study)
     scene = study.scene
-    if study.scatter is not None and study.scatter.inputs.keys() & dict(scene.parameters).keys():
-        return study
+    own_scenes = study.scatter is not None and study.scatter.inputs.keys() & dict(scene.parameters).keys()
     # what a result file holds was built with the parameters that stand beside it
-    if not scene.is_bundled or scene.path is not None:
+    if own_scenes or not scene.is_bundled or scene.path is not None:
         return study
     parameters = scene_with_room(scene.model, scene.parameters, expected_wear(study))
-    if parameters is scene.parameters:
-        return study
     return study.model_copy(update={"scene": scene.model_copy(update={"parameters": parameters})})
 
 
-def with_room_of_all(study: Study) -> Study:
-    """A study of missions whose blocks have room for the wear of all of them, in equal pairs."""
+def _with_room_in_blocks(study: Study) -> Study:
     cycles = study.missions_kept[-1] * sum(
         block.cycles_at(max(of_block.axes.frequency))
         for block, of_block in zip(study.mission, study.block_studies, strict=True)
@@ -49,8 +48,8 @@ def with_room_of_all(study: Study) -> Study:
     if len(set(widths)) > 1:
         parameters = [each.model_copy(update={"half_width": max(widths)}) for each in parameters]
     found = tuple(
-        each.model_copy(update={"scene": each.scene.model_copy(update={"parameters": of_block})})
-        for each, of_block in zip(wearing, parameters, strict=True)
+        each.model_copy(update={"scene": each.scene.model_copy(update={"parameters": own})})
+        for each, own in zip(wearing, parameters, strict=True)
     )
     return study.model_copy(update={"block_studies": found})
 
@@ -76,17 +75,3 @@ def expected_wear(study: Study) -> ExpectedWear:
         volume=until.get("worn_volume", math.inf),
         depth=until.get("wear_depth", math.inf),
     )
-
-
-def describe_room(study: Study) -> str:
-    """Half-width, and number of pairs as wide as now, with which the scene has room; empty where that is not known."""
-    given = dict(study.scene.parameters)
-    if not study.scene.is_bundled or given.get("half_width") is None:
-        return ""
-    free = study.scene.parameters.model_copy(update={"half_width": None})
-    needed = dict(scene_with_room(study.scene.model, free, expected_wear(study)))["half_width"]
-    if not isinstance(needed, float) or needed <= given["half_width"]:
-        return ""
-    name = "strips" if "strips" in given else "patches"
-    number = 2 * math.ceil(given[name] * needed / given["half_width"] / 2.0)
-    return f"half_width = {needed:g} has room for it; {name} = {number} are then as wide as now"

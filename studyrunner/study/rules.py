@@ -18,7 +18,7 @@ _MOST_POINTS = 1_000_000
 
 def check_rules(study: Study, found: Mistakes, *, complete: bool) -> None:
     """Notes what breaks a rule. complete: whether the study has all tables; it has none that are wrong themselves."""
-    for rule in (_variables, _offers, size_of_result, _worn, _samples, _end, _followed, wrong_scatter):
+    for rule in (_variables, size_of_result, _solver, _end, _followed, wrong_scatter):
         try:
             for wrong in rule(study):
                 found.add(*wrong)
@@ -41,36 +41,30 @@ def size_of_result(study: Study) -> Iterator[Wrong]:
 
 
 def _variables(study: Study) -> Iterator[Wrong]:
-    """Variables are of the kind of study."""
-    offered = [name for name in SCENE if name != "exact" or study.kind is WEAR]
+    """Variables are of the kind of study and of the scene."""
+    known = dict.fromkeys((*study.variables, *(name for name in SCENE if name != "exact" or study.kind is WEAR)))
     for name in study.outputs.variables:
-        if name not in (*study.variables, *offered):
-            known = ", ".join(dict.fromkeys((*study.variables, *offered)))
-            yield Wrong("outputs.variables", name, f"give names out of {known}: {study.kind.name} do not have it")
-
-
-def _offers(study: Study) -> Iterator[Wrong]:
-    """What is asked of the scene is there."""
-    for name in ("mesh", "exact"):
-        if name in study.outputs.variables and name not in study.scene.offers:
+        if name not in known:
+            remedy = f"give names out of {', '.join(known)}: {study.kind.name} do not have it"
+            yield Wrong("outputs.variables", name, remedy)
+        elif name in ("mesh", "exact") and name not in study.scene.offers:
             yield Wrong("outputs.variables", name, f"leave it out: the scene {study.scene.model} has none")
+        elif name == "exact" and (study.to_the_end or study.follow is not None):
+            remedy = "leave it out: it is of given frequencies and given cycle counts, which this study does not have"
+            yield Wrong("outputs.variables", "exact", remedy)
 
 
-def _worn(study: Study) -> Iterator[Wrong]:
-    """A law that depends on depths knows the depths."""
-    if study.scene.worn is not None and study.wear.law == "table":
-        remedy = 'give another law: the factors of a "table" depend on depths, which a worn scene counts from 0'
-        yield Wrong("wear.law", study.wear.law, remedy)
-
-
-def _samples(study: Study) -> Iterator[Wrong]:
-    """Samples in a period resolve the harmonics."""
+def _solver(study: Study) -> Iterator[Wrong]:
+    """Samples in a period resolve the harmonics; a law that depends on depths knows the depths."""
     most = max(study.given_harmonics, default=0)
     fewest = min((number for number in study.samples if number != AUTO), default=None)
     if fewest is not None and fewest <= 2 * most:
         table = "solver" if study.axes.samples is None else "axes"
         remedy = f"give more than twice the {most} harmonics, at least {2 * most + 1}"
         yield Wrong(f"{table}.samples", fewest, remedy)
+    if study.wear.law == "table" and study.scene.worn is not None:
+        remedy = 'give another law: the factors of a "table" depend on depths, which a worn scene counts from 0'
+        yield Wrong("wear.law", study.wear.law, remedy)
 
 
 def _end(study: Study) -> Iterator[Wrong]:
@@ -84,22 +78,15 @@ def _end(study: Study) -> Iterator[Wrong]:
     if "final" in study.axes.scheme and study.slow_time.until is not None:
         remedy = 'leave it out: the scheme "final" has no way on which it could be reached'
         yield Wrong("slow_time.until", study.slow_time.until, remedy)
-    if study.to_the_end and "exact" in study.outputs.variables:
-        remedy = "leave it out: it is of given cycle counts, and slow_time.cycles = inf has none"
-        yield Wrong("outputs.variables", "exact", remedy)
 
 
 def _followed(study: Study) -> Iterator[Wrong]:
-    """A frequency that is followed is neither fixed nor given."""
+    """A frequency that is followed is not fixed."""
     if study.follow is None:
         return
-    word = study.follow.of
+    followed = f'axes.frequency = "{study.follow.of}" changes'
     if "ramp" in study.axes.sweep:
-        remedy = f'give "up" or "down": a ramp has a fixed frequency, and axes.frequency = "{word}" seeks it'
-        yield Wrong("axes.sweep", "ramp", remedy)
+        yield Wrong("axes.sweep", "ramp", f'give "up" or "down": a ramp has a fixed frequency, and {followed}')
     if "final" in study.axes.scheme:
-        remedy = f'give "adaptive": the scheme "final" has a fixed frequency, and axes.frequency = "{word}" follows it'
+        remedy = f'give "adaptive": the scheme "final" has a fixed frequency, and {followed}'
         yield Wrong("axes.scheme", "final", remedy)
-    if "exact" in study.outputs.variables:
-        remedy = f'leave it out: it is of given frequencies, and axes.frequency = "{word}" has none'
-        yield Wrong("outputs.variables", "exact", remedy)

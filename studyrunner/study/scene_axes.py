@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import contextlib
-import copy
 import itertools
 import math
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
-from studyrunner.study.mistakes import Mistakes, tables_in, wrong_keys
+from studies.scene_error import remedy_of
+from studyrunner.study.mistakes import Mistakes, flat_errors, tables_in
 from studyrunner.study.sections import AxesSection, WearSection
-from studyrunner.values import Section, Wrong, read_axis
+from studyrunner.user_error import WrongValueError
+from studyrunner.values import Wrong, read_axis
 
 Table = dict[str, Any]
 AxisValue = float | int | bool | str
 
 _MOST_COMBINATIONS = 10_000  # each of them is checked, which takes 0.2 ms
 _UNITS = {"-": "1", "1": "1", "degrees": "degree", "rpm": "rpm"}
-_UNITS |= dict.fromkeys(("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N/m3", "N s/m", "kg", "kg/m3", "J/m2"), "")
+_UNITS |= {name: name for name in ("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N/m3", "N s/m", "kg", "kg/m3", "J/m2")}
 
 
 @dataclass(frozen=True)
@@ -47,35 +48,26 @@ class SceneAxis:
         return ".".join(self.key)
 
 
-def take_scene_axes(
-    tables: Mapping[str, Any], scene: type[BaseModel], wear: type[Section], found: Mistakes
-) -> tuple[SceneAxis, ...]:
+def take_scene_axes(tables: Mapping[str, Any], scene: type[BaseModel], found: Mistakes) -> tuple[SceneAxis, ...]:
     """Axes that are keys of [scene] or [wear], which are taken out of the table [axes].
 
-    tables: of the study file. scene, wear: what [scene] of this model and [wear] consist of.
+    tables: of the study file. scene: what [scene] of this model consists of.
     """
     axes: list[SceneAxis] = []
-    known: dict[Literal["scene", "wear"], Collection[str]] = {"scene": scene.model_fields, "wear": wear.AXES}
     for name in [name for name in tables["axes"] if name not in AxesSection.model_fields]:
-        table = next((table for table, keys in known.items() if name in keys), None)
-        if table is None:
+        of_scene = name in scene.model_fields
+        if not of_scene and name not in WearSection.AXES:
             continue
-        value = tables["axes"].pop(name)
+        value, table = tables["axes"].pop(name), "scene" if of_scene else "wear"
         for inner, values in value.items() if is_table(value) else [(None, value)]:
             key = (name,) if inner is None else (name, str(inner))
-            dotted = ".".join(key)
             wrong = _wrong_place(tables[table], table, key, values)
-            if wrong is not None:
+            of_axis = () if wrong else _read_values(".".join(key), values, found)
+            if wrong:
                 found.add(*wrong)
-                continue
-            try:
-                of_axis = read_axis(values)
-            except ValueError as error:
-                for wrong in wrong_keys(error, AxesSection, {}):
-                    found.add(f"axes.{dotted}{wrong.key}", values if wrong.value is None else wrong.value, wrong.remedy)
-                continue
-            units, meaning = describe_key(scene if table == "scene" else wear, *key)
-            axes.append(SceneAxis("_".join(key), table, key, of_axis, units, meaning))
+            elif of_axis:
+                units, meaning = describe_key(scene if of_scene else WearSection, *key)
+                axes.append(SceneAxis("_".join(key), table, key, of_axis, units, meaning))
     n_combinations = math.prod(len(axis.values) for axis in axes)
     if n_combinations > _MOST_COMBINATIONS:
         longest = max(axes, key=lambda axis: len(axis.values))
@@ -86,20 +78,27 @@ def take_scene_axes(
     return tuple(axes)
 
 
+def _read_values(dotted: str, values: object, found: Mistakes) -> tuple[AxisValue, ...]:
+    try:
+        return read_axis(values)
+    except ValidationError as error:
+        for each in flat_errors(error):
+            found.add(f"axes.{dotted}.{each['loc'][0]}", each["input"], remedy_of(each))
+    except WrongValueError as error:
+        found.add(f"axes.{dotted}", error.value, error.remedy)
+    except ValueError as error:
+        found.add(f"axes.{dotted}", values, str(error))
+    return ()
+
+
 def _wrong_place(table: Mapping[str, Any], name: str, key: Sequence[str], values: object) -> Wrong | None:
     """What is wrong with an axis of this key, where its table has the key, or no place for it."""
-    dotted, given = ".".join(key), table
-    for part in key:
-        given = only_table(given)
-        if not isinstance(given, Mapping):
-            return Wrong(
-                f"{name}.{key[0]}", given, f"give it once, here or as axes.{key[0]}; a table of other keys here"
-            )
-        if part not in given:
-            break
-        given = given[part]
-    else:
-        return Wrong(f"{name}.{dotted}", given, f"give it once, here or as axes.{dotted}")
+    first, dotted = table.get(key[0]), ".".join(key)
+    inner = only_table(first)
+    if first is not None and (len(key) == 1 or not isinstance(inner, Mapping) or key[1] in inner):
+        given = inner[key[1]] if len(key) > 1 and isinstance(inner, Mapping) else first
+        where = dotted if given is not first else key[0]
+        return Wrong(f"{name}.{where}", given, f"give it once, here or as axes.{dotted}")
     if not "_".join(key).isidentifier():
         remedy = "give a surface whose name consists of letters, digits and _: a dimension has the name"
         return Wrong(f"axes.{dotted}", values, remedy)
@@ -120,19 +119,20 @@ def keys_as_given(scene_axes: Sequence[SceneAxis]) -> Iterator[None]:
     found.raise_any()
 
 
-def combinations(sections: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> Iterator[dict[str, Table]]:
+def combinations(tables: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> Iterator[dict[str, Table]]:
     """The tables of a study with each combination of values in [scene] and [wear], the last axis fastest."""
     for values in itertools.product(*(axis.values for axis in scene_axes)):
-        tables = {name: copy.copy(table) for name, table in sections.items()}
+        changed = {**tables, "scene": dict(tables["scene"]), "wear": dict(tables["wear"])}
         for axis, value in zip(scene_axes, values, strict=True):
-            table = tables.setdefault(axis.table, {})
-            if axis.key == ("worn",):
+            table, name = changed[axis.table], axis.key[0]
+            if name == "worn":
                 # one state of several
-                states, place = table["worn"], axis.values.index(value)
-                table["worn"] = {"depth": [states["depth"][place]], "result": states.get("result", "")}
-                continue
-            table[axis.key[0]] = value if len(axis.key) == 1 else _with(table.get(axis.key[0], {}), axis.key[1], value)
-        yield tables
+                states = table["worn"]
+                depth = states["depth"][axis.values.index(value)]
+                table["worn"] = {"depth": [depth], "result": states.get("result", "")}
+            else:
+                table[name] = value if len(axis.key) == 1 else _with(table.get(name, {}), axis.key[1], value)
+        yield changed
 
 
 def scene_with_axes(scene: Mapping[str, Any], axes: Mapping[str, Any]) -> Table:
@@ -149,19 +149,14 @@ def scene_with_axes(scene: Mapping[str, Any], axes: Mapping[str, Any]) -> Table:
     return found
 
 
-def as_checked(scene_axes: Sequence[SceneAxis], variants: Sequence[Any]) -> tuple[SceneAxis, ...]:
-    """The axes with their values as the checked studies of all combinations have them: 3 is 3.0 where that is meant."""
-    checked, apart = [], len(variants)
+def as_checked(scene_axes: Sequence[SceneAxis], study: Any) -> tuple[SceneAxis, ...]:
+    """The axes with values as a checked study has them: 3 is 3.0 where that is meant."""
+    checked = []
     for axis in scene_axes:
-        apart //= len(axis.values)
-        if axis.key == ("worn",):
-            checked.append(axis)
-            continue
-        values = []
-        for variant in variants[::apart][: len(axis.values)]:
-            table = variant.scene.parameters if axis.table == "scene" else variant.wear
-            value = only_table(getattr(table, axis.key[0]))
-            values.append(value if len(axis.key) == 1 else dict(value)[axis.key[1]])
+        given = only_table(getattr(study.scene.parameters if axis.table == "scene" else study.wear, axis.key[0], None))
+        first = given if len(axis.key) == 1 else dict(given)[axis.key[1]]
+        is_float = isinstance(first, float)
+        values = (float(each) if is_float and isinstance(each, int) else each for each in axis.values)
         checked.append(replace(axis, values=tuple(values)))
     return tuple(checked)
 
@@ -195,4 +190,4 @@ def describe_key(kind: type[BaseModel], name: str, inner: str = "") -> tuple[str
     units = next((part for part in reversed(re.split("[,;] ", text)) if part in _UNITS), "1")
     parts = [part for part in text.partition("; ")[0].split(", ") if part != units]
     meaning = ", ".join(parts) or name.replace("_", " ")
-    return _UNITS.get(units) or units, f"{meaning}, {inner}" if inner else meaning
+    return _UNITS[units], f"{meaning}, {inner}" if inner else meaning

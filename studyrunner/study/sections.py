@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from solver.contact.wear_law import WearLaw, WearTable
-from solver.settings import FOLLOWED, TARGETS
+from solver.settings import TARGETS
 from studyrunner.coordinates import SCENE
 from studyrunner.mission_variables import OF_MISSIONS
 from studyrunner.mode_variables import OF_MODES
@@ -61,38 +60,16 @@ def _check_name(value: str) -> str:
     return value
 
 
-def _check_word(value: object) -> object:
-    """A word in place of a frequency is one of those of a followed resonance, which `take_followed` takes."""
-    for word in listed(value):
-        if isinstance(word, str):
-            raise WrongValueError(word, "give a number in Hz, or " + " or ".join(f'"{each}"' for each in FOLLOWED))
-    return value
-
-
 def _check_variables(value: object) -> object:
-    known = (*VARIABLES, *KEPT)
-    for name in value if isinstance(value, list | tuple) else ():
-        if name != DEFAULT and name not in known:
-            raise WrongValueError(name, f'give "{DEFAULT}" or {_similar(str(name), known)}')
+    for name in listed(value):
+        if name not in (DEFAULT, *VARIABLES, *KEPT) and isinstance(value, list | tuple):
+            raise WrongValueError(name, f'give "{DEFAULT}" or {nearest_name(str(name), (*VARIABLES, *KEPT))}')
     return value
-
-
-def _similar(name: str, known: Sequence[str]) -> str:
-    """Variables whose names hold this one, else the most similar one, else all."""
-    holding = [each for each in known if name and name in each]
-    return f"one of {', '.join(holding)}" if holding else nearest_name(name, known)
 
 
 def _check_target(value: dict[str, float]) -> dict[str, float]:
     if len(value) != 1 or next(iter(value)) not in TARGETS:
         raise ValueError("give one of " + ", ".join(f"{{{name} = ...}}" for name in TARGETS))
-    return value
-
-
-def _check_range(value: object) -> object:
-    numbers = isinstance(value, list | tuple) and all(type(each) in (int, float) for each in value)
-    if not numbers or len(value) != 2 or not 0.0 < value[0] < value[1] < float("inf"):  # type: ignore[arg-type,index]
-        raise ValueError("give the lowest and the highest frequency in Hz, as [205, 215]")
     return value
 
 
@@ -109,7 +86,7 @@ class StudySection(Section):
 class AxesSection(Section):
     """[axes]: every axis becomes a dimension of the result, in the order of the values given here."""
 
-    frequency: Annotated[Axis[Positive], BeforeValidator(_check_word)] = Field(
+    frequency: Axis[Positive] = Field(
         description='Hz; or "resonance" or "peak", followed in the range of [loading]; not for modes and missions'
     )
     frequency_ratio: Axis[Positive] | None = Field(
@@ -269,7 +246,7 @@ class OutputsSection(Section):
 class LoadingSection(Section):
     """[loading]: range of a frequency that is followed."""
 
-    between: Annotated[tuple[float, float], Field(strict=False), BeforeValidator(_check_range)] = Field(
+    between: Annotated[tuple[Positive, Positive], Field(strict=False), AfterValidator(ascending)] = Field(
         description='Hz, [lowest, highest] frequency of the excitation with axes.frequency = "resonance" or "peak"'
     )
 
@@ -284,13 +261,3 @@ SECTIONS: dict[str, type[Section]] = {
     "scatter": ScatterSection,
     "loading": LoadingSection,
 }
-
-
-def names_model(model: str) -> bool:
-    """Whether the text under `scene.model` names a finite-element model: a deck or a mesh."""
-    return Path(model).suffix.lower() in (".inp", ".msh", ".cdb")
-
-
-def names_file(model: str) -> bool:
-    """Whether the text under `scene.model` names a scene file: a path, or a name with an HDF5 ending."""
-    return "/" in model or "\\" in model or Path(model).suffix.lower() in (".h5", ".hdf5", ".he5")

@@ -92,11 +92,10 @@ class Study(Section):
     @property
     def files(self) -> tuple[Path, ...]:
         """Files that a run of the study reads."""
-        found = [self.folder / Path(self.source).name]
-        found += [] if self.scene.path is None else [self.scene.path]
-        found += [] if self.scene.files is None else self.scene.files.all
-        found += [self.folder / self.scene.worn.result] if self.scene.worn and self.scene.worn.result else []
-        return tuple(found)
+        scene = self.scene
+        worn = scene.worn.result if scene.worn else ""
+        found = [self.folder / Path(self.source).name, *(scene.files.all if scene.files else ())]
+        return (*found, *([scene.path] if scene.path else ()), *([self.folder / worn] if worn else ()))
 
     @property
     def friction_coefficient(self) -> float | None:
@@ -129,7 +128,7 @@ class Study(Section):
         if isinstance(outputs, tuple):
             return outputs
         if self.to_the_end:
-            return tuple(float(number) for number in range(outputs))
+            return tuple(map(float, range(outputs)))
         if cycles == 0.0:
             return (0.0,)
         return (*(cycles * position / (outputs - 1) for position in range(outputs - 1)), cycles)
@@ -137,10 +136,9 @@ class Study(Section):
     @property
     def missions_kept(self) -> tuple[int, ...]:
         """Numbers of missions of the result, ascending; equally spaced, rounded to whole numbers."""
-        missions, outputs = self.slow_time.missions, self.slow_time.outputs
-        assert missions is not None
+        missions, outputs = self.slow_time.missions or 0, self.slow_time.outputs
         if isinstance(outputs, tuple):
-            return tuple(int(count) for count in outputs)
+            return tuple(map(int, outputs))
         spaced = (round(missions * position / max(1, outputs - 1)) for position in range(outputs))
         return tuple(sorted({*spaced, missions}))
 
@@ -187,8 +185,7 @@ class Study(Section):
 
     def units(self, name: str) -> str:
         """Unit of an axis; "1" where it has none."""
-        of_scene = {axis.name: axis.units for axis in self.scene_axes}
-        return of_scene[name] if name in of_scene else COORDINATES[name].units
+        return {axis.name: axis.units for axis in self.scene_axes}.get(name) or COORDINATES[name].units
 
     @property
     def idle_axes(self) -> tuple[str, ...]:

@@ -26,8 +26,8 @@ from studyrunner.study.kinds import (
 from studyrunner.study.mission import OWN_AXES, MissionBlock, check_used_axes, engine_frequency, read_blocks
 from studyrunner.study.mistakes import Mistakes, check_table, nearest_name
 from studyrunner.study.overrides import override
-from studyrunner.study.realisation import check_draws, wrong_scatter
-from studyrunner.study.room_for_wear import with_room_for_wear, with_room_of_all
+from studyrunner.study.realisation import wrong_scatter
+from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.rules import check_rules, size_of_result
 from studyrunner.study.scene_axes import (
     SceneAxis,
@@ -39,15 +39,7 @@ from studyrunner.study.scene_axes import (
     take_scene_axes,
 )
 from studyrunner.study.scene_section import Origin, check_scene, parameters_of
-from studyrunner.study.sections import (
-    DEFAULT,
-    SECTIONS,
-    SOLVER_AXES,
-    VARIABLES,
-    AxesSection,
-    OutputsSection,
-    WearSection,
-)
+from studyrunner.study.sections import DEFAULT, SECTIONS, SOLVER_AXES, VARIABLES, AxesSection, WearSection
 from studyrunner.study.study import Study
 from studyrunner.study.study_of_result import read_archived
 from studyrunner.study.toml_text import format_toml, read_toml, read_toml_file
@@ -56,7 +48,6 @@ from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
-_MOST_WRONG_PARTS = 20
 _ON_REQUEST = ("scatter", "loading", "mission")
 _TABLES = ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", *_ON_REQUEST)
 
@@ -105,20 +96,19 @@ def bundled_studies() -> tuple[str, ...]:
 
 
 def _study_path(argument: str) -> Path:
-    path, names = Path(argument), bundled_studies()
+    path, names, remedy = Path(argument), bundled_studies(), ""
     try:
         if path.is_file():
             return path
         remedy = "give a TOML file: this is a folder" if path.is_dir() else ""
     except OSError as error:
         remedy = f"give a file that can be read: {error.strerror}"
-    if not remedy and (path.suffix == ".toml" or "/" in argument or "\\" in argument):
-        remedy = "there is no such file: give a TOML file or a bundled study"
-    if not remedy and argument not in names:
-        remedy = f"there is none of this name: give a TOML file or one of {', '.join(names)}"
-    if remedy:
-        raise UserError(argument, "the study", None, remedy)
-    return Path(str(resources.files("studies").joinpath(f"{argument}.toml")))
+    if not remedy and argument in names:
+        return Path(str(resources.files("studies").joinpath(f"{argument}.toml")))
+    is_file = path.suffix == ".toml" or "/" in argument or "\\" in argument
+    what = "no such file" if is_file else "none of this name"
+    remedy = remedy or f"there is {what}: give a TOML file or one of the bundled studies {', '.join(names)}"
+    raise UserError(argument, "the study", None, remedy)
 
 
 def _dict(table: Mapping[str, object], name: str) -> dict[str, Any]:
@@ -136,15 +126,14 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     moved |= _move_solver_axes(tables, found)
     axes, blocks = _axes_and_blocks(tables, origin, found)
     parts, renamed = [], {**moved, **keys_below_axes(axes)}
-    for number, part in enumerate(combinations(tables, axes) if axes else [tables]):
+    for part in combinations(tables, axes):
         with found.collecting(renamed):
-            parts.append(_check_part(part, origin, blocks, found))
-        if number - len(parts) > _MOST_WRONG_PARTS:
-            break
+            checked = _check_part(part, origin, blocks, found)
+            parts.append(checked if found else _complete(checked))
     found.raise_any(table)
     study = parts[0]
     if axes:
-        study = study.model_copy(update={"scene_axes": as_checked(axes, parts), "variants": tuple(parts)})
+        study = study.model_copy(update={"scene_axes": as_checked(axes, study), "variants": tuple(parts)})
         for wrong in (*size_of_result(study), *wrong_scatter(study)):
             found.add(*wrong)
         found.raise_any()
@@ -200,7 +189,7 @@ def _move_solver_axes(tables: Tables, found: Mistakes) -> dict[str, str]:
 
 
 def _scene_kind(tables: Tables, origin: Origin) -> type[BaseModel] | None:
-    """What [scene] consists of; None where its model is wrong, which is said where the scene is checked."""
+    """What [scene] consists of; None where its model is wrong, which is a mistake where the scene is checked."""
     try:
         return parameters_of(tables["scene"].get("model"), origin.source)
     except UserError:
@@ -217,7 +206,7 @@ def _axes_and_blocks(
             del tables["axes"][name]
         return (), ()
     own = [name for name in tables["axes"] if name in OWN_AXES]
-    axes = take_scene_axes(tables, kind, WearSection, found)
+    axes = take_scene_axes(tables, kind, found)
     blocks: tuple[MissionBlock, ...] = ()
     if "mission" in tables:
         blocks = read_blocks(tables["mission"], tables["axes"], kind, found)
@@ -226,13 +215,10 @@ def _axes_and_blocks(
     return (*axes, *worn_axis(tables["scene"].get("worn", {}), name)), blocks
 
 
-def _check_part(
-    tables: Tables, origin: Origin, blocks: tuple[MissionBlock, ...], before: Mistakes, *, room: bool = True
-) -> Study:
-    """A study without axes that are keys of [scene] or [wear].
+def _check_part(tables: Tables, origin: Origin, blocks: tuple[MissionBlock, ...], before: Mistakes) -> Study:
+    """A study without axes that are keys of [scene] or [wear], of tables that are right. Raises UserError.
 
-    before: mistakes because of which the study is not complete. room: whether scenes get room for what wears. Raises
-    UserError.
+    before: mistakes because of which tables are missing.
     """
     found, tables = Mistakes(origin.source), dict(tables)
     parts: dict[str, Any] = {"source": origin.source, "folder": origin.path.parent, "archived": origin.archived}
@@ -243,37 +229,35 @@ def _check_part(
         parts |= {"mission": blocks, "block_studies": of_blocks}
     parts["follow"] = take_followed(tables, found)
     filled = with_idle_values(tables)
+    scene = _scene_kind(tables, origin)
     for name, kind in SECTIONS.items():
         if name in filled and name not in before:
-            scene = _scene_kind(tables, origin) if name == "axes" else None
-            others = () if scene is None else (*scene.model_fields, *WearSection.AXES)
+            others = (*scene.model_fields, *WearSection.AXES) if scene and name == "axes" else ()
             with found.collecting():
                 parts[name] = check_table(kind, filled[name], origin.source, name, others)
-    if "outputs" in parts:
-        parts["outputs"] = _with_usual_variables(parts, tables)
     study = Study.model_construct(**parts)
     wrong = [name for name in filled if name not in parts]
     for name in wrong:
         # a rule that asks for it is left out
         vars(study).pop(name, None)
+    if "outputs" in parts:
+        study = _with_usual_variables(study, tables)
     check_rules(study, found, complete=not wrong)
     found.raise_any()
-    if before:
-        return study
-    if "mission" in tables:
-        outputs = {"outputs": study.outputs}
-        same = tuple(each.model_copy(update=outputs) for each in study.block_studies)
-        study = study.model_copy(update={"block_studies": same})
-    if room:
-        study = with_room_of_all(study) if study.mission else with_room_for_wear(study)
-    check_draws(study)
     return study
+
+
+def _complete(study: Study) -> Study:
+    """A right study with scenes that have room for wear."""
+    outputs = {"outputs": study.outputs}
+    blocks = tuple(each.model_copy(update=outputs) for each in study.block_studies)
+    return with_room_for_wear(study.model_copy(update={"block_studies": blocks}))
 
 
 def _block_studies(
     tables: Tables, blocks: Sequence[MissionBlock], origin: Origin, before: Mistakes, found: Mistakes
 ) -> tuple[Study, ...]:
-    """For each block a study of this block alone, without room for wear; none where a parameter of a block is wrong."""
+    """For each block a study of this block alone; none where a parameter of a block is wrong."""
     studies: list[Study] = []
     for block in blocks:
         own = {name: getattr(block, name) for name in OWN_AXES if isinstance(getattr(block, name), float)}
@@ -284,7 +268,7 @@ def _block_studies(
         alone["outputs"] = {key: value for key, value in tables["outputs"].items() if key == "scene"}
         renamed = {f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}
         with found.collecting(renamed):
-            study = _check_part(alone, origin, (), before, room=False)
+            study = _check_part(alone, origin, (), before)
             if block.engine_order is not None:
                 frequency = engine_frequency(block, study.scene.parameters, origin.source)
                 study = study.model_copy(update={"axes": study.axes.model_copy(update={"frequency": (frequency,)})})
@@ -292,15 +276,16 @@ def _block_studies(
     return tuple(studies) if len(studies) == len(blocks) else ()
 
 
-def _with_usual_variables(parts: Mapping[str, Any], tables: Tables) -> OutputsSection:
+def _with_usual_variables(study: Study, tables: Tables) -> Study:
     """[outputs] with variables in their order, the usual ones of such a study for the word that stands for them."""
-    outputs: OutputsSection = parts["outputs"]
-    names, kind = set(outputs.variables), kind_of(tables)
+    names, kind = set(study.outputs.variables), kind_of(tables)
     if DEFAULT in names:
         names |= {*(kind.usual if tables.get("scatter") is None else kind.of_samples)}
-        names |= {*(FOLLOWED_FREQUENCY if parts["follow"] is not None else ())}
-        names |= {"mesh"} & {*(parts["scene"].offers if "scene" in parts else ())}
-    return outputs.model_copy(update={"variables": tuple(name for name in VARIABLES if name in names)})
+        names |= {*(FOLLOWED_FREQUENCY if study.follow is not None else ())}
+        scene = vars(study).get("scene")
+        names |= {"mesh"} & {*(scene.offers if scene else ())}
+    ordered = tuple(name for name in VARIABLES if name in names)
+    return study.model_copy(update={"outputs": study.outputs.model_copy(update={"variables": ordered})})
 
 
 def format_study(study: Study) -> str:

@@ -31,7 +31,7 @@ def _listed(value: object) -> object:
 def _states(value: object) -> object:
     """Depths of all pairs, one number or one for each, of one state or of a list of states."""
     several = isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple)
-    return tuple(_listed(state) for state in value) if several else (_listed(value),)  # type: ignore[attr-defined]
+    return tuple(_listed(state) for state in listed(value)) if several else (_listed(value),)
 
 
 _Depths = Annotated[tuple[NotNegative, ...], Field(min_length=1, strict=False)]
@@ -119,10 +119,9 @@ def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence
     places: dict[str, Any] = {}
     for name in axes:
         values = dataset[name].values.tolist()
-        if name not in point and len(values) > 1:
-            remedy = f"missing: give one of the values {', '.join(map(str, values[:10]))} of the result"
-            found.add(f"scene.worn.{name}", None, remedy)
-        places[name] = _place(f"scene.worn.{name}", values, point.get(name, values[0]), found)
+        places[name] = _place(
+            f"scene.worn.{name}", values, point.get(name, values[0] if len(values) == 1 else None), found
+        )
     counts = dataset["cycle"].values.tolist()
     places["cycle"] = [_place("scene.worn.cycle", counts, count, found) for count in cycle]
     found.raise_any()
@@ -136,23 +135,18 @@ def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence
 
 def _place(key: str, values: Sequence[Any], wanted: Any, found: Mistakes) -> int:
     """Index of a value along an axis of a result; 0, and a mistake, where it is not there."""
-    numbers = [value for value in values if isinstance(value, float | int)]
-    if numbers and isinstance(wanted, float | int):
-        near = min(numbers, key=lambda value: abs(value - wanted))
-        if math.isclose(near, wanted, rel_tol=1e-12):
-            return values.index(near)
-        found.add(key, wanted, f"the nearest value of the result is {near:.10g}")
-    elif wanted in values:
-        return values.index(wanted)
-    else:
-        found.add(key, wanted, f"give one of {values[:10]}")
+    numbers = isinstance(wanted, float | int) and not isinstance(values[0], str)
+    for place, value in enumerate(values):
+        if (numbers and math.isclose(value, wanted, rel_tol=1e-12)) or value == wanted:
+            return place
+    if numbers:
+        values = sorted(values, key=lambda value: abs(value - wanted))
+    found.add(key, wanted, f"give a value of the result: {', '.join(map(str, values[:10]))}")
     return 0
 
 
 def worn_axis(table: Mapping[str, Any], name: str) -> tuple[SceneAxis, ...]:
     """The axis of worn states; none where their cycle counts are not known. table: as `read_worn` gives it."""
     counts = table.get("cycle", [])
-    if not counts:
-        return ()
     meaning = "number of vibration cycles that have worn the joint before"
-    return (SceneAxis(name, "scene", ("worn",), tuple(counts), "1", meaning),)
+    return (SceneAxis(name, "scene", ("worn",), tuple(counts), "1", meaning),) if counts else ()

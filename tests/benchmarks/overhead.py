@@ -3,7 +3,7 @@
 Ends with 1 where a point takes rank 0 of 4 more than 0.5 ms of its processor, or 0.01 MiB. On a slow machine the
 limit is as many times higher as a fixed piece of work in Python takes longer there.
 
-    python -m tests.benchmarks.overhead [POINTS]
+    python -m tests.benchmarks.overhead [--points 10000]
 
 Tasks give made-up results at once. In one process, all of it runs in turn: the time is that of rank 0, of the ranks
 that compute and of the disk together. Under mpiexec with 4 ranks it is shared with the other ranks, which take turns on
@@ -19,6 +19,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.benchmarks.frame import Table, arguments
 from tests.mpi.launching import FAKED, ROOT, launcher
 
 FREQUENCIES = 10
@@ -39,40 +40,23 @@ class Spent:
 
 def run(n_ranks: int, n_points: int, folder: Path, name: str = "out.nc", outputs: int = 11) -> Spent:
     """A study of trivial points from its start to its end. outputs: cycle counts at which a point has results."""
-    arguments = [
-        *(FAKED, "sdof_slider"),
-        *("--set", f"axes.frequency={{start = 100, stop = 200, num = {FREQUENCIES}}}"),
-        *("--set", f"axes.wear_coefficient={{start = 1e-12, stop = 1e-11, num = {n_points // FREQUENCIES}}}"),
-        *(
-            "--set",
-            "axes.scheme=implicit",
-            "--set",
-            f"slow_time.outputs={outputs}",
-            "--set",
-            "outputs.variables=['worn_volume']",
-        ),
-        *("--set", "solver.shortcuts=false", "-o", name),
-    ]
+    changes = (
+        f"axes.frequency={{start = 100, stop = 200, num = {FREQUENCIES}}}",
+        f"axes.wear_coefficient={{start = 1e-12, stop = 1e-11, num = {n_points // FREQUENCIES}}}",
+        "axes.scheme=implicit",
+        f"slow_time.outputs={outputs}",
+        "outputs.variables=['worn_volume']",
+        "solver.shortcuts=false",
+    )
+    command = [*launcher(n_ranks), sys.executable, FAKED, "sdof_slider", *(f"--set={change}" for change in changes)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "FAKE_NOTHING": "1"}
     began = time.perf_counter()
     done = subprocess.run(
-        [*launcher(n_ranks), sys.executable, *arguments],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
+        [*command, "-o", name], cwd=folder, env=environment, capture_output=True, text=True, check=True
     )
     seconds = time.perf_counter() - began
     ((memory, of_rank_0),) = re.findall(r"rank 0: (\d+) KiB, (\S+) s", done.stderr)
     return Spent(seconds, float(of_rank_0), int(memory) / 1024)
-
-
-def spent_on_points(n_ranks: int, n_points: int, folder: Path) -> Spent:
-    """What so many points take beyond what a study of few does."""
-    few = run(n_ranks, FREQUENCIES, folder, f"few{n_ranks}.nc")
-    many = run(n_ranks, n_points, folder, f"many{n_ranks}.nc")
-    return Spent(many.seconds - few.seconds, many.of_rank_0 - few.of_rank_0, many.memory - few.memory)
 
 
 def unit() -> float:
@@ -87,18 +71,19 @@ def unit() -> float:
 
 
 def main() -> int:
-    """Prints a line for one process and one for 4 ranks; 1 where the 4 ranks take more than the limits."""
-    n_points = int(sys.argv[1]) if len(sys.argv) > 1 else 10_000
+    """Prints a row for one process and one for 4 ranks; 1 where the 4 ranks take more than the limits."""
+    n_points = arguments(__doc__, points=10_000).points
+    table = Table("per point", "ms", "ms of rank 0", "MiB in all")
     with tempfile.TemporaryDirectory() as name:
         for n_ranks in (0, 4):
-            spent = spent_on_points(n_ranks, n_points, Path(name))
-            print(
-                f"{n_points} points, {f'{n_ranks} ranks' if n_ranks else 'one process'}:"
-                f" {1e3 * spent.seconds / n_points:.3f} ms a point, of which rank 0 is busy for"
-                f" {1e3 * spent.of_rank_0 / n_points:.3f} ms; it grows by {spent.memory:.0f} MiB"
+            # beyond what a study of few points does
+            few, many = (run(n_ranks, n, Path(name), f"{n_ranks} {n}.nc") for n in (FREQUENCIES, n_points))
+            seconds, of_rank_0 = (
+                1e3 * (getattr(many, key) - getattr(few, key)) / n_points for key in ("seconds", "of_rank_0")
             )
+            table.row(f"{n_ranks} ranks" if n_ranks else "one process", seconds, of_rank_0, many.memory - few.memory)
     slowness = max(1.0, unit() / UNIT)
-    return int(1e3 * spent.of_rank_0 / n_points > MILLISECONDS * slowness or spent.memory > MEMORY * n_points)
+    return int(of_rank_0 > MILLISECONDS * slowness or many.memory - few.memory > MEMORY * n_points)
 
 
 if __name__ == "__main__":

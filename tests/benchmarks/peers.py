@@ -1,148 +1,250 @@
 """Other harmonic balance programs on the same slider and the same dovetail, each in an environment of its own.
 
-    python -m tests.benchmarks.peers [--folder ~/.cache/fretwear_peers] [--tmdsimpy FOLDER] [--nlvib FOLDER]
+    python -m tests.benchmarks.peers [slider] [dovetail] [--folder FOLDER] [--tmdsimpy FOLDER] [--nlvib FOLDER]
 
-One response curve of a mass of 0.1 kg on a mount (1.6e5 N/m, 20 N s/m) under 10 N, held by friction of 5 N from 120 to
-250 Hz: rigid friction, and elastic friction behind a spring of 1.6e6 N/m. Printed are the CPU time of the second of two
-equal runs (compiling is left out), Newton iterations, and the largest error of the first harmonic against the exact
-motion at the frequencies that the program has chosen. Then one curve of the dovetail: see `peers_dovetail`.
+Slider: one response curve of a mass of 0.1 kg on a mount (1.6e5 N/m, 20 N s/m) under 10 N, held by friction of 5 N, at
+27 frequencies from 120 to 250 Hz: rigid friction, and elastic friction behind a spring of 1.6e6 N/m, against the exact
+motion. Dovetail: 16 pairs, 0.5 N, friction 0.5, unworn, 25 frequencies from 211 to 214 Hz. Its true motion is that of
+rigid contact: a start state of this project with 25 harmonics and `rtol` 1e-4, which `time_integration` confirms. Other
+programs get the model, the first state of the own curve as their first guess, and the springs or penalties that are
+asked for; no friction history: in each period they begin with sliders that are not displaced.
 
+Printed are the CPU time of the second of two equal runs (compiling is left out), the iterations really made, and the
+error of the first harmonic at the frequencies that the program has chosen; the same in `peers.csv` of the folder.
 Environments are built in the folder, pyHarm and JAX from the package index. tmdsimpy and NLvib are no packages:
 `--tmdsimpy` and `--nlvib` name copies of their repositories, without them git fetches them. NLvib runs under Octave
-(`octave-cli`). What cannot be had is said in a sentence, and the others go on.
+(`octave-cli`); it has no friction whose normal force changes. What cannot be had is said in a sentence.
 """
 
 from __future__ import annotations
 
-import argparse
-import time
+import json
+import os
+import subprocess
+import tempfile
+import venv
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from solver import frequency_response
 from solver.compliant_contact import TANGENTIAL_RATIO
-from solver.loading_history.start_states import follow_branch
+from solver.model import FloatArray, ReducedModel
 from solver.settings import SolverSettings
 from studies import build_scene
-from tests.benchmarks import peers_dovetail
-from tests.benchmarks.peer_runs import Curve, Run, attempt, curve_of, environment, repository
+from tests.benchmarks.frame import Table, arguments, measure
 from tests.references import slider_orbit
+from tests.solver.models import branch_states
 from tests.solver.random_orbits import behind_spring
 
 MASS, DAMPING, MOUNT, FORCE, FRICTION, SPRING = 0.1, 20.0, 1.6e5, 10.0, 5.0, 1.6e6
-FIRST, LAST, N_FREQUENCIES = 120.0, 250.0, 27
+SLIDER = {"mass": MASS, "damping": DAMPING, "mount": MOUNT, "force": FORCE, "friction": FRICTION, "spring": SPRING}
+SLIDER_FREQUENCIES, FREQUENCIES = np.linspace(120.0, 250.0, 27), np.linspace(211.0, 214.0, 25)
+LOAD, MU = 0.5, 0.5  # of the dovetail: N, 1
+STRUCTURE = 2e8  # N/m: what the bodies resist a displacement of one pair with, 1.1e8 to 3.4e8
 HARMONICS, SAMPLES = (5, 13), 256
+NEWTON = {"tolerance": 1e-6, "most": 25}  # of the residual, N, and iterations; a curve that converges takes ten
 PYHARM, JAX = ("pyharm-os==1.2.2",), ("jax[cpu]", "scipy")
 TMDSIMPY, NLVIB = "https://github.com/tmd-lab/tmdsimpy", "https://github.com/maltekrack/NLvib"
-SLIDER = {
-    "mass": MASS,
-    "damping": DAMPING,
-    "mount": MOUNT,
-    "force": FORCE,
-    "friction": FRICTION,
-    "spring": SPRING,
-    "first": FIRST,
-    "last": LAST,
-    "n_frequencies": N_FREQUENCIES,
-    "samples": SAMPLES,
+ELEMENTS = {
+    "pyHarm": [
+        ("Penalty3D", "springs", STRUCTURE, 5),
+        ("Penalty3D", "springs", 10.0 * STRUCTURE, 5),
+        ("DLFT3D", "rigid, as it is", STRUCTURE, 5),
+        *(("Rigid", "rigid, own element", STRUCTURE, harmonics) for harmonics in HARMONICS),
+    ],
+    "tmdsimpy": [
+        ("ElasticDryFriction3D", "springs, square limit", STRUCTURE, 5),
+        ("CircularFriction", "springs, own element", STRUCTURE, 5),
+        ("CircularFriction", "springs, own element", 10.0 * STRUCTURE, 5),
+    ],
 }
+"""Elements of other programs for the dovetail: name there, words for the table, springs or penalty, N/m, harmonics."""
+# One core, as the own curves. With the 32 bits that JAX takes unless told otherwise Newton's method does not converge.
+_SURROUNDINGS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "JAX_ENABLE_X64": "1"}
+# frequency, Hz, and amplitude, m, of the points that converged; iterations, CPU seconds, attempts that failed
+Curve = dict[str, Any]
+Truth = Callable[[FloatArray], FloatArray]
 
 
 def exact(kind: str, frequency: float) -> float:
-    """Amplitude of the first harmonic of the exact motion, m."""
+    """Amplitude of the first harmonic of the exact motion of the slider, m."""
     if kind == "rigid":
         return abs(slider_orbit(MASS, DAMPING, MOUNT, FORCE, FRICTION, 2.0 * np.pi * frequency).harmonic(0))
     rate = np.sqrt(MOUNT / MASS)
     limit, damping = FRICTION / FORCE, DAMPING / np.sqrt(MOUNT * MASS)
     pair = behind_spring(SPRING / MOUNT, damping, limit, 2.0 * np.pi * frequency / rate).pair
-    amplitude = pair.response(pair.orbit_near(np.zeros(2), np.zeros(2)))
-    return float(abs(amplitude).item()) * FORCE / MOUNT
+    return float(abs(pair.response(pair.orbit_near(np.zeros(2), np.zeros(2)))).item()) * FORCE / MOUNT
 
 
-def own_curve(kind: str, harmonics: int | None) -> Curve:
-    """The curve of this project. harmonics: None for those that the program chooses for `rtol`."""
-    springs = {} if kind == "rigid" else {"contact_stiffness": SPRING / (TANGENTIAL_RATIO * 1e-4)}
-    model = build_scene("sdof_slider", mass=MASS, damping=DAMPING, stiffness=MOUNT, normal_stiffness=0.0, **springs)
-    settings = SolverSettings() if harmonics is None else SolverSettings(harmonics=harmonics, samples=SAMPLES)
-    frequencies = np.linspace(FIRST, LAST, N_FREQUENCIES)
-    began = time.process_time()
-    found = frequency_response(model, frequencies, FORCE, 0.5, settings=settings)
-    spent = time.process_time() - began
-    there = np.isfinite(found.response[:, 0])
-    starts = [start for _, start in follow_branch(model, 0.5, FORCE, frequencies, "up", settings)]
+def own_curve(model: ReducedModel, frequencies: FloatArray, force: float, settings: SolverSettings) -> Curve:
+    """The curve of this project."""
+    found = [measure(lambda: frequency_response(model, frequencies, force, MU, settings=settings)) for _ in range(2)][1]
+    there = np.isfinite(found.result.response[:, 0])
     return {
         "frequency": frequencies[there].tolist(),
-        "amplitude": np.abs(found.response[there, 0]).tolist(),
-        "iterations": sum(start.newton_iterations for start in starts),
-        "seconds": spent,
+        "amplitude": np.abs(found.result.response[there, 0]).tolist(),
+        "iterations": found.iterations,
+        "seconds": found.seconds,
+        "failed": int((~there).sum()),
     }
 
 
-def peer_rows(name: str, kinds: tuple[str, ...], run: Run) -> None:
-    """Prints the rows of another program. Raises CalledProcessError."""
-    for kind in kinds:
-        for harmonics in HARMONICS:
-            show(name, kind, harmonics, run({"kind": kind, "harmonics": harmonics, **SLIDER}))
-
-
-def show(name: str, kind: str, harmonics: int | str, curve: Curve) -> None:
-    """Prints a row of the table."""
+def show(table: Table, name: str, harmonics: int | str, curve: Curve, truth: Truth) -> None:
+    """A row of the table."""
     frequencies, amplitudes = np.array(curve["frequency"]), np.array(curve["amplitude"])
     if not frequencies.size:
-        print(f"| {name} | {kind} | {harmonics} | no point converged | | | |")
+        table.row(name, harmonics, 0, curve.get("failed", 0), *6 * [None])
         return
-    errors = np.abs(amplitudes / [exact(kind, frequency) for frequency in frequencies] - 1.0)
-    where = frequencies[np.argmax(errors)]
-    print(
-        f"| {name} | {kind} | {harmonics} | {frequencies.size} | {curve['iterations']:.0f} | {curve['seconds']:.2f} s |"
-        f" {100.0 * errors.max():.2f} % at {where:.0f} Hz, median {100.0 * np.median(errors):.3f} % |",
-        flush=True,
-    )
+    errors = 100.0 * np.abs(amplitudes / truth(frequencies) - 1.0)
+    largest, effort = int(np.argmax(amplitudes)), (curve["iterations"], curve["seconds"])
+    peak = 1e3 * amplitudes[largest], frequencies[largest]
+    errors = float(errors.max()), float(np.median(errors))
+    table.row(name, harmonics, frequencies.size, curve.get("failed", 0), *effort, *map(float, peak), *errors)
 
 
-def slider(pyharm: Run, tmdsimpy: Run, nlvib: Run) -> None:
-    """Prints the table of the slider."""
-    print("| program | friction | harmonics | points | iterations | CPU time | error of the first harmonic |")
-    print("|---|---|---|---|---|---|---|")
+def own_rows(table: Table, kind: str, model: ReducedModel, frequencies: FloatArray, force: float, truth: Truth) -> None:
+    """The rows of this project."""
+    for harmonics in (*HARMONICS, "auto"):
+        settings = SolverSettings(harmonics=harmonics, samples="auto" if harmonics == "auto" else SAMPLES)
+        show(table, f"fretwear, {kind}", harmonics, own_curve(model, frequencies, force, settings), truth)
+
+
+def slider(table: Table, programs: dict[str, Callable[[Curve], Curve]]) -> None:
+    """The rows of the slider."""
+    asked = {**SLIDER, "first": 120.0, "last": 250.0, "n_frequencies": 27, "samples": SAMPLES}
+    asked["frequency"] = SLIDER_FREQUENCIES.tolist()
     for kind in ("elastic", "rigid"):
-        for harmonics in (*HARMONICS, None):
-            own_curve(kind, harmonics)
-            show("fretwear", kind, harmonics or "auto, rtol 1 %", own_curve(kind, harmonics))
-    attempt("pyHarm", lambda: peer_rows("pyHarm", ("elastic", "rigid"), pyharm))
-    attempt("tmdsimpy", lambda: peer_rows("tmdsimpy", ("elastic",), tmdsimpy))
-    attempt("NLvib", lambda: peer_rows("NLvib", ("elastic",), nlvib))
+        springs = {} if kind == "rigid" else {"contact_stiffness": SPRING / (TANGENTIAL_RATIO * 1e-4)}
+        model = build_scene("sdof_slider", mass=MASS, damping=DAMPING, stiffness=MOUNT, normal_stiffness=0.0, **springs)
+
+        def truth(frequencies: FloatArray, kind: str = kind) -> FloatArray:
+            return np.array([exact(kind, frequency) for frequency in frequencies])
+
+        own_rows(table, f"slider, {kind}", model, SLIDER_FREQUENCIES, FORCE, truth)
+        for name in programs if kind == "elastic" else ("pyHarm",):
+            for harmonics in HARMONICS:
+                curve = attempt(name, programs[name], {**asked, "kind": kind, "harmonics": harmonics})
+                if curve is not None:
+                    show(table, f"{name}, slider, {kind}", harmonics, curve, truth)
+
+
+def dovetail(table: Table, programs: dict[str, Callable[[Curve], Curve]], folder: Path) -> None:
+    """The rows of the dovetail."""
+    model, known = build_scene("dovetail_sector", mesh=1), dict[float, float]()
+
+    def truth(frequencies: FloatArray) -> FloatArray:
+        places = np.round(frequencies, 6).tolist()
+        if new := [place for place in places if place not in known]:
+            fine = SolverSettings(rtol=1e-4, harmonics=25, samples=512)
+            found = frequency_response(model, new, LOAD, MU, settings=fine)
+            known.update(zip(new, np.abs(found.response[:, 0]).tolist(), strict=True))
+        return np.array([known[place] for place in places])
+
+    own_rows(table, "dovetail, rigid", model, FREQUENCIES, LOAD, truth)
+    file = folder / "dovetail.npz"
+    asked = {"file": str(file), "pairs": model.contact.n_contact, "friction": MU, "samples": SAMPLES, **NEWTON}
+    asked["frequency"] = FREQUENCIES.tolist()
+    for name, elements in ELEMENTS.items():
+        for element, words, stiffness, harmonics in elements:
+            write_model(file, model, 0.0 if "rigid" in words else 1.0 / stiffness, harmonics)
+            wanted = {**asked, "element": element, "stiffness": stiffness, "harmonics": harmonics}
+            curve = attempt(name, programs[name], wanted)
+            if curve is not None:
+                show(table, f"{name}, dovetail, {words}, {stiffness:.0e}", harmonics, curve, truth)
+
+
+def write_model(file: Path, model: ReducedModel, compliance: float, harmonics: int) -> None:
+    """Matrices, loads, response and first guess as arrays in a file; pairs first, normal before tangents.
+
+    The first guess is the state of the own curve at the first frequency, mean and first harmonic. With springs a pair
+    closes by its normal force times their compliance, m/N.
+    """
+    linear, omega = model.linear[0], 2.0 * np.pi * FREQUENCIES[0]
+    mass, damping, stiffness = (np.real(part) for part in (linear.mass, linear.damping, linear.stiffness))
+    state = branch_states(model, MU, LOAD, [omega], SolverSettings())[0].state
+    n, joint, cosine = len(mass), model.contact.dofs.size, LOAD * np.real(linear.load_harmonic)
+    guess, closing = np.zeros((2 * harmonics + 1, n)), np.array([compliance, 0.0, 0.0])
+    for order, load in ((0, linear.load_static), (1, cosine)):
+        impedance = stiffness + 1j * order * omega * damping - (order * omega) ** 2 * mass
+        moved, force = (
+            part[..., 0] + 0.0j if order == 0 else part[..., 1] - 1j * part[..., 2]
+            for part in (state.displacement_h, state.contact_force_h)
+        )
+        free = np.linalg.solve(impedance[joint:, joint:], load[joint:] - impedance[joint:, :joint] @ moved.ravel())
+        whole = np.concatenate([(moved + closing * force).ravel(), free])
+        guess[order] = whole.real
+        if order:
+            guess[2] = -whole.imag
+    arrays = {"M": mass, "C": damping, "K": stiffness, "static": linear.load_static, "cosine": cosine}
+    np.savez(file, **arrays, row=np.real(linear.response[0]), start=guess.ravel())
+
+
+def environment(folder: Path, name: str, packages: tuple[str, ...]) -> str:
+    """Interpreter of an environment with the packages. Raises CalledProcessError."""
+    python = folder / name / "bin" / "python"
+    if not python.exists():
+        venv.create(folder / name, with_pip=True)
+        subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True, capture_output=True, text=True)
+    return str(python)
+
+
+def repository(place: Path, address: str) -> str:
+    """A copy of a repository, fetched by git if there is none. Raises CalledProcessError."""
+    if not place.exists():
+        fetch = ["git", "clone", "-q", "--depth", "1", address, place]
+        subprocess.run(fetch, check=True, capture_output=True, text=True)
+    return str(place)
+
+
+def curve_of(command: list[str], script: str, asked: Curve) -> Curve:
+    """What a script of this folder prints last. Raises CalledProcessError, FileNotFoundError without the program."""
+    command = [*command, str(Path(__file__).with_name(script)), json.dumps(asked)]
+    with tempfile.TemporaryDirectory() as folder:  # pyHarm writes where it runs
+        surroundings = {**os.environ, **_SURROUNDINGS}
+        done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder, env=surroundings)
+    curve: Curve = json.loads(done.stdout.splitlines()[-1])
+    return curve
+
+
+def attempt(name: str, program: Callable[[Curve], Curve], asked: Curve) -> Curve | None:
+    """The curve of another program; None, and a sentence, where it is not to be had."""
+    try:
+        return program(asked)
+    except (subprocess.CalledProcessError, FileNotFoundError) as error:
+        said = (getattr(error, "stderr", None) or str(error)).strip().splitlines() or ["no message"]
+        # Octave says first what is wrong, Python last
+        print(f"{name} is not run here: {next((line for line in said if line.startswith('error: ')), said[-1])}")
+    return None
 
 
 def main() -> None:
-    """Builds the environments and prints the tables."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--folder", type=Path, default=Path.home() / ".cache" / "fretwear_peers")
-    parser.add_argument("--tmdsimpy", type=Path)
-    parser.add_argument("--nlvib", type=Path)
-    given = parser.parse_args()
-    folder = given.folder.resolve()
+    """Builds the environments and prints the table."""
+    cache = str(Path.home() / ".cache" / "fretwear_peers")
+    given = arguments(__doc__, ("slider", "dovetail"), folder=cache, tmdsimpy=None, nlvib=None)
+    folder = Path(given.folder).resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    tmdsimpy_copy = (given.tmdsimpy or folder / "tmdsimpy_copy").resolve()
-    nlvib_copy = (given.nlvib or folder / "nlvib_copy").resolve()
-
-    def pyharm(script: str) -> Run:
-        return lambda asked: curve_of([environment(folder, "pyharm", PYHARM)], script, asked)
-
-    def tmdsimpy(script: str) -> Run:
-        return lambda asked: curve_of(
-            [environment(folder, "tmdsimpy", JAX)], script, {**asked, "source": repository(tmdsimpy_copy, TMDSIMPY)}
-        )
-
-    def nlvib(asked: dict[str, object]) -> Curve:
-        return curve_of(["octave-cli", "-q"], "peer_nlvib.m", {**asked, "source": repository(nlvib_copy, NLVIB)})
-
-    slider(pyharm("peer_pyharm.py"), tmdsimpy("peer_tmdsimpy.py"), nlvib)
-    dovetail = peers_dovetail.Table(folder / "dovetail.npz")
-    dovetail.own_rows()
-    attempt("pyHarm", lambda: dovetail.peer_rows("pyHarm", pyharm("peer_pyharm_dovetail.py")))
-    attempt("tmdsimpy", lambda: dovetail.peer_rows("tmdsimpy", tmdsimpy("peer_tmdsimpy_dovetail.py")))
-    print("NLvib has no friction whose normal force changes.")
+    copies = [(given.tmdsimpy or folder / "tmdsimpy_copy"), (given.nlvib or folder / "nlvib_copy")]
+    tmdsimpy, nlvib = (copy.resolve() for copy in copies)
+    programs: dict[str, Callable[[Curve], Curve]] = {
+        "pyHarm": lambda asked: curve_of([environment(folder, "pyharm", PYHARM)], "peer_pyharm.py", asked),
+        "tmdsimpy": lambda asked: curve_of(
+            [environment(folder, "tmdsimpy", JAX)],
+            "peer_tmdsimpy.py",
+            {**asked, "source": repository(tmdsimpy, TMDSIMPY)},
+        ),
+        "NLvib": lambda asked: curve_of(
+            ["octave-cli", "-q"], "peer_nlvib.m", {**asked, "source": repository(nlvib, NLVIB)}
+        ),
+    }
+    columns = ("program", "harmonics", "points", "failed", "iterations", "CPU s", "largest, mm", "at Hz")
+    table = Table(*columns, "error, %", "median, %", file=folder / "peers.csv")
+    if "slider" in given.chosen:
+        slider(table, programs)
+    if "dovetail" in given.chosen:
+        dovetail(table, programs, folder)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ against every law of contact. Prints outcomes, the largest error of each law, it
 solver and linear programme disagree.
 """
 
-import argparse
 from collections import Counter
 
 import numpy as np
@@ -17,12 +16,14 @@ from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
+from tests.benchmarks.frame import Table, arguments
 from tests.random_decks import RandomDeck, equilibrium_possible, law_errors, random_deck
 
 SETTINGS = SolverSettings()
 OMEGA = 2.0 * np.pi * 1000.0  # rad/s; the penalty alone depends on it
 EXISTS = {True: "possible", False: "impossible", None: "at the limit"}
 NAMED = (Outcome.STATIC_SLIDING, Outcome.STATIC_OPEN)
+EXPECTED = {"possible": (Outcome.CONVERGED,), "impossible": NAMED, "at the limit": (Outcome.CONVERGED, *NAMED)}
 
 
 def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float], int]:
@@ -38,26 +39,22 @@ def run_deck(deck: RandomDeck) -> tuple[str, Outcome, dict[str, float], int]:
 
 def main() -> None:
     """Runs the models and prints the tables."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--first", type=int, default=0)
-    given = parser.parse_args()
+    given = arguments(__doc__, count=200, first=0)
     counts, iterations, worst = Counter[tuple[str, str]](), [], dict[str, float]()
+    others = Table("solver and linear programme disagree", "seed", "state", "outcome")
     for seed in range(given.first, given.first + given.count):
         deck = random_deck(seed)
         exists, outcome, errors, taken = run_deck(deck)
         counts[exists, outcome.meaning] += 1
         iterations.append(taken)
-        for law, error in errors.items():
-            worst[law] = max(worst.get(law, 0.0), error)
-        expected = {"possible": (Outcome.CONVERGED,), "impossible": NAMED}.get(exists, (Outcome.CONVERGED, *NAMED))
-        if outcome not in expected:
-            print(f"seed {seed}, static state {exists}: {outcome.meaning}; {deck.facts}")
+        worst |= {law: max(worst.get(law, 0.0), error) for law, error in errors.items()}
+        if outcome not in EXPECTED[exists]:
+            others.row(deck.facts, seed, exists, outcome)
+    table = Table("static state", "outcome", "number")
     for (exists, meaning), count in sorted(counts.items()):
-        print(f"static state {exists:12} {meaning:14} {count}")
+        table.row(exists, meaning, count)
     print("largest errors:", ", ".join(f"{law} {error:.1e}" for law, error in worst.items()))
-    quantiles = ", ".join(f"{share}: {np.quantile(iterations, share):.0f}" for share in (0.5, 0.9, 1.0))
-    print(f"iterations: {quantiles}")
+    print("iterations, median, 90 % and all:", *np.quantile(iterations, (0.5, 0.9, 1.0)))
 
 
 if __name__ == "__main__":

@@ -1,18 +1,18 @@
 """Wear of a passage through a resonance, by time integration, over the wear of its steady states.
 
-`python -m tests.benchmarks.run_up [--scene sdof_slider] [--rates 0.1 0.3 1 3]` prints both for some sweep rates, each
-as |df/dt| / (zeta f)^2, with the error that the passage tells. The time integration is that of `time_integration`: the
-phase of the excitation runs with the frequency, up or down, and the slip work is summed at constant depth.
-"""
+    python -m tests.benchmarks.run_up [--scene sdof_slider] [--rates 0.1 0.3 1 3]
 
-import argparse
-import time
+Both for some sweep rates, each as |df/dt| / (zeta f)^2, up and down, with the error that the passage tells. The time
+integration is that of `time_integration`: the phase of the excitation runs with the frequency, and the slip work is
+summed at constant depth.
+"""
 
 import numpy as np
 
-from solver import Block, MissionHistory, Passage, SolverSettings, integrate_mission
+from solver import Block, MissionHistory, Passage, integrate_mission
 from solver.model import FloatArray, ReducedModel
 from studies import build_scene
+from tests.benchmarks.frame import Table, arguments, measure
 from tests.benchmarks.time_integration import advance, at_rest, build, settle
 
 FRICTION, WEAR_PER_WORK = 0.5, 1e-30
@@ -42,36 +42,27 @@ def time_integrated(model: ReducedModel, passage: Passage, amplitude: float, n_s
     return work
 
 
-def main() -> None:
-    """Both wears for each rate and direction."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--scene", choices=CASES, default="sdof_slider")
-    parser.add_argument("--rates", type=float, nargs="+", default=[0.1, 0.3, 1.0, 3.0])
-    parser.add_argument("--steps", type=int, default=500)
-    parser.add_argument("--ways", choices=["up", "down"], nargs="+", default=["up", "down"])
-    given = parser.parse_args()
-    changes, ends, amplitude = CASES[given.scene]
-    model = build_scene(given.scene, **changes)
-    for way in given.ways:
-        start, stop = ends if way == "up" else ends[::-1]
-        for rate in given.rates:
-            began = time.process_time()
-            slow = _mission(model, Passage(start, stop, 1.0), amplitude)
-            passage = Passage(start, stop, rate / float(slow.sweep_rate[0]))
-            history = _mission(model, passage, amplitude)
-            volume = float(history.worn_volume[-1]) / WEAR_PER_WORK
-            work = float(time_integrated(model, passage, amplitude, given.steps).sum())
-            print(
-                f"{way}, {rate:.3g} (zeta f)^2, {passage.rate:.3g} Hz/s: {work / volume:.4f}, told "
-                f"{history.error_estimate:.2%}, {time.process_time() - began:.0f} CPU s",
-                flush=True,
-            )
-
-
-def _mission(model: ReducedModel, passage: Passage, amplitude: float) -> MissionHistory:
+def steady(model: ReducedModel, passage: Passage, amplitude: float) -> MissionHistory:
     """One passage that wears next to nothing, through steady states."""
     block = Block(model, passage, amplitude, FRICTION, begin=passage.sweep)
-    return integrate_mission((block,), WEAR_PER_WORK, 1, settings=SolverSettings())
+    return integrate_mission((block,), WEAR_PER_WORK, 1)
+
+
+def main() -> None:
+    """Both wears for each rate and direction."""
+    given = arguments(__doc__, scene="sdof_slider", rates=[0.1, 0.3, 1.0, 3.0], steps=500)
+    changes, ends, amplitude = CASES[given.scene]
+    model = build_scene(given.scene, **changes)
+    table = Table("passage, rate over (zeta f)^2", "Hz/s", "integrated over steady", "error", "CPU s")
+    for start, stop in (ends, ends[::-1]):
+        for rate in given.rates:
+            slow = steady(model, Passage(start, stop, 1.0), amplitude)
+            passage = Passage(start, stop, rate / float(slow.sweep_rate[0]))
+            found = measure(lambda passage=passage: steady(model, passage, amplitude))
+            volume = float(found.result.worn_volume[-1]) / WEAR_PER_WORK
+            true = measure(lambda passage=passage: time_integrated(model, passage, amplitude, given.steps).sum())
+            numbers = (passage.rate, float(true.result) / volume, found.result.error_estimate)
+            table.row(f"{start:g} to {stop:g} Hz, {rate:g}", *numbers, found.seconds + true.seconds)
 
 
 if __name__ == "__main__":

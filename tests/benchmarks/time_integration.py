@@ -28,7 +28,6 @@ volume and tip amplitude of the bundled dovetail root; `--single 16000` takes th
   there, `--single 16000` takes the first cycles one by one, without projection.
 """
 
-import argparse
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -366,24 +365,19 @@ def first_harmonic(structure: Structure, motion: Motion, rows: FloatArray) -> np
 def main() -> None:
     """Worn volume and tip of the dovetail root."""
     from studies import build_scene
+    from tests.benchmarks.frame import arguments
     from tests.benchmarks.ring_of_sectors import ring_of_sectors
 
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for name, value in (("mesh", 1), ("steps", 250), ("periods", 1000), ("sectors", 47), ("diameter", 0)):
-        parser.add_argument(f"--{name}", type=int, default=value)
-    for name, value in (
-        ("frequency", 212.42), ("each", 20.0), ("single", 0.0), ("cycles", 1e5), ("amplitude", 0.5), ("friction", 0.5),
-    ):  # fmt: skip
-        parser.add_argument(f"--{name}", type=float, default=value)
-    parser.add_argument("--approach", choices=("up", "ramp"), default="up", help="to the frequency, in --periods")
-    given = parser.parse_args()
+    given = arguments(
+        __doc__, mesh=1, steps=250, periods=1000, sectors=47, diameter=0, frequency=212.42, each=20.0, single=0.0,
+        cycles=1e5, amplitude=0.5, friction=0.5, approach="up",
+    )  # fmt: skip
     model = build_scene("dovetail_sector", mesh=given.mesh, n_sectors=given.sectors, nodal_diameter=given.diameter)
     n_apart = 1
     if given.diameter:
         model, n_pairs = ring_of_sectors(model), model.contact.n_contact
         n_apart = model.contact.n_contact // n_pairs
-        if given.steps % n_apart:
-            parser.error(f"--steps: give a multiple of {n_apart}, so that all sectors move alike")
+        assert given.steps % n_apart == 0, f"--steps: give a multiple of {n_apart}, so that all sectors move alike"
     course = (run_up if given.approach == "up" else ramp)(given.frequency, given.amplitude, given.periods)
     began = time.process_time()
     structure, motion = loaded(model, given.friction, course, given.steps)

@@ -7,22 +7,13 @@ from functools import lru_cache, partial
 import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.refinement import refine
-from solver.continuation.arc_length import Arc
-from solver.continuation.first_state import solve_first_state
-from solver.continuation.natural import follow_naturally
-from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State
 from solver.model import ReducedModel
-from solver.newton.run import Budget, Run
+from solver.outcome import Outcome
 from solver.settings import SolverSettings
-from solver.structure.fourier import to_complex
-from solver.structure.joint import Case, build_case
 from tests import references
-from tests.solver.models import crossings, scene
+from tests.solver.models import branch_states, march_wear, scene
 
 SLIDING = ("forward", "backward")
-SWEEP_STEP = 0.01  # rad/s
 NATURAL = float(np.sqrt(1.6e6))  # rad/s, of the slider
 
 
@@ -30,7 +21,7 @@ NATURAL = float(np.sqrt(1.6e6))  # rad/s, of the slider
 class ExactState:
     """A scene at a frequency, with its exact complex first harmonics (n_response,), m, and slip work, N m a period.
 
-    begin: rad/s, where a sweep up that reaches the state begins; None where the state is found from nothing.
+    sweep: direction that leads to the state.
     """
 
     model: ReducedModel
@@ -39,7 +30,7 @@ class ExactState:
     omega: float
     response: np.ndarray
     slip_work: float
-    begin: float | None = None
+    sweep: str = "up"
 
 
 @lru_cache
@@ -63,13 +54,12 @@ def two_masses(omega: float) -> ExactState:
 
 
 @lru_cache
-def vibro_impact(omega: float, begin: float | None) -> ExactState:
-    """Mass that meets an elastic wall: upper branch where a sweep begins lower down, else the one without contact."""
-    orbit = references.vibro_impact_orbit(
-        1.0, 0.05, 1.0, 0.02, 100.0, 0.1, omega, sweep="down" if begin is None else "up", sweep_start=begin
-    )
+def vibro_impact(omega: float, sweep: str) -> ExactState:
+    """Mass that meets an elastic wall: upper branch by a sweep up, else the one without contact."""
+    begin = {"sweep_start": 0.7 if omega < 1.15 else 0.85} if sweep == "up" else {}
+    orbit = references.vibro_impact_orbit(1.0, 0.05, 1.0, 0.02, 100.0, 0.1, omega, sweep=sweep, **begin)
     response = np.array([orbit.harmonic(0)])
-    return ExactState(scene("vibro_impact"), 0.0, 0.02, omega, response, 0.0, begin)
+    return ExactState(scene("vibro_impact"), 0.0, 0.02, omega, response, 0.0, sweep)
 
 
 def _moving(orbit: references.Orbit) -> list[str]:
@@ -99,46 +89,22 @@ class Errors:
         return self.estimate.response >= response and self.estimate.wear_rate >= wear
 
 
-def first_found(exact: ExactState, case: Case, budget: Budget) -> State:
-    """State at the frequency, by the sweep that the branch asks for."""
-    begin = exact.omega if exact.begin is None else exact.begin
-    idle = np.zeros(exact.model.contact.n_contact)
-    point = solve_first_state(case, begin, exact.amplitude, idle, Run(case.settings.tolerance, budget))
-    assert isinstance(point, State)
-    if exact.begin is None:
-        return point
-
-    def balance_at(omega: float, history: np.ndarray) -> Balance:
-        return Balance(case.joint(omega, exact.amplitude), history, idle)
-
-    run = Run(case.settings.tolerance, budget)
-    at = State(point.evaluation, point.history, begin)
-    for target in np.append(np.arange(begin + SWEEP_STEP, exact.omega, SWEEP_STEP), exact.omega):
-        at, arrived = follow_naturally(balance_at, at, float(target), run)
-        at = at if arrived else next(crossings(Arc(balance_at, at, SWEEP_STEP, run), float(target)))
-    return at
-
-
 def errors_of(exact: ExactState, settings: SolverSettings) -> Errors:
-    """Refine a state as the settings say and compare it with the exact one."""
-    budget = Budget()
-    case = build_case(exact.model, exact.friction, exact.omega, settings)
-    point = first_found(exact, case, budget)
-    refined = refine(case, exact.omega, exact.amplitude, point, Run(case.settings.tolerance, budget))
-    joint = refined.case.joint(exact.omega, exact.amplitude)
-    evaluation = refined.point.evaluation
-    found = to_complex(joint.structure.response_h(joint.to_relative(evaluation.displacement_h)))[:, 0]
-    size = np.linalg.norm(exact.response)
-    slip_work = float(evaluation.slip_work.sum())
+    """The start state of a sweep, and its wear rate, compared with the exact one."""
+    given = exact.model, exact.friction
+    (start,) = branch_states(*given, exact.amplitude, [exact.omega], settings, exact.sweep)
+    # the wear rate is the slip work
+    state = march_wear(*given, start, 1.0, 1.0, "implicit", np.zeros(1), settings)
+    found, slip_work, size = state.response[0], float(state.wear_rate[0]), np.linalg.norm(exact.response)
     return Errors(
         amplitude=float(np.linalg.norm(np.abs(found) - np.abs(exact.response)) / size),
         response=float(np.linalg.norm(found - exact.response) / size),
         wear=abs(slip_work / exact.slip_work - 1.0) if exact.slip_work else abs(slip_work),
-        estimate=refined.estimate,
-        accurate=refined.accurate,
-        orders=refined.case.resolution.orders,
-        samples=refined.case.resolution.samples,
-        iterations=budget.iterations,
+        estimate=Estimate(float(state.response_error[0]), float(state.wear_rate_error[0])),
+        accurate=start.outcome is state.outcome is Outcome.CONVERGED,
+        orders=start.resolution.orders,
+        samples=start.resolution.samples,
+        iterations=start.newton_iterations,
     )
 
 
@@ -147,20 +113,16 @@ SLIDERS = (
     *((7.0, 0.8), (7.0, 1.25), (5.5, 0.6), (5.5, 0.8), (5.5, 1.25)),
 )
 """Force, N, against 5 N of friction; frequency ratio."""
-IMPACTS: tuple[tuple[float, float | None], ...] = ((0.95, 0.7), (1.05, 0.7), (1.2, 0.85), (1.5, 0.85), (1.2, None))
-"""rad/s; where a sweep up begins that finds the upper branch."""
-
-
 TWO_MASSES = (0.3, 0.4, 0.5, 0.6, 0.7, 1.3, 1.6, 1.8)  # rad/s
+IMPACTS = ((1.05, "up"), (1.1, "up"), (1.2, "up"), (1.5, "up"), (1.2, "down"))  # rad/s, sweep
 
 
 def states() -> dict[str, Callable[[], ExactState]]:
     """All of them by name, to be computed when called."""
     found: dict[str, Callable[[], ExactState]] = {}
-    for force, ratio in SLIDERS:
-        found[f"slider {force} N {ratio}"] = partial(slider, force, ratio)
-    for omega in TWO_MASSES:
-        found[f"two masses {omega}"] = partial(two_masses, omega)
-    for omega, begin in IMPACTS:
-        found[f"vibro-impact {omega} {'open' if begin is None else 'upper'}"] = partial(vibro_impact, omega, begin)
-    return found
+    found |= {f"slider {force} N {ratio}": partial(slider, force, ratio) for force, ratio in SLIDERS}
+    found |= {f"two masses {omega}": partial(two_masses, omega) for omega in TWO_MASSES}
+    words = {"up": "upper", "down": "open"}
+    return found | {
+        f"vibro-impact {omega} {words[sweep]}": partial(vibro_impact, omega, sweep) for omega, sweep in IMPACTS
+    }

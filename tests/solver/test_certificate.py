@@ -14,43 +14,23 @@ from tests.solver.models import OMEGA, branch_states, first_point, random_model,
 
 TOLERANCE = SolverSettings().tolerance
 GOOD = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-SLIDER = 2 * np.pi * 160.0
+SLIDER, TWO_MASSES = ("sdof_slider", 0.5, 10.0, 2 * np.pi * 160.0), ("two_masses", 0.5, 20.0, 0.4)
 KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only", "constant_load_one_tangent")
 
 
-def on_branch(model, friction, amplitude, omega, settings, sweep="up"):
-    """The state of a sweep, evaluated from what is stored of it."""
+@lru_cache
+def on_branch(name, friction, amplitude, omega, n_harmonics, sweep="up"):
+    """The state of a sweep, evaluated from what is stored of it: joint and evaluation."""
+    model, settings = scene(name, n_harmonics), SolverSettings(n_harmonics, 256)
     (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
-    joint = build_case(model, friction, start.penalty_omega, settings).joint(omega, amplitude)
-    balance = Balance(joint, start.state.start_history, start.state.wear_depth)
-    predicted = balance.predict(start.state.displacement_h, start.state.contact_force_h)
-    return joint, balance.evaluate(predicted)
+    joint, state = build_case(model, friction, start.penalty_omega, settings).joint(omega, amplitude), start.state
+    balance = Balance(joint, state.start_history, state.wear_depth)
+    return joint, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
 
 
-@lru_cache
-def slider(n_harmonics, n_samples=256):
-    settings = SolverSettings(n_harmonics, n_samples)
-    return on_branch(scene("sdof_slider", n_harmonics), 0.5, 10.0, SLIDER, settings)
-
-
-@lru_cache
-def two_masses(omega, n_harmonics):
-    settings = SolverSettings(n_harmonics, 256)
-    return on_branch(scene("two_masses", n_harmonics), 0.5, 20.0, omega, settings)
-
-
-@lru_cache
 def vibro_impact(omega, n_harmonics, sweep="up"):
     """The upper branch is reached by a sweep up from below the bistable range."""
-    settings = SolverSettings(n_harmonics, 256)
-    model = scene("vibro_impact", n_harmonics)
-    if sweep == "down":
-        return on_branch(model, 0.0, 0.02, omega, settings, sweep)
-    omegas = [*np.arange(0.9, omega, 0.1), omega]
-    start = branch_states(model, 0.0, 0.02, omegas, settings)[-1]
-    joint = build_case(model, 0.0, start.penalty_omega, settings).joint(omega, 0.02)
-    balance = Balance(joint, start.state.start_history, start.state.wear_depth)
-    return joint, balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
+    return on_branch("vibro_impact", 0.0, 0.02, omega, n_harmonics, sweep)
 
 
 @lru_cache
@@ -58,8 +38,7 @@ def random_state(seed, kinds=KINDS):
     """Elastic joint with pairs that stick, slip and open."""
     case = build_case(random_model(seed, kinds), 0.4, OMEGA, SolverSettings(5, 128))
     worn = np.random.default_rng(seed).uniform(0.0, 2e-6, len(kinds))
-    point = first_point(case, OMEGA, 60.0, worn)
-    return case.joint(OMEGA, 60.0), point.evaluation
+    return case.joint(OMEGA, 60.0), first_point(case, OMEGA, 60.0, worn).evaluation
 
 
 def failing(joint, evaluation):
@@ -69,11 +48,10 @@ def failing(joint, evaluation):
 @pytest.mark.slow
 @pytest.mark.parametrize("n_harmonics", [3, 21])
 def test_states_of_the_textbook_scenes_hold(n_harmonics):
-    states = [slider(n_harmonics), two_masses(0.4, n_harmonics), two_masses(0.6, n_harmonics)]
+    states = [on_branch(*SLIDER, n_harmonics), on_branch(*TWO_MASSES, n_harmonics)]
     states += [vibro_impact(1.2, n_harmonics), vibro_impact(1.5, n_harmonics), vibro_impact(1.2, n_harmonics, "down")]
-    for joint, evaluation in states:
-        certificate = certify(joint, evaluation)
-        assert certificate.holds(TOLERANCE), certificate.sentence(TOLERANCE)
+    for state in states:
+        assert not failing(*state)
 
 
 @pytest.mark.slow
@@ -84,7 +62,7 @@ def test_penetration_falls_as_harmonics_are_added():
 
 
 def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_overshoots():
-    joint, evaluation = slider(21)
+    joint, evaluation = on_branch(*SLIDER, 21)
     limit = 0.5 * evaluation.force_t[0, 0].max()
     overshoot = np.abs(evaluation.force_h[0, 1] @ joint.basis.synthesis).max() / limit - 1.0
     assert overshoot > 0.1, "Gibbs"
@@ -93,31 +71,27 @@ def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_oversho
     assert certificate.tension == 0.0
 
 
-def test_an_unconverged_force_is_caught_by_the_residual():
-    for joint, evaluation in (slider(5), random_state(1)):
-        balance = Balance(joint, evaluation.history, evaluation.wear_depth)
-        noise = np.random.default_rng(0).normal(size=evaluation.predicted_h.shape)
-        size = np.abs(evaluation.predicted_h).max()
-        assert "residual" in failing(joint, balance.evaluate(evaluation.predicted_h + 1e-5 * size * noise))
-
-
-@pytest.mark.parametrize("state", [slider(5), random_state(1)])
-def test_friction_that_drives_is_caught_by_the_energy(state):
-    # the motion is made to fit the force, so that equilibrium alone would not tell
+@pytest.mark.parametrize("state", [on_branch(*SLIDER, 5), random_state(1)], ids=["slider", "joint"])
+def test_an_unconverged_force_and_friction_that_drives_are_caught(state):
     joint, evaluation = state
+    balance = Balance(joint, evaluation.history, evaluation.wear_depth)
+    noise = (
+        1e-5 * np.abs(evaluation.predicted_h).max() * np.random.default_rng(0).normal(size=evaluation.predicted_h.shape)
+    )
+    assert "residual" in failing(joint, balance.evaluate(evaluation.predicted_h + noise))
+    # the motion is made to fit the force, so that equilibrium alone would not tell
     turned = evaluation.force_h.copy()
     turned[:, 1:] *= -1.0
     moved = joint.to_relative(evaluation.displacement_h)
     left = joint.structure.force_h() - joint.to_relative(turned) - joint.structure.apply(moved)
-    n = np.arange(1, 6)
-    steps = np.array(
-        [np.linalg.solve(joint.structure.dynamic_stiffness[i - 1], left[:, 2 * i - 1] - 1j * left[:, 2 * i]) for i in n]
-    )
-    moved[:, 1::2] += steps.T.real
-    moved[:, 2::2] -= steps.T.imag
+    for i, stiffness in enumerate(joint.structure.dynamic_stiffness, 1):
+        step = np.linalg.solve(stiffness, left[:, 2 * i - 1] - 1j * left[:, 2 * i])
+        moved[:, 2 * i - 1] += step.real
+        moved[:, 2 * i] -= step.imag
     moved[:, 0] += np.linalg.solve(joint.structure.static_stiffness, left[:, 0])
-    broken = replace(evaluation, force_h=turned, displacement_h=joint.to_pairs(moved))
-    failures = certify(joint, broken).failures(TOLERANCE)
+    failures = certify(joint, replace(evaluation, force_h=turned, displacement_h=joint.to_pairs(moved))).failures(
+        TOLERANCE
+    )
     assert "residual" not in failures
     assert failures["energy_error"][0] > 0.5
 
@@ -132,7 +106,7 @@ def test_a_slip_that_does_not_repeat_is_caught():
     assert failing(joint, replace(evaluation, periodicity_error=0.02 * limit)) == {"periodicity_error"}
 
 
-def test_a_pull_is_caught_in_the_samples_and_in_the_series():
+def test_a_pull_and_surfaces_in_each_other_are_caught():
     joint, evaluation = random_state(1)
     pulled = evaluation.force_t.copy()
     pulled[0, 0, 3] = -0.05 * pulled[:, 0].max()
@@ -141,10 +115,6 @@ def test_a_pull_is_caught_in_the_samples_and_in_the_series():
     force_h[0, 0] = 0.0
     force_h[0, 0, 1] = evaluation.force_t[:, 0].max()
     assert {"tension", "residual"} <= failing(joint, replace(evaluation, force_h=force_h))
-
-
-def test_surfaces_in_each_other_are_caught():
-    joint, evaluation = random_state(1)
     moved = np.linalg.norm(evaluation.displacement_h[:, :, 1:] @ joint.basis.synthesis[1:], axis=1).max()
     closer = evaluation.displacement_h.copy()
     closer[0, 0, 0] += 0.2 * moved
@@ -156,14 +126,9 @@ def test_surfaces_in_each_other_are_caught():
 @pytest.mark.parametrize("name", ["residual", *VIOLATION_LIMITS])
 def test_each_number_is_judged_and_named(name):
     limit = VIOLATION_LIMITS.get(name, 2.0 * TOLERANCE)
-    assert GOOD.holds(TOLERANCE)
     assert replace(GOOD, **{name: limit}).holds(TOLERANCE)
     for wrong in (1.01 * limit, float("inf"), float("nan")):
         broken = replace(GOOD, **{name: wrong})
         assert not broken.holds(TOLERANCE)
         assert set(broken.failures(TOLERANCE)) == {name}
-        assert f"{wrong:.2g}" in broken.sentence(TOLERANCE)
-    sentences = {
-        replace(GOOD, **{other: 1.0}).sentence(TOLERANCE).split(" 1")[0] for other in ("residual", *VIOLATION_LIMITS)
-    }
-    assert len(sentences) == 1 + len(VIOLATION_LIMITS)
+        assert broken.sentence(TOLERANCE).startswith(f"{name.replace('_', ' ')} {wrong:.2g}")

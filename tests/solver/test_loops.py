@@ -59,8 +59,7 @@ def loop_work(history):
     return np.sum(mean * np.diff(motion, axis=-2), axis=(-2, -1))
 
 
-@pytest.mark.parametrize("samples", [64, 96, 128, 200, 256])
-@pytest.mark.parametrize("lead", [0.0, 0.5])
+@pytest.mark.parametrize(("samples", "lead"), [(64, 0.0), (96, 0.5), (200, 0.0), (256, 0.5)])
 def test_between_samples_the_values_are_those_of_straight_lines(samples, lead):
     values = np.random.default_rng(samples).normal(size=(2, samples))
     phases = 2 * np.pi * (np.arange(samples) - lead) / samples
@@ -89,8 +88,7 @@ def test_the_loop_of_a_sliding_mass_is_a_rectangle(scheme):
     assert (velocity * force[..., 1] > 0.0)[fast].all()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("samples", [64, 256])
+@pytest.mark.parametrize(("scheme", "samples"), [("explicit", 64), ("implicit", 256), ("adaptive", 64)])
 def test_the_loop_encloses_the_energy_that_friction_takes(scheme, samples):
     history = slider_march(scheme, np.array([0.0, 8000.0, 16000.0]), SolverSettings(harmonics=9, samples=samples))
     work = loop_work(history)[:, 0]

@@ -5,7 +5,7 @@ import pytest
 
 from solver import build_model, march_wear
 from solver.outcome import Outcome
-from solver.results.resonance import resonance_frequency
+from solver.results.state_report import resonance_frequency
 from solver.settings import Resolution, SolverSettings, WearTarget, all_orders
 from solver.structure.fourier import to_complex
 from tests.solver.models import dovetail, random_balance, random_model

@@ -5,22 +5,55 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.outcome import Outcome
+from solver.outcome import Outcome, in_digits
 from solver.results.verdict import judge
 from tests.studyrunner.histories import history
 
 COUNTS = [0.0, 4.0, 10.0]
 ALL = np.arange(3)
+INACCURATE = {"inaccurate_in": "response", "inaccurate_error": 0.026}
+UNKNOWN = {"worn_volume": 1e-9 * np.arange(3.0), "worn_volume_error": np.array([0.0, 0.1, 0.6])}
 
 
 def judged(rows=ALL, slower=1.0, **changed):
     """Of a history whose volume at the last count, 2 m3, is known to 6 %."""
-    return judge(replace(history(COUNTS), **changed), np.asarray(rows), 1e-2, slower)
+    return judge(replace(history(COUNTS), **changed), np.asarray(rows, int), 1e-2, slower)
 
 
-def test_a_history_that_is_known_says_nothing():
-    assert judged() == (Outcome.CONVERGED, "")
-    assert judged(np.zeros(0, int)) == (Outcome.CONVERGED, "")
+@pytest.mark.parametrize(
+    ("rows", "changed", "outcome", "said"),
+    [
+        (ALL, {}, Outcome.CONVERGED, ""),
+        ([], {}, Outcome.CONVERGED, ""),
+        (ALL, {"inaccurate_from": 0.0}, Outcome.INACCURATE, "from cycle 0 on the response is known to 2.6 % only"),
+        (ALL, {"inaccurate_from": 4.0}, Outcome.INACCURATE, "from cycle 8 on the response is known to 2.6 % only"),
+        ([0, 1], {"inaccurate_from": 4.0}, Outcome.INACCURATE, "from cycle 8 on "),
+        ([0, 1], {"inaccurate_from": 5.0}, Outcome.CONVERGED, ""),
+        (
+            ALL,
+            {"inaccurate_from": 0.0, "inaccurate_error": np.inf},
+            Outcome.INACCURATE,
+            "from cycle 0 on the response is not",
+        ),
+        # what is not known goes before harmonics, a contact that is cut off before both
+        (ALL, {**UNKNOWN, "inaccurate_from": 0.0}, Outcome.SENSITIVE, "worn volume 2 mm3"),
+        (ALL, {**UNKNOWN, "cut_off_cycle": 4.0}, Outcome.CONTACT_CUT_OFF, "pairs at the edge"),
+        (ALL, {**UNKNOWN, "cut_off_cycle": 11.0}, Outcome.SENSITIVE, "worn volume 2 mm3"),
+        # a history that shares it and ends before is known
+        ([0, 1], UNKNOWN, Outcome.CONVERGED, ""),
+        # a joint that is held says so beside all else
+        (ALL, {"held_from": 4.0}, Outcome.CONVERGED, "from cycle 8 on every pair slips"),
+        (ALL, {"held_from": 4.0, "inaccurate_from": 0.0}, Outcome.INACCURATE, "from cycle 0 on the response"),
+        ([0], {"held_from": 4.0}, Outcome.CONVERGED, ""),
+    ],
+)
+def test_the_outcome_is_that_of_the_counts_that_are_judged(rows, changed, outcome, said):
+    found = judged(rows, 0.5, **{**INACCURATE, **changed})
+    assert found[0] is outcome
+    assert found[1].startswith(said)
+    assert bool(found[1]) is bool(said)
+    if {"held_from", "inaccurate_from"} <= set(changed):
+        assert "; from cycle 8 on every pair slips" in found[1]
 
 
 @pytest.mark.parametrize(
@@ -32,47 +65,14 @@ def test_a_history_that_is_known_says_nothing():
         (np.nan, np.inf, "worn volume 2 mm3, not known: with longer steps"),
     ],
 )
-def test_a_sensitive_volume_is_told_with_that_of_the_reference_solution(other, error, said):
-    volumes, errors = 1e-9 * np.arange(3.0), np.array([0.0, 0.1, error])
-    changed = {"worn_volume": volumes, "worn_volume_error": errors, "reference_volume": np.array([0.0, 1e-9, other])}
-    outcome, message = judged(**changed)
-    assert outcome is Outcome.SENSITIVE
-    assert message.startswith(said)
-    # a history that shares it and ends before is known
-    assert judged([0, 1], 0.4, **changed) == (Outcome.CONVERGED, "")
+def test_an_unknown_volume_stands_beside_that_of_the_reference_solution(other, error, said):
+    errors = {"worn_volume_error": np.array([0.0, 0.1, error]), "reference_volume": np.array([0.0, 1e-9, other])}
+    assert judged(**{**UNKNOWN, **errors})[1].startswith(said)
 
 
 @pytest.mark.parametrize(
-    ("first", "rows", "said"),
-    [
-        (0.0, ALL, "from cycle 0 on "),
-        (4.0, ALL, "from cycle 8 on "),
-        (4.0, [0, 1], "from cycle 8 on "),
-        (5.0, [0, 1], ""),
-        (np.inf, ALL, ""),
-    ],
+    ("value", "digits", "text"),
+    [(2000.0, 2, "2000"), (123456.0, 3, "123000"), (0.35, 3, "0.35"), (np.inf, 3, "inf"), (0.0, 6, "0")],
 )
-def test_harmonics_that_do_not_suffice_are_told_from_their_count_on(first, rows, said):
-    outcome, message = judged(rows, 0.5, inaccurate_from=first, inaccurate_in="response", inaccurate_error=0.026)
-    assert outcome is (Outcome.INACCURATE if said else Outcome.CONVERGED)
-    assert message == (f"{said}the response is known to 2.6 % only" if said else "")
-    _, unknown = judged(rows, 0.5, inaccurate_from=first, inaccurate_in="wear rate", inaccurate_error=np.inf)
-    assert unknown == (f"{said}the wear rate is not known" if said else "")
-
-
-def test_a_volume_that_is_not_known_goes_before_harmonics_and_a_contact_cut_off_before_both():
-    wrong = {"worn_volume_error": np.array([0.0, 0.1, 0.6]), "inaccurate_from": 0.0, "inaccurate_error": 0.02}
-    assert judged(**wrong)[0] is Outcome.SENSITIVE
-    outcome, message = judged(slower=0.5, **wrong, cut_off_cycle=4.0)
-    assert outcome is Outcome.CONTACT_CUT_OFF
-    assert "8" in message
-    assert judged(**wrong, cut_off_cycle=11.0)[0] is Outcome.SENSITIVE
-
-
-def test_a_joint_that_is_held_says_so_beside_all_else():
-    outcome, message = judged(held_from=4.0, slower=0.5)
-    assert outcome is Outcome.CONVERGED
-    assert message.startswith("from cycle 8 on every pair slips")
-    _, both = judged(held_from=4.0, inaccurate_from=0.0, inaccurate_in="response", inaccurate_error=0.02)
-    assert both.startswith("from cycle 0 on the response is known to 2 % only; from cycle 4 on every pair slips")
-    assert judged([0], held_from=4.0) == (Outcome.CONVERGED, "")
+def test_counts_have_no_exponent(value, digits, text):
+    assert in_digits(value, digits) == text

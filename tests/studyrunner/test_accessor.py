@@ -159,10 +159,16 @@ def test_an_opened_result_holds_the_loops_that_were_asked_for_alone(result, tmp_
     with open_result(tmp_path / "out.nc") as opened:
         assert opened["loop_force"].dims == ("frequency", "scheme", "cycle", "loop_contact", "phase", "component")
         assert opened["loop_contact"].values.tolist() == [PAIR]
-        assert opened.fretwear.loop(PAIR).equals(
-            result.fretwear.loop(PAIR)
-            .drop_vars([name for name in result.coords if name.startswith("contact_")])
-            .rename(contact="loop_contact")
+        assert (opened.ended.values == "converged").all()
+        assert "'converged'" in repr(opened)
+        assert (
+            opened.fretwear.loop(PAIR)
+            .drop_vars("ended")
+            .equals(
+                result.fretwear.loop(PAIR)
+                .drop_vars([name for name in result.coords if name.startswith("contact_")])
+                .rename(contact="loop_contact")
+            )
         )
         assert opened.fretwear.outcomes().values.tolist() == [["converged"] * 2] * 3
 

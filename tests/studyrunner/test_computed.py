@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from solver.packing import Packed, pack
-from studies.finite_element import reduced_joint
 from studies.scenes import dovetail_sector
 from studyrunner.scene import computed as computed_module
 from studyrunner.scene import scene as scene_module
@@ -66,28 +65,6 @@ def test_natural_frequencies_are_computed_once(monkeypatch):
         assert one.name == other.name
         np.testing.assert_array_equal(one.values, other.values)
         assert one.values.dtype == other.values.dtype
-
-
-@pytest.mark.slow
-def test_interrupted_natural_frequencies_go_on_where_they_were(monkeypatch):
-    study, kept = read_study("dovetail", ["scene.mesh=1", "outputs.variables=['natural_frequency']"]), InMemory()
-    model, whole, computed = build_study_scene(study), InMemory(), []
-    wanted = build_scene_variables(study, model, whole)
-    glued = reduced_joint.glued_frequencies
-
-    def counted(prepared, nodal_diameter, n_modes):
-        computed.append(nodal_diameter)
-        if computed.count(5) == 1 and nodal_diameter == 5:
-            raise KeyboardInterrupt
-        return glued(prepared, nodal_diameter, n_modes)
-
-    monkeypatch.setattr(reduced_joint, "glued_frequencies", counted)
-    with pytest.raises(KeyboardInterrupt):
-        build_scene_variables(study, model, kept)
-    found = build_scene_variables(study, model, kept)
-    assert computed == [0, 1, 2, 3, 4, 5, *range(5, 24)]
-    for one, other in zip(found, wanted, strict=True):
-        np.testing.assert_array_equal(one.values, other.values)
 
 
 def key_of(study):

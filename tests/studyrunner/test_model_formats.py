@@ -4,7 +4,12 @@ import importlib.util
 
 import numpy as np
 import pytest
+from scipy import io
 
+from solver import SolverSettings, march_wear
+from studies.finite_element.joint.surfaces import surface_of_nodes
+from studyrunner.scene.scene import build_study_scene
+from studyrunner.study.study_file import read_study
 from tests.studies.fe_models.matrix_files import write_abaqus, write_nastran
 from tests.studies.fe_models.plates import Plates
 from tests.studyrunner.test_model_studies import message, scene_of
@@ -93,10 +98,43 @@ def test_nastran(folder):
     check_same(scene_of("scene.matrices=job"), scene_of(), 1e-5)  # of 10 digits, and thin plates
 
 
+def test_a_table_of_nodes_with_matrices_wears_as_the_deck(folder):
+    """Matrices of all nodes that are not held; forces at the tip as a column beside them."""
+    plates = Plates()
+    stiffness, mass, node, dof = plates.system()
+    free = ~np.isin(node, plates.numbers["GROUND"])
+    surface = surface_of_nodes(plates.mesh, "UNDER", plates.sets["UNDER"])
+    area, normals = surface.areas_and_normals(plates.mesh.coordinates)
+    lines = ["node,x,y,z,sets,area,normal_x,normal_y,normal_z"]
+    for row, number in enumerate(plates.mesh.numbers):
+        if number not in plates.numbers["GROUND"]:
+            sets = " ".join(name for name, rows in plates.sets.items() if row in rows)
+            contact = [[area[at], *normals[at]] for at in np.flatnonzero(surface.nodes == row)] or [[""] * 4]
+            place = map(repr, plates.mesh.coordinates[row].tolist())
+            lines.append(",".join(map(str, [number, *place, sets, *contact[0]])))
+    (folder / "nodes.csv").write_text("\n".join(lines) + "\n")
+    named = {name: each[np.ix_(free, free)] for name, each in (("stiffness", stiffness), ("mass", mass))}
+    io.savemat(folder / "job.mat", {**named, "rows": np.stack([node, dof], axis=1)[free]})
+    (folder / "wear.toml").write_text(STUDY.replace("[axes]", "stuck_modes = 200\n[axes]", 1))
+    (folder / "table.toml").write_text(
+        (folder / "wear.toml").read_text().replace('"lap.inp"', '"nodes.csv"\nmatrices = "job"')
+        .replace('clamp = ["GROUND"]\n', "").replace("material =", "# material =")
+    )  # fmt: skip
+    expected, found = (build_study_scene(read_study(name)) for name in ("wear.toml", "table.toml"))
+    check_same(found, expected)
+    settings = SolverSettings(harmonics=1, samples=32)
+    worn = [
+        march_wear(each, 300.0, 20.0, 0.3, 1e-11, 1e3, scheme="implicit", step=500.0, settings=settings).worn_volume[-1]
+        for each in (expected, found)
+    ]
+    assert worn[0] > 0.0
+    assert worn[1] == pytest.approx(worn[0], rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("overrides", "expected"),
     [
-        (["scene.model=lap.med"], "or the path of a scene file or of a model (.inp, .msh, .cdb)"),
+        (["scene.model=lap.med"], "or the path of a scene file or of a model (.inp, .msh, .cdb, .csv)"),
         (["scene.units=mm-t-s", "scene.matrices=job"], "not mm-t-s: give `units` that fit"),
         (["scene.matrices=job", "scene.stress_stiffening=false"], "scene.stress_stiffening = false: leave it out"),
         (['scene.contact=[["UNDER","UNDER"]]'], "scene.contact: UNDER and UNDER share"),

@@ -11,6 +11,7 @@ from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
 from studyrunner.scene import computed
+from studyrunner.scene.computed import InMemory
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.scene.scene_variables import exact_answers
 from studyrunner.scene.variables import build_scene_variables
@@ -34,9 +35,9 @@ def test_the_file_is_the_one_of_the_plain_twin(bytes_a_slab, tmp_path, monkeypat
     study = read_study("sdof_slider", GRID)
     of_scene = exact_answers(study)
     frequencies = read_study("two_masses", ["outputs.variables=['natural_frequency']"])
-    of_scene += build_scene_variables(frequencies, build_study_scene(frequencies))
+    of_scene += build_scene_variables(frequencies, build_study_scene(frequencies), InMemory())
     mesh = read_study("dovetail", ["scene.mesh=1", "outputs.variables=['mesh']"])
-    of_scene += build_scene_variables(mesh, build_study_scene(mesh))
+    of_scene += build_scene_variables(mesh, build_study_scene(mesh), InMemory())
     plan = build_tasks(study, FACTS.n_displacements)
     results = [result for _, result in fake_histories(plan)]
     write_study(study, results, tmp_path / "out.nc", of_scene)

@@ -1,5 +1,8 @@
 """What is computed again of a worn joint is what a study gives that holds it, or that begins with its depths."""
 
+import shutil
+
+import h5py
 import numpy as np
 import pytest
 
@@ -45,9 +48,21 @@ def test_loops_and_responses_are_those_of_studies_that_ask_for_them(path, tmp_pa
 
 @pytest.mark.slow
 def test_the_command_draws_what_it_computes_and_says_what_is_wrong(path, tmp_path, capsys):
-    assert main([str(path), "-o", str(tmp_path), "--worn-response", "--loops", "0"]) == 0
+    assert main([str(path), "-o", str(tmp_path), "--loops", "0"]) == 0
     assert "worn by" in (tmp_path / "index.html").read_text(encoding="utf-8")
     assert (tmp_path / "fretting_loops.csv").exists()
+    # without the scene a sentence takes the place of the curve
+    lost = tmp_path / "lost.nc"
+    shutil.copy(path, lost)
+    with h5py.File(lost, "r+") as file:
+        study = file.attrs["study"].decode()
+        del file.attrs["study"]
+        text = study.replace('model = "sdof_slider"', 'model = "gone.h5"')
+        file.attrs.create("study", text, dtype=h5py.string_dtype("utf-8"))
+    for options in ([], ["--no-compute"]):
+        assert main([str(lost), "-o", str(tmp_path / "lost"), *options]) == 0
+        page = (tmp_path / "lost" / "index.html").read_text(encoding="utf-8")
+        assert ("Without the curve of the worn joint" in page) is (not options)
     capsys.readouterr()
     for wrong in (["--loops", "7"], ["--loops", "a"], ["--natural-frequencies"]):
         assert main([str(path), "-o", str(tmp_path), *wrong]) == 2

@@ -73,12 +73,12 @@ def test_depths_may_be_given(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"frequency": 151.0}, "scene.worn.frequency = 151.0: the nearest value of the result is 150"),
-        ({"cycle": [10]}, "scene.worn.cycle = 10.0: the nearest value of the result is 0"),
+        ({"frequency": 151.0}, "scene.worn.frequency = 151.0: give a value of the result: 150"),
+        ({"cycle": [10]}, "scene.worn.cycle = 10.0: give a value of the result: 0"),
         ({"cycle": [0, 0]}, "give every value once"),
         ({"freq": 150.0}, "scene.worn.freq = 150.0: unknown key"),
-        ({"scheme": "explicit", "sweep": "up"}, "give one of ['adaptive']"),
-        ({"scheme": "explicit", "frequency": 151.0}, "scene.worn.frequency = 151.0: the nearest value of the result"),
+        ({"scheme": "explicit", "sweep": "up"}, "give a value of the result: adaptive"),
+        ({"scheme": "explicit", "frequency": 151.0}, "scene.worn.frequency = 151.0: give a value of the result"),
         ({"result": "none.nc"}, 'scene.worn.result = "none.nc": there is no such file'),
         ({"depth": -1.0}, "scene.worn.depth = -1.0: give a number that is 0 or more"),
         ({"depth": [[1e-6], [2e-6], [3e-6]]}, "3 states with 2 cycle counts: give one cycle count"),

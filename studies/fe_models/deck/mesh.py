@@ -251,6 +251,15 @@ class CentrifugalLoad:
 
 
 @dataclass(frozen=True)
+class ContactNodes:
+    """Nodes of a table: area (n,), unit normal (n, 3) out of the body, initial gap (n,); NaN where none is given."""
+
+    area: FloatArray
+    normals: FloatArray
+    gap: FloatArray
+
+
+@dataclass(frozen=True)
 class Deck:
     """All that is read of a model's mesh file: the model as its steps leave it that do not write matrices.
 
@@ -292,6 +301,8 @@ class Deck:
         What was read in a way that may be asked for, a sentence each.
     included
         Files that the deck includes, relative to its folder.
+    contact_nodes
+        Of a table of nodes, which has no elements; None of a mesh.
     """
 
     path: str
@@ -320,6 +331,7 @@ class Deck:
     skipped: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     included: tuple[str, ...] = ()
+    contact_nodes: ContactNodes | None = None
 
     @property
     def remarks(self) -> tuple[tuple[str, str], ...]:

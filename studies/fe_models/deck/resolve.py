@@ -94,6 +94,7 @@ class Resolved:
             skipped=(*draft.skipped, *self._idle(fields)),
             notes=(*self.node_sets.notes, *self.element_sets.notes, *draft.notes, *self._numbering()),
             included=tuple(draft.included),
+            contact_nodes=None,
             **{name: tuple(fields.get(name, ())) for name in names},
         )
 

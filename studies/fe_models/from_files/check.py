@@ -59,12 +59,20 @@ def describe_model(
     else:
         still = prepared.at_rest.frequencies(k, N_FREQUENCIES) / (2.0 * np.pi)
         rows.append(("glued", f"{where}{_frequencies(still)} Hz at rest, {_frequencies(turning)} Hz with prestress"))
+    first = dict(sorted((k, found[0]) for k, found in summary.glued_frequencies.items()))
+    if len(first) > 1:
+        listed = ", ".join(map(str, first))
+        rows.append(("glued", f"first at nodal diameters {listed}: {_frequencies(np.array([*first.values()]))} Hz"))
     progress("reduction with twice the modes")
     rows.append(("reduction", _reduction_error(loaded, scene.model, parameters)))
-    held = count_held_by_friction(scene.model)
+    rows.append(("rigid", f"{count_free_motions(scene.model, open_pairs=True)} motions with all pairs open"))
+    held = count_free_motions(scene.model)
     if held:
         verb = "motion is" if held == 1 else "motions are"
         rows.append(("warning", f"{held} {verb} held by friction alone: give retention_stiffness"))
+    placed = ~np.isnan(loaded.model.coordinates[:, 0])
+    total = prepared.static_load.reshape(-1, 3)[placed].sum(axis=0)
+    rows.append(("force", f"{_vector(total)} N in all at rest, {np.linalg.norm(total):.4g} N"))
     progress("state at rest")
     friction = parameters.friction_coefficient
     stiff = make_compliant(scene.model, parameters.contact_stiffness)
@@ -73,10 +81,10 @@ def describe_model(
     return rows
 
 
-def count_held_by_friction(model: ReducedModel) -> int:
-    """Motions without stiffness where all pairs stay closed and slide freely."""
+def count_free_motions(model: ReducedModel, *, open_pairs: bool = False) -> int:
+    """Motions without stiffness where all pairs stay closed and slide freely, or where they are open."""
     linear, dofs = model.linear[0], model.contact.dofs
-    closing = dofs[:, 0][dofs[:, 0] >= 0]
+    closing = np.empty(0, dtype=np.int64) if open_pairs else dofs[:, 0][dofs[:, 0] >= 0]
     free = np.setdiff1d(np.arange(len(linear.stiffness)), closing)
     stiffness = linear.stiffness.real[np.ix_(free, free)]
     # modal coordinates have another unit: each displacement is scaled by its own stiffness

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy import sparse
 
 from solver.model import FloatArray
 from studies.fe_models.checks import (
@@ -15,13 +14,15 @@ from studies.fe_models.checks import (
     check_mesh_is_of_matrices,
     check_nodes_have_dofs,
     check_speed,
+    check_translations,
     check_units,
     mass_of,
     omega_squared_of,
 )
 from studies.fe_models.deck.mesh import Deck
-from studies.fe_models.from_files.constraints import find_constraints
+from studies.fe_models.from_files.constraints import Supported, find_constraints
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
+from studies.fe_models.from_files.reduced import check_table, constant_forces, read_recovery
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.from_files.solid import build_solid_mesh
 from studies.fe_models.from_files.supports import find_clamped, find_cut, find_cyclic_axis, find_rotation
@@ -30,11 +31,14 @@ from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.fe_models.mesh_files import read_mesh_file
 from studies.fe_models.model_files import ModelFiles
-from studies.fe_models.nodal_matrices import NodalMatrices, order_by_nodes
+from studies.fe_models.nodal_matrices import order_by_nodes
 from studies.fe_models.units import Units, find_units
 from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.joint.cut_faces import CyclicAxis
+from studies.finite_element.joint.matched_nodes import match_nodes
+from studies.finite_element.joint.pairing import ContactPairs
 from studies.finite_element.joint.surfaces import loops_of_faces, pressure_forces
-from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel, Retainer, SetMotion
+from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel, Retainer, RowMotion, SetMotion
 from studies.finite_element.reduced_joint import Progress, silent
 from studies.scene_error import SceneError
 
@@ -65,11 +69,16 @@ def find_files(folder: Path, model: str, parameters: Parameters) -> ModelFiles:
     mesh = folder / model
     _check_there(mesh, "model")
     if parameters.matrices is None:
+        if parameters.recovery is not None:
+            raise SceneError("recovery", parameters.recovery, "give it with `matrices`, over their rows")
         return ModelFiles(mesh)
     matrices = find_matrix_files(folder / parameters.matrices)
     for path in matrices:
         _check_there(path, "matrices")
-    return ModelFiles(mesh, matrices)
+    recovery = None if parameters.recovery is None else folder / parameters.recovery
+    if recovery is not None:
+        _check_there(recovery, "recovery")
+    return ModelFiles(mesh, matrices, recovery)
 
 
 def load_mesh(files: ModelFiles, parameters: Parameters) -> SolidMesh:
@@ -91,56 +100,85 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     mesh = build_solid_mesh(deck, parameters, units)
     selections = Selections(deck, mesh)
     if not files.matrices:
-        check_units(deck, None, units)
-        for found in deck.unassembled:
-            remedy = "use solid elements, of one material in a .cdb, or give `matrices` of another program"
-            raise SceneError("model", found, remedy)
+        _check_assembled(deck, units)
     rotation = find_rotation(deck, parameters, units)
     axis = find_cyclic_axis(deck, parameters, units)
     surfaces = find_surfaces(selections, parameters, units, axis)
     cut, clamped = find_cut(selections, parameters, axis, surfaces.contacts), find_clamped(selections, parameters)
-    nodal, held_speed = None, None
+    on_cut = np.empty(0, dtype=np.int64) if cut is None else np.concatenate([cut.left, cut.right])
+    matrices, nodal, held_speed = None, None, None
     if files.matrices:
         matrices = _read_matrices(files, parameters, deck, progress)
-        check_units(deck, mass_of(deck, matrices), units)
-        check_mass(deck, matrices, units)
-        _check_export(deck, matrices, mesh, surfaces, units)
-        if rotation is not None:
-            held_speed = _check_rotation(deck, matrices, rotation, parameters, units)
-        nodal = _ordered(matrices, mesh, units)
-        clamped = None if clamped is None else np.pad(clamped, ((0, len(nodal.numbers) - len(clamped)), (0, 0)))
-    numbers = mesh.numbers if nodal is None else nodal.numbers
-    on_cut = np.empty(0, dtype=np.int64) if cut is None else np.concatenate([cut.left, cut.right])
+        if deck.contact_nodes is not None:
+            check_table(deck, matrices, parameters, mesh.numbers[on_cut])
+        else:
+            held_speed = _check_export(deck, matrices, mesh, surfaces, parameters, units, rotation)
+        nodal = order_by_nodes(matrices, units, mesh.numbers, mesh.coordinates)
+        clamped = None if clamped is None else np.pad(clamped, ((0, len(nodal.missing) - len(clamped)), (0, 0)))
+    numbers = mesh.numbers if nodal is None else nodal.model.numbers
     supported = find_constraints(deck, numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
-    n_nodes = len(supported.held)
-    preload = np.zeros(3 * n_nodes)
-    if not parameters.preload:
-        preload = supported.forces + _pressed(deck, mesh, n_nodes, units)
-    for each in parameters.preload:
-        preload = preload + each.force * _motion(selections, each, "preload.set").row(n_nodes)
+    preload = _preload(selections, parameters, units, supported)
     gravity = None if deck.gravity is None else deck.gravity * units.length
-    held = supported.held
+    responses: dict[str, SetMotion | RowMotion] = {
+        name: _motion(selections, each, f"response.{name}.set") for name, each in parameters.responses.items()
+    }
     model: MeshModel | MatrixModel
-    if nodal is None:
+    if nodal is None or matrices is None:
         model = MeshModel(mesh, rotation, parameters.stress_stiffening, preload, gravity, extra=supported.extra)
     else:
-        _check_free_nodes(matrices, mesh, np.asarray(supported.own[: mesh.n_nodes].all(axis=1)))
-        held[: len(nodal.missing)] |= nodal.missing
-        model = nodal.model(rotation, preload, gravity, supported.extra)
+        if deck.contact_nodes is None:
+            _check_free_nodes(matrices, mesh, np.asarray(supported.own[: mesh.n_nodes].all(axis=1)))
+        else:
+            preload = preload + constant_forces(matrices, nodal, units, len(supported.held))
+        supported.held[: len(nodal.missing)] |= nodal.missing
+        model = replace(nodal.model.with_nodes(supported.extra), rotation=rotation, preload=preload, gravity=gravity)
+        if files.recovery is not None:
+            responses |= read_recovery(files.recovery, matrices, nodal, units)
     joint = JointDefinition(
         contacts=surfaces.contacts,
-        held=held,
+        held=supported.held,
         load=_motion(selections, parameters.load, "load.set"),
-        responses={
-            name: _motion(selections, each, f"response.{name}.set") for name, each in parameters.responses.items()
-        },
+        responses=responses,
         cut=cut,
         retainer=_retainer(parameters, None if cut is None else cut.axis.axis, rotation),
         ties=surfaces.ties,
         constraints=supported.constraints,
+        pairs=_pairs_of_table(deck, model, surfaces, units, axis),
     )
     return LoadedModel(deck, units, mesh, model, joint, held_speed)
+
+
+def _check_assembled(deck: Deck, units: Units) -> None:
+    """What stiffness and mass that are assembled here need. Raises SceneError."""
+    if deck.contact_nodes is not None:
+        raise SceneError("matrices", "missing", f"give the matrices of the nodes of {deck.path}")
+    check_units(deck, None, units)
+    for found in deck.unassembled:
+        remedy = "use solid elements, of one material in a .cdb, or give `matrices` of another program"
+        raise SceneError("model", found, remedy)
+
+
+def _pairs_of_table(
+    deck: Deck, model: MeshModel | MatrixModel, surfaces: Surfaces, units: Units, axis: CyclicAxis | None
+) -> ContactPairs | None:
+    """Pairs of a table of nodes; None of a mesh, whose facets make them."""
+    if deck.contact_nodes is None:
+        return None
+    others = len(model.numbers) - len(deck.node_numbers)
+    scales = (deck.contact_nodes.area * units.length**2, deck.contact_nodes.gap * units.length)
+    area, gap = (np.pad(each, (0, others), constant_values=np.nan) for each in scales)
+    normals = np.pad(deck.contact_nodes.normals, ((0, others), (0, 0)), constant_values=np.nan)
+    return match_nodes(model.coordinates, model.numbers, surfaces.contacts, (area, normals, gap), axis)
+
+
+def _preload(selections: Selections, parameters: Parameters, units: Units, supported: Supported) -> FloatArray:
+    """Constant nodal forces (3 n_nodes,), N: those of the study, else of the deck."""
+    n_nodes = len(supported.held)
+    if not parameters.preload:
+        return np.asarray(supported.forces + _pressed(selections.deck, selections.mesh, n_nodes, units))
+    rows = [each.force * _motion(selections, each, "preload.set").row(n_nodes) for each in parameters.preload]
+    return np.asarray(np.sum(rows, axis=0))
 
 
 def _check_there(path: Path, key: str) -> None:
@@ -179,17 +217,6 @@ def _read_matrices(files: ModelFiles, parameters: Parameters, deck: Deck, progre
     return matrices
 
 
-def _ordered(matrices: Matrices, mesh: SolidMesh, units: Units) -> NodalMatrices:
-    return order_by_nodes(
-        sparse.csr_matrix(matrices.stiffness * units.stiffness),
-        sparse.csr_matrix(matrices.mass * units.mass),
-        matrices.node,
-        matrices.direction,
-        mesh.numbers,
-        mesh.coordinates,
-    )
-
-
 def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotation | None) -> Retainer | None:
     if parameters.retention_stiffness == 0.0:
         return None
@@ -203,14 +230,29 @@ def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotatio
     return Retainer(parameters.retention_stiffness, axis)
 
 
-def _check_export(deck: Deck, matrices: Matrices, mesh: SolidMesh, surfaces: Surfaces, units: Units) -> None:
-    """The matrices have the nodes of all surfaces, and nothing joins those in contact."""
+def _check_export(
+    deck: Deck,
+    matrices: Matrices,
+    mesh: SolidMesh,
+    surfaces: Surfaces,
+    parameters: Parameters,
+    units: Units,
+    rotation: Rotation | None,
+) -> float | None:
+    """The matrices are those of the mesh, with the nodes of all surfaces, and nothing joins those in contact.
+
+    Returns the square of the speed that they hold, as `_check_rotation` does.
+    """
+    check_translations(matrices)
+    check_units(deck, mass_of(deck, matrices), units)
+    check_mass(deck, matrices, units)
     for each in (*surfaces.contacts, *surfaces.ties):
         for surface in (each.first, each.second):
             check_nodes_have_dofs(matrices, mesh.numbers[surface.nodes], surface.name)
     for each in surfaces.contacts:
         nodes = mesh.numbers[each.first.nodes], mesh.numbers[each.second.nodes]
         check_contact_removed(deck, matrices, nodes, (each.first.name, each.second.name), units)
+    return None if rotation is None else _check_rotation(deck, matrices, rotation, parameters, units)
 
 
 def _check_free_nodes(matrices: Matrices, mesh: SolidMesh, held: FloatArray) -> None:

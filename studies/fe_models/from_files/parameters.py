@@ -88,6 +88,11 @@ class Parameters(Table):
     response: dict[str, SetDirection] | None = Field(
         None, description="mean displacements by name: {name = {set, direction}}; default: that of the load"
     )
+    recovery: str | None = Field(
+        None,
+        description="table with the columns node, dof and one for each further response, over the rows of the"
+        " matrices; a name as root stress [MPa] has a unit, one without is a displacement",
+    )
     preload: Annotated[tuple[Preload, ...], BeforeValidator(_as_tuple)] = Field(
         (),
         description="constant forces beside the centrifugal one, no part of the prestress: [{set, direction, force}];"

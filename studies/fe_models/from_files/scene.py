@@ -59,7 +59,8 @@ def describe_origin(files: ModelFiles, parameters: BaseModel) -> dict[str, str]:
     Raises SceneError or OSError where a file cannot be read.
     """
     folder = files.mesh.parent
-    paths = (files.mesh, *(folder / name for name in read_mesh_file(files.mesh).included), *files.matrices)
+    mesh, *others = files.all
+    paths = (mesh, *(folder / name for name in read_mesh_file(mesh).included), *others)
     listed = ", ".join(f"{path.name} sha256:{file_digest(path)}" for path in paths)
     return {
         "model_files": listed,

@@ -11,7 +11,7 @@ import numpy as np
 from solver.model import IntArray
 from studies.fe_models.deck.mesh import Deck
 from studies.finite_element.elements.solid_mesh import SolidMesh
-from studies.finite_element.joint.surfaces import Surface, surface_of_faces, surface_of_nodes
+from studies.finite_element.joint.surfaces import Surface, surface_of_faces, surface_of_nodes, surface_of_points
 from studies.scene_error import SceneError
 
 _MOST_NAMED = 6
@@ -60,6 +60,8 @@ class Selections:
         if surface is not None and not surface.of_nodes:
             return surface_of_faces(self.mesh, known, surface.elements, surface.faces)
         nodes = self._nodes(known)
+        if nodes is not None and self.deck.contact_nodes is not None:
+            return surface_of_points(known, nodes)
         if nodes is None:
             raise self.unknown(name, key, "surface or set of nodes", (*self.deck.surfaces, *self.deck.node_sets))
         return surface_of_nodes(self.mesh, known, nodes)

@@ -19,13 +19,16 @@ _NONE = Material(0.0, 0.0, 0.0)  # of a mesh whose matrices come from elsewhere
 def build_solid_mesh(deck: Deck, parameters: Parameters, units: Units) -> SolidMesh:
     """Elements of a deck and their nodes, m; nodes of no element are left out.
 
-    Materials are those of the study, else of the deck; none are needed where the study names matrices.
+    Materials are those of the study, else of the deck; none are needed where the study names matrices. A table of nodes
+    has no elements, and all its nodes are there.
 
     Raises
     ------
     SceneError
         Where the deck has no elements, or some have no material.
     """
+    if deck.contact_nodes is not None:
+        return SolidMesh(deck.coordinates * units.length, deck.node_numbers, ())
     if not deck.blocks:
         raise SceneError("model", f"{deck.path} has no solid elements", "give a deck with the mesh")
     numbers = np.unique(np.concatenate([block.nodes.ravel() for block in deck.blocks]))

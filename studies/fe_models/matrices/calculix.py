@@ -11,42 +11,27 @@ from pathlib import Path
 import numpy as np
 
 from studies.fe_models.matrices.columns import read_columns
-from studies.fe_models.matrices.matrices import (
-    LARGEST_DOFS,
-    FloatArray,
-    IntArray,
-    Matrices,
-    Triplets,
-    sorted_dofs,
-    symmetric,
-    wrong,
-)
-
-Columns = tuple[IntArray, IntArray, FloatArray]
+from studies.fe_models.matrices.matrices import Entries, Matrices, assemble, label, wrong
 
 
 def read_calculix(stiffness: Path, mass: Path, dofs: Path) -> Matrices:
     """Matrices of a .sti, a .mas and a .dof file. Raises SceneError about "matrices"."""
     node, direction = read_columns(dofs, ".", (int, int))
-    n_dof = node.size
-    if n_dof > LARGEST_DOFS:
-        wrong(dofs.name, f"{n_dof} dofs", f"reduce the model to at most {LARGEST_DOFS}")
-    if node.min() < 1 or direction.min() < 1 or direction.max() > 3:
-        at = int(np.flatnonzero((node < 1) | (direction < 1) | (direction > 3))[0])
-        found = f"line {at + 1} is {node[at]}.{direction[at]}"
-        wrong(dofs.name, found, "export displacements only: directions 1 to 3")
-    read = []
-    for path in (stiffness, mass):
+    labels, n_dof = label(node, direction, dofs.name), node.size
+    if np.unique(labels).size < n_dof:
+        twice = int(np.flatnonzero(np.bincount(np.unique(labels, return_inverse=True)[1]) > 1)[0])
+        number = np.unique(labels)[twice]
+        at = int(np.flatnonzero(labels == number)[0])
+        wrong(dofs.name, f"dof {direction[at]} of node {node[at]} has two rows", "export the matrices again")
+    parts = {}
+    for name, path in (("stiffness", stiffness), ("mass", mass)):
         rows, columns, values = read_columns(path, " ", (int, int, float))
-        if min(rows.min(), columns.min()) < 1:
-            wrong(path.name, "a row or column below 1", "export it again")
         size = int(max(rows.max(), columns.max()))
         if size == 2 * n_dof:
             found = f"{size} rows for {n_dof} dofs in {dofs.name}, written for a nodal diameter"
             wrong(path.name, found, "export without *SELECT CYCLIC SYMMETRY MODES, and with CYCMPC=INACTIVE")
-        if size != n_dof:
+        if size != n_dof or min(rows.min(), columns.min()) < 1:
             found = f"{size} rows for {n_dof} dofs in {dofs.name}"
             wrong(path.name, found, "give the three files of one run, each of them whole")
-        read.append(symmetric(Triplets(rows - 1, columns - 1, values), n_dof, path.name))
-    files = (stiffness.name, mass.name, dofs.name)
-    return sorted_dofs(Matrices(read[0], read[1], node, direction - 1, files, "calculix"))
+        parts[name] = Entries(path.name, labels[rows - 1], labels[columns - 1], values)
+    return assemble(parts, (stiffness.name, mass.name, dofs.name), "calculix")

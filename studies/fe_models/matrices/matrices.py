@@ -1,11 +1,17 @@
-"""Stiffness and mass with the node and direction of every row, and how they come out of triplets."""
+"""Stiffness, mass, damping and constant forces with the node and direction of every row, and how they are put together.
+
+A reader gives the entries of each matrix by labels, a number for each node and dof. What is common to all programs
+follows here: one order of the rows, both triangles, and what cannot be.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
+import pandas as pd
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
@@ -18,32 +24,23 @@ IntArray = NDArray[np.int64]
 LARGEST_FILE = 2**32
 """Bytes of one file with a matrix."""
 
-LARGEST_ENTRIES = 2**27
-"""Entries of one triangle: 3 GiB as triplets."""
-
-LARGEST_DOFS = 5_000_000
-"""Rows of a matrix."""
-
-HELD = 1e35
-"""A stiffness on the diagonal above it is no stiffness but a boundary condition (Abaqus writes 1e36)."""
+_LARGEST_DOFS = 5_000_000
+_MOST_NODES = 2**40  # numbers that fit into a label, negative ones as well
+_DOFS = 64  # labels of one node
+_HELD = 1e35  # a stiffness on the diagonal above it is a boundary condition (Abaqus writes 1e36)
+_ASYMMETRY = 1e-6  # over the largest entry: what text with few digits leaves
 
 
 @dataclass(frozen=True)
 class Matrices:
-    """Unreduced stiffness and mass of a model, in units of its files.
+    """Matrices of a model, in units of its files, rows by node, then direction.
 
-    Attributes
-    ----------
-    stiffness, mass
-        (n_dof, n_dof) real symmetric, both triangles. The mass may be singular.
-    node
-        (n_dof,) node number of every row. Negative ones are internal nodes of Abaqus.
-    direction
-        (n_dof,) 0, 1 or 2: displacement along x, y or z.
-    files
-        Names of the files.
-    code
-        "calculix", "abaqus", "nastran" or "ansys".
+    stiffness, mass (n_dof, n_dof): real symmetric, both triangles. The mass may be singular.
+    node (n_dof,): number of the node; negative ones are internal nodes of Abaqus.
+    direction (n_dof,): 0, 1, 2 for displacements along x, y, z; others are rotations, or coordinates of no place.
+    files: names of the files. code: "calculix", "abaqus", "nastran", "ansys" or "table", for messages.
+    damping: None where the files have none. load (n_dof, n_cases): constant
+    forces; None where the files have none.
     """
 
     stiffness: sp.csr_array
@@ -52,12 +49,15 @@ class Matrices:
     direction: IntArray
     files: tuple[str, ...]
     code: str
+    damping: sp.csr_array | None = None
+    load: FloatArray | None = None
 
 
 @dataclass(frozen=True)
-class Triplets:
-    """Entries (m,) of a matrix as a file has them: rows and columns from 0, and values."""
+class Entries:
+    """Entries (m,) of a matrix or, with the columns 0, of forces. file: for messages. rows, columns: labels."""
 
+    file: str
     rows: IntArray
     columns: IntArray
     values: FloatArray
@@ -68,26 +68,83 @@ def wrong(file: str, found: str, remedy: str) -> NoReturn:
     raise SceneError("matrices", f"{shown(file)}: {found}", remedy)
 
 
-def symmetric(triplets: Triplets, n_dof: int, file: str) -> sp.csr_array:
-    """The matrix (n_dof, n_dof) of entries that stand for both triangles, or of both where any is there twice.
+def label(node: IntArray, dof: IntArray, file: str) -> IntArray:
+    """Labels (m,) of nodes and their dofs, from 1, or 0 for a coordinate of no place. Raises SceneError."""
+    if node.size and (np.abs(node).max() > _MOST_NODES or dof.min() < 0 or dof.max() >= _DOFS):
+        at = int(np.flatnonzero((np.abs(node) > _MOST_NODES) | (dof < 0) | (dof >= _DOFS))[0])
+        found = f"dof {dof[at]} of node {node[at]}"
+        wrong(file, found, f"give node numbers of at most ten digits, and dofs below {_DOFS}")
+    return np.asarray(_DOFS * node + dof, dtype=np.int64)
 
-    A triangle in the order of the code need not be one in the order of the rows.
+
+def of_table(file: str, matrix: object, labels: IntArray) -> Entries:
+    """Entries of a matrix, dense or sparse, or of a column of forces, whose rows have labels (n_dof,).
+
+    Raises SceneError where the sizes do not fit or numbers are complex.
+    """
+    try:
+        found = sp.coo_array(matrix if sp.issparse(matrix) else np.atleast_2d(np.asarray(matrix)))
+    except (ValueError, TypeError) as error:
+        wrong(file, f"a matrix is damaged ({shown(str(error))})", "write it again")
+    if found.shape == (1, labels.size) and labels.size > 1:
+        found = found.T.tocoo()
+    if found.shape[0] != labels.size or found.shape[1] not in (1, labels.size):
+        shape = " x ".join(str(length) for length in found.shape)
+        wrong(
+            file, f"{shape} entries for {labels.size} rows", "give node and dof of each row, in the order of the rows"
+        )
+    if np.iscomplexobj(found.data):
+        remedy = "give real matrices of the sector and its cut faces, or a scene file with nd/<k>"
+        wrong(file, "complex numbers", remedy)
+    vector = found.shape[1] == 1 and labels.size > 1
+    columns = np.zeros_like(found.col) if vector else labels[found.col]
+    return Entries(file, labels[found.row], columns.astype(np.int64), found.data.astype(np.float64))
+
+
+def assemble(parts: Mapping[str, Entries], files: tuple[str, ...], code: str) -> Matrices:
+    """The matrices of entries by name: "stiffness" and "mass"; "damping" and "load" may be missing.
 
     Raises
     ------
     SceneError
-        Where an entry is not finite, stands there twice, or the matrix is not symmetric.
+        Where an entry is not finite or given twice, a matrix is not symmetric, or rows are held or too many.
     """
-    rows, columns, values = triplets.rows, triplets.columns, triplets.values
+    square = {name: each for name, each in parts.items() if name != "load"}
+    for name in ("stiffness", "mass"):
+        if name not in square or not square[name].values.size:
+            wrong(files[0], f"no {name} in the file", "write stiffness and mass")
+    # by hash: entries are many more than labels
+    labels = np.sort(
+        pd.unique(np.concatenate([part for each in square.values() for part in (each.rows, each.columns)]))
+    )
+    if labels.size > _LARGEST_DOFS:
+        wrong(files[0], f"{labels.size} dofs", f"reduce the model to at most {_LARGEST_DOFS}")
+    found = {name: _symmetric(each, labels) for name, each in square.items()}
+    held = int(np.count_nonzero(found["stiffness"].diagonal() > _HELD))
+    if held:
+        entries = f"{held} entries of the diagonal are 1e36: boundary conditions were active at export"
+        wrong(parts["stiffness"].file, entries, "remove them in the step that writes the matrices")
+    node, direction = labels // _DOFS, labels % _DOFS - 1
+    load = _forces(parts["load"], labels) if "load" in parts else None
+    return Matrices(found["stiffness"], found["mass"], node, direction, files, code, found.get("damping"), load)
+
+
+def _symmetric(entries: Entries, labels: IntArray) -> sp.csr_array:
+    """The matrix of entries that stand for both triangles, or of both where any is there twice.
+
+    A triangle in the order of the program need not be one in the order of the rows.
+    """
+    file, values, n = entries.file, entries.values, labels.size
     if not np.isfinite(values).all():
         wrong(file, "an entry is not a finite number", "export it again")
-    matrix = sp.csr_array((values, (rows, columns)), shape=(n_dof, n_dof))
+    places = np.searchsorted(labels, entries.rows), np.searchsorted(labels, entries.columns)
+    matrix = sp.csr_array((values, places), shape=(n, n))
     if matrix.nnz < values.size:
         wrong(file, f"{values.size - matrix.nnz} entries are given twice", "export it again")
     twin = matrix.T.tocsr()
     if _have_entry_in_common(sp.triu(matrix, 1, "csr"), sp.triu(twin, 1, "csr")):
         difference = abs(matrix - twin)
-        if difference.nnz and difference.max() > 1e-6 * abs(values).max():
+        if difference.nnz and difference.max() > _ASYMMETRY * abs(values).max():
             wrong(file, "the matrix is not symmetric", "export it without damping, gyroscopic terms and friction")
         return sp.csr_array((matrix + twin) / 2)
     return sp.csr_array(matrix + twin - sp.diags_array(matrix.diagonal()))
@@ -99,23 +156,12 @@ def _have_entry_in_common(one: sp.csr_array, other: sp.csr_array) -> bool:
     return bool(patterns[0].multiply(patterns[1]).nnz)
 
 
-def check_held(stiffness: sp.csr_array, file: str) -> None:
-    """Raises SceneError where boundary conditions were active when the stiffness was written."""
-    n_held = int(np.count_nonzero(stiffness.diagonal() > HELD))
-    if n_held:
-        found = f"{n_held} entries of the diagonal are 1e36: boundary conditions were active at export"
-        wrong(file, found, "remove them in the step that writes the matrices")
-
-
-def sorted_dofs(matrices: Matrices) -> Matrices:
-    """The same with rows by node, then direction; of a node none is twice. Raises SceneError."""
-    order = np.lexsort((matrices.direction, matrices.node))
-    node, direction = matrices.node[order], matrices.direction[order]
-    again = np.flatnonzero((node[1:] == node[:-1]) & (direction[1:] == direction[:-1]))
-    if again.size:
-        found = f"dof {direction[again[0]] + 1} of node {node[again[0]]} has two rows"
-        wrong(matrices.files[0], found, "export the matrices again")
-    if np.array_equal(order, np.arange(order.size)):
-        return matrices
-    stiffness, mass = (sp.csr_array(item[order][:, order]) for item in (matrices.stiffness, matrices.mass))
-    return Matrices(stiffness, mass, node, direction, matrices.files, matrices.code)
+def _forces(entries: Entries, labels: IntArray) -> FloatArray:
+    """Forces (n_dof, n_cases), a column for each load case. Raises SceneError where a row is none of the matrices."""
+    acting = entries.values != 0.0
+    rows, cases = entries.rows[acting], np.unique(entries.columns[acting], return_inverse=True)[1]
+    if not np.isfinite(entries.values).all() or not np.isin(rows, labels).all():
+        wrong(entries.file, "a force is not finite, or on a dof that the matrices do not have", "export it again")
+    found = np.zeros((labels.size, cases.max(initial=0) + 1))
+    np.add.at(found, (np.searchsorted(labels, rows), cases), entries.values[acting])
+    return found

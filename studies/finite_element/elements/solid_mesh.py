@@ -63,7 +63,9 @@ class SolidMesh:
 
     @property
     def bodies(self) -> IntArray:
-        """Body (n_nodes,) of each node: what elements join is one body."""
+        """Body (n_nodes,) of each node: what elements join is one body, as are nodes without elements."""
+        if not self.groups:
+            return np.zeros(self.n_nodes, dtype=np.int64)
         return joined_bodies(
             self.n_nodes,
             np.concatenate([np.repeat(group.nodes[:, 0], group.nodes.shape[1]) for group in self.groups]),

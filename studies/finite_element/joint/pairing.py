@@ -132,23 +132,12 @@ def build_contact_pairs(
         nodes belong to two pairs.
     """
     parts = [_pair(coordinates, numbers, contact, place, along, axis) for place, contact in enumerate(contacts)]
-    joined = _joined(parts)
-    unique, count = np.unique(joined.moving, return_counts=True)
-    if (count > 1).any():
-        twice = unique[count > 1]
-        both = joined.surface[joined.moving == twice[0]]
-        names = " and ".join(joined.moving_name[place] for place in both)
-        raise SceneError(
-            "contact",
-            f"{len(twice)} nodes move in two pairs, in {names}, as node {numbers[twice[0]]}",
-            "take them out of one of the surfaces",
-        )
-    return joined
+    return join_pairs(parts, numbers)
 
 
-def _joined(parts: Sequence[ContactPairs]) -> ContactPairs:
-    """Pairs of several surfaces, one after the other."""
-    return ContactPairs(
+def join_pairs(parts: Sequence[ContactPairs], numbers: IntArray) -> ContactPairs:
+    """Pairs of several surfaces, one after the other. Raises SceneError where a node moves in two of them."""
+    joined = ContactPairs(
         moving=np.concatenate([part.moving for part in parts]),
         opposite=sparse.vstack([part.opposite for part in parts], format="csr"),
         sector=np.concatenate([part.sector for part in parts]),
@@ -162,6 +151,17 @@ def _joined(parts: Sequence[ContactPairs]) -> ContactPairs:
         moving_name=tuple(name for part in parts for name in part.moving_name),
         opposite_name=tuple(name for part in parts for name in part.opposite_name),
     )
+    unique, count = np.unique(joined.moving, return_counts=True)
+    if (count > 1).any():
+        twice = unique[count > 1]
+        both = joined.surface[joined.moving == twice[0]]
+        names = " and ".join(joined.moving_name[place] for place in both)
+        raise SceneError(
+            "contact",
+            f"{len(twice)} nodes move in two pairs, in {names}, as node {numbers[twice[0]]}",
+            "take them out of one of the surfaces",
+        )
+    return joined
 
 
 def local_frames(normals: FloatArray, along: FloatArray) -> FloatArray:
@@ -253,7 +253,7 @@ def _check_match(match: _Match, numbers: IntArray, facet: float, sector: int) ->
         raise SceneError("contact", found, "leave them out of the surface")
 
 
-def _gaps(contact: ContactSurfaces, distance: FloatArray) -> FloatArray:
+def initial_gaps(contact: ContactSurfaces, distance: FloatArray) -> FloatArray:
     """Initial gaps (n,), m: the clearance that the model states, the distances of the mesh (n,), or none."""
     if contact.clearance is not None:
         return np.full_like(distance, contact.clearance)
@@ -315,7 +315,7 @@ def _pair(
         area=match.area,
         position=coordinates[nodes],
         distance=match.distance,
-        gap=_gaps(contact, match.distance),
+        gap=initial_gaps(contact, match.distance),
         surface=np.full(n, place),
         moving_name=(match.moving.name,),
         opposite_name=(match.opposite.name,),

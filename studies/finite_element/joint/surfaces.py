@@ -225,6 +225,13 @@ def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
     return surface
 
 
+def surface_of_points(name: str, nodes: IntArray) -> Surface:
+    """Surface of nodes (n,) of a model without elements: triangles of no extent."""
+    n = len(nodes)
+    none = np.empty((0, 4), dtype=np.int64)
+    return Surface(name, np.tile(nodes[:, None], 3), none, np.full((n, 8), -1), np.zeros((n, 4, 2)), np.zeros(n))
+
+
 def outer_faces(mesh: SolidMesh) -> OuterFaces:
     """All outer faces of a mesh."""
     loops: list[IntArray] = []

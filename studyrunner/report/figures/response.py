@@ -43,8 +43,7 @@ def draw_responses(result: Result) -> Drawing | Missing:
     again = result.again.get("response")
     if course is None and again is None:
         said = "The study has one frequency: give several under [axes] frequency"
-        followed = ", or use study-report --worn-response" if result.followed else ""
-        return Missing(name, title, f"{said}{followed}.")
+        return Missing(name, title, f"{result.no_worn_response or said}.")
     if course is not None and result.cycles[0] != 0.0:
         return Missing(name, title, "The file holds no new joint: add 0 to slow_time.outputs.")
     n_panels = min(len(result.responses), _MOST_RESPONSES)
@@ -66,7 +65,8 @@ def draw_responses(result: Result) -> Drawing | Missing:
     text = as_sentences(
         f"Largest amplitude of the first harmonic of {result.responses[0]}: {'; '.join(filter(None, peaks))}",
         f"One joint, {again.attrs['title']}: its response curve at that wear, without further wear" if again else "",
-        f"{again.attrs['how']}" if again else "study-report --worn-response adds the curve of one worn joint",
+        f"{again.attrs['how']}" if again else "",
+        f"Without the curve of the worn joint: {result.no_worn_response}" if result.no_worn_response else "",
         "More responses are in the file" if len(result.responses) > n_panels else "",
         *told,
     )

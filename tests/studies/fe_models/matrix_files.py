@@ -2,10 +2,13 @@
 
 import shutil
 import subprocess
+from functools import partial
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+from scipy import io, sparse
 
 needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 
@@ -89,3 +92,133 @@ def _short(value: float) -> str:
     """A number in 8 characters, as Nastran has it: 1.234+9."""
     mantissa, exponent = f"{value:.3e}".split("e")
     return f"{mantissa}{int(exponent):+d}"
+
+
+def write_rows(folder, rows):
+    (folder / "job_rows.csv").write_text("node,dof\n" + "".join(f"{node},{dof}\n" for node, dof in rows))
+
+
+def write_mat(folder, named, rows):
+    io.savemat(folder / "job.mat", {**named, "stiffness": sparse.csc_array(named["stiffness"]), "rows": rows})
+
+
+def write_mat_73(folder, named, rows):
+    """HDF5 with transposed arrays behind a header of 512 bytes; the mass is sparse."""
+    with h5py.File(folder / "job.mat", "w", userblock_size=512) as file:
+        for name, values in {**named, "rows": rows.astype(float)}.items():
+            if name != "mass":
+                file[name] = np.atleast_2d(values).T if values.ndim == 2 else values[None]
+        columns = sparse.csc_array(named["mass"])
+        group = file.create_group("mass")
+        group.attrs["MATLAB_sparse"] = np.uint64(columns.shape[0])
+        group["data"], group["ir"], group["jc"] = columns.data, columns.indices, columns.indptr
+    with (folder / "job.mat").open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file")
+
+
+def write_market(folder, named, rows):
+    write_rows(folder, rows)
+    for name, values in named.items():
+        matrix = values[:, None] if values.ndim == 1 else sparse.coo_array(values)
+        io.mmwrite(folder / f"job_{name}.mtx", matrix, precision=17)
+
+
+def write_harwell_boeing(folder, named, rows):
+    write_rows(folder, rows)
+    for name, values in named.items():
+        io.hb_write(folder / f"job_{name}.rb", sparse.csc_matrix(np.atleast_2d(values.T).T))
+
+
+def write_matrix_input(folder, named, rows):
+    """Of *MATRIX OUTPUT, FORMAT=MATRIX INPUT: one triangle, and forces."""
+    for name, end in (("stiffness", "STIF1"), ("mass", "MASS1"), ("damping", "DMPV1")):
+        lines = [f"{','.join(map(str, (*rows[r], *rows[c])))}, {v:.16e}" for r, c, v in entries(named[name], True)]
+        (folder / f"job_{end}.mtx").write_text("\n".join(lines) + "\n")
+    lines = [f"{node},{dof}, {value:.16e}" for (node, dof), value in zip(rows, named["load"], strict=True) if value]
+    (folder / "job_LOAD1.mtx").write_text("*CLOAD, OP=NEW\n" + "\n".join(lines) + "\n")
+
+
+def write_user_element(folder, named, rows, name="job"):
+    """Of *SUBSTRUCTURE MATRIX OUTPUT: a node for each row, as CalculiX writes it, four entries a line."""
+    lines = ["**", f"*USER ELEMENT, NODES={len(rows)}, LINEAR", "** ELEMENT NODES"]
+    lines += ["** " + ", ".join(str(node) for node, _ in rows[at : at + 10]) for at in range(0, len(rows), 10)]
+    lines += [f"{rows[0][1]}", *(f"{place}, {dof}" for place, (_, dof) in enumerate(rows[1:], 2))]
+    for kind, of in (("STIFFNESS", "stiffness"), ("MASS", "mass"), ("VISCOUS DAMPING", "damping")):
+        values = [f"{v:.16e}" for column in range(len(rows)) for v in named[of][: column + 1, column]]
+        lines += [f"*MATRIX,TYPE={kind}", *(" , ".join(values[at : at + 4]) for at in range(0, len(values), 4))]
+    (folder / f"{name}.mtx").write_text("\n".join(lines) + "\n")
+
+
+def write_punch(folder, named, rows):
+    """DMIG entries in large fields."""
+    lines = []
+    for title, of in (("KAAX", "stiffness"), ("MAAX", "mass"), ("BAAX", "damping"), ("PAX", "load")):
+        matrix = np.atleast_2d(named[of].T).T
+        lines.append(f"{'DMIG':8}{title:8}{0:8d}{9 if title == 'PAX' else 6:8d}{2:8d}{0:8d}{'':8}{'':8}")
+        for column in range(matrix.shape[1]):
+            at = rows[column] if title != "PAX" else (1, 0)
+            lines.append(f"{'DMIG*':8}{title:16}{at[0]:16d}{at[1]:16d}")
+            for row in range(column if title != "PAX" else 0, len(matrix)):
+                value = f"{matrix[row, column]:.9E}".replace("E", "D")
+                lines.append(f"{'*':8}{rows[row][0]:16d}{rows[row][1]:16d}{value:>16}")
+    (folder / "job.pch").write_text("\n".join(lines) + "\n")
+
+
+def op4_strings(column, sparsely):
+    """First row, from 1, and values of the parts of a column: one of all rows, or those between zeros."""
+    if not sparsely:
+        return [(1, column)]
+    rows = np.flatnonzero(column)
+    return [(part[0] + 1, column[part]) for part in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if part.size]
+
+
+def write_op4(folder, named, rows, *, binary=False, sparsely=False, many=False):
+    """many: two whole numbers a string, as for many rows (BIGMAT)."""
+    write_rows(folder, rows)
+    with (folder / "job.op4").open("wb") as file:
+
+        def put(text, *parts):
+            if binary:
+                record = b"".join(part if isinstance(part, bytes) else np.asarray(part).tobytes() for part in parts)
+                file.write(np.int32(len(record)).tobytes() + record + np.int32(len(record)).tobytes())
+            else:
+                file.write(text.encode() + b"\n")
+
+        for name, of in (("KAA", "stiffness"), ("MAA", "mass"), ("BAA", "damping"), ("PA", "load")):
+            matrix = np.atleast_2d(named[of].T).T
+            size, columns = matrix.shape
+            head = np.array([columns, -size if many else size, 6, 2], dtype=np.int32)
+            put("".join(f"{n:8d}" for n in head) + f"{name:8}1P,3E23.16", head, f"{name:8}".encode())
+            for number, column in enumerate(matrix.T, 1):
+                strings = op4_strings(column, sparsely)
+                extra = 0 if not sparsely else 2 if many else 1
+                words = sum(2 * len(values) + extra for _, values in strings)
+                count = words if binary or sparsely else len(column)
+                texts, parts = [], []
+                for row, values in strings:
+                    length = 2 * len(values) + 1
+                    start = [] if not sparsely else [length, row] if many else [(length << 16) + row]
+                    texts += ["".join(f"{n:{8 if many else 12}d}" for n in start)] if start else []
+                    texts += ["".join(f"{v:23.16E}" for v in values[at : at + 3]) for at in range(0, len(values), 3)]
+                    parts += [np.array(start, dtype=np.int32), values]
+                first = [number, 0 if sparsely else 1, count]
+                put("\n".join(["".join(f"{n:8d}" for n in first), *texts]), np.array(first, dtype=np.int32), *parts)
+            last = [columns + 1, 1, 1 + binary]
+            put("".join(f"{n:8d}" for n in last) + "\n 1.0", np.array(last, dtype=np.int32), np.ones(1))
+
+
+REDUCED = {
+    "mat": write_mat,
+    "mat 7.3": write_mat_73,
+    "market": write_market,
+    "harwell boeing": write_harwell_boeing,
+    "matrix input": write_matrix_input,
+    "user element": write_user_element,
+    "punch": write_punch,
+    "op4": write_op4,
+    "op4 binary": partial(write_op4, binary=True),
+    "op4 sparse": partial(write_op4, sparsely=True),
+    "op4 binary sparse": partial(write_op4, binary=True, sparsely=True),
+    "op4 many rows": partial(write_op4, binary=True, sparsely=True, many=True),
+}
+"""What writes job.* with matrices and forces by name, of rows (n, 2) with node and dof."""

@@ -7,7 +7,9 @@ import pytest
 from scipy import linalg, sparse
 
 from studies.fe_models.from_files.check import describe_rest
+from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.nodal_matrices import order_by_nodes
+from studies.fe_models.units import find_units
 from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness, spin_softening
 from studies.finite_element.elements.solid_mesh import Material, Rotation
 from studies.finite_element.joint import ordering, reduction
@@ -325,15 +327,15 @@ def test_matrices_are_put_in_the_order_of_the_nodes():
     node = np.append(model.numbers[rows // 3], [-4, -4, -4])
     direction = np.append(rows % 3, [2, 0, 1])
     heavy = sparse.block_diag([mass[rows][:, rows], sparse.diags([1.0, 2.0, 3.0])], format="csr")
-    ordered = order_by_nodes(more, heavy, node, direction, model.numbers, model.coordinates)
+    given = Matrices(sparse.csr_array(more), sparse.csr_array(heavy), node, direction, ("job",), "table")
+    ordered = order_by_nodes(given, find_units("SI"), model.numbers, model.coordinates)
     assert np.array_equal(np.argwhere(ordered.missing), [[17 // 3, 17 % 3]])
-    assert ordered.numbers[-1] == -4
-    assert np.isnan(ordered.coordinates[-1]).all()
+    found = ordered.model
+    assert found.numbers[-1] == -4
+    assert np.isnan(found.coordinates[-1]).all()
     kept = np.setdiff1d(np.arange(3 * n), [17])
-    assert np.abs(ordered.stiffness[kept][:, kept] - stiffness[kept][:, kept]).max() == 0.0
-    assert np.array_equal(ordered.mass.diagonal()[-3:], [2.0, 3.0, 1.0])
-    with pytest.raises(SceneError, match=r"displacement 2 of node -4 has more than one row"):
-        order_by_nodes(more, heavy, node, np.append(rows % 3, [1, 1, 0]), model.numbers, model.coordinates)
+    assert np.abs(found.stiffness[kept][:, kept] - stiffness[kept][:, kept]).max() == 0.0
+    assert np.array_equal(found.mass.diagonal()[-3:], [2.0, 3.0, 1.0])
 
 
 @pytest.mark.parametrize("small", [0, 900])

@@ -11,14 +11,16 @@ from studies.fe_models.from_files.check import describe_model
 from studies.fe_models.from_files.model import find_files, load_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.scene import reduce_model
+from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.nodal_matrices import order_by_nodes
+from studies.fe_models.units import find_units
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.finite_element.joint_model import ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
 from studies.scene_error import SceneError
 from studies.scenes import shrouded_sector
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z
-from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, node_set, read_export, run_ccx
+from tests.studies.fe_models.solid_meshes import EXPORT, centrifugal, deck_lines, node_set, run_ccx
 
 pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 
@@ -121,13 +123,11 @@ def test_matrices_of_calculix(kind, tmp_path):
     sector = Sector(kind, kind, (1, 4, 2), (2, 2, 2))
     lines = [*sector_lines(sector), *static_step(sector), "*STEP, PERTURBATION", "*BOUNDARY, OP=NEW", *EXPORT]
     run_ccx(tmp_path, lines)
-    stiffness, mass = read_export(tmp_path)
     rotation = Rotation(OMEGA_SQUARED, np.zeros(3), Z)
-    rows = [row.split(".") for row in (tmp_path / "job.dof").read_text().split()]
-    node, direction = np.array(rows, dtype=int).T
-    ordered = order_by_nodes(stiffness, mass, node, direction - 1, sector.mesh.numbers, sector.mesh.coordinates)
+    given = read_matrices(tmp_path / "job")
+    ordered = order_by_nodes(given, find_units("SI"), sector.mesh.numbers, sector.mesh.coordinates)
     assert not ordered.missing.any()
-    model = ordered.model(rotation)
+    model = replace(ordered.model, rotation=rotation)
     scene = build_fe_scene(model, sector.joint(), ReductionOptions(nodal_diameter=3, n_modes=N_MODES), 2)
     expected = calculix_frequencies(tmp_path, sector, (0, 3, 6), prestress=True)
     own = np.array([scene.summary.glued_frequencies[k] for k in (0, 3, 6)])

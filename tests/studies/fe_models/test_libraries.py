@@ -159,7 +159,7 @@ def test_meshes_by_their_ending(tmp_path):
     path = tmp_path / "mesh.inp"
     path.write_text("*NODE\n1,0,0,0\n")
     assert read_mesh_file(path).node_numbers.tolist() == [1]
-    with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh or .cdb"):
+    with pytest.raises(SceneError, match=r"model: mesh.med is no mesh that is known; give .inp, .msh, .cdb or .csv"):
         read_mesh_file(tmp_path / "mesh.med")
     with pytest.raises(SceneError, match=r"none.cdb: there is no such file"):
         read_mesh_file(tmp_path / "none.cdb")

@@ -1,0 +1,100 @@
+"""Matrices without labels: MATLAB (.mat), MatrixMarket and Harwell-Boeing files, OP4 of Nastran.
+
+Node and dof of each row, in the order of the rows, are the variable `rows` (n, 2) of a .mat file, or stand beside the
+files in job_rows.csv with the columns node and dof; dof 0 is a coordinate of no place, as of a mode.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+from scipy import io, sparse
+
+from studies.fe_models.libraries.errors import library_errors
+from studies.fe_models.matrices.matrices import IntArray, Matrices, assemble, label, of_table, wrong
+from studies.fe_models.matrices.nastran import names_of_matrices
+from studies.fe_models.matrices.op4 import read_op4
+
+NAMES = ("stiffness", "mass", "damping", "load")
+"""Variables of a .mat file, and ends of the names of files with one matrix each."""
+
+ONE_EACH = (".mtx", ".hb", ".rb")
+"""Endings of these files: MatrixMarket, Harwell-Boeing."""
+
+
+def rows_of(job: Path) -> Path:
+    """The table of the rows that belongs to matrices of a name."""
+    return job.with_name(f"{job.name}_rows.csv")
+
+
+def read_tables(files: Mapping[str, Path], rows: Path) -> Matrices:
+    """Matrices of files by name; rows: the table of their rows. Raises SceneError about "matrices"."""
+    found = {}
+    for name, path in files.items():
+        with library_errors(path, "scipy.io", "scipy", "matrices"):
+            found[name] = io.mmread(path) if path.suffix.lower() == ".mtx" else io.hb_read(path)
+    return _labelled(found, _read_rows(rows), {name: path.name for name, path in files.items()})
+
+
+def read_matlab(path: Path) -> Matrices:
+    """Matrices of a .mat file of any version, by the variables NAMES and `rows`. Raises SceneError about "matrices"."""
+    with library_errors(path, "scipy.io", "scipy", "matrices"):
+        with path.open("rb") as file:
+            newest = file.read(10) == b"MATLAB 7.3" or h5py.is_hdf5(path)
+        found = _read_v73(path) if newest else io.loadmat(path, variable_names=[*NAMES, "rows"])
+    if "rows" not in found:
+        labels = _read_rows(rows_of(path.with_suffix("")))
+    else:
+        table = np.asarray(found["rows"])
+        if table.ndim != 2 or table.shape[1] != 2 or table.dtype.kind not in "iuf":
+            wrong(path.name, f"rows have the shape {table.shape}", "give node and dof of each row of the matrices")
+        labels = label(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), path.name)
+    own_names = {name: found[name] for name in NAMES if name in found}
+    return _labelled(own_names, labels, dict.fromkeys(NAMES, path.name))
+
+
+def read_nastran_op4(path: Path) -> Matrices:
+    """Matrices of an OP4 file by the names of Nastran. Raises SceneError about "matrices"."""
+    found = read_op4(path)
+    names = names_of_matrices(found, path.name)
+    own = {name: found[each] for name, each in names.items()}
+    return _labelled(own, _read_rows(rows_of(path.with_suffix(""))), dict.fromkeys(names, path.name))
+
+
+def _labelled(found: Mapping[str, Any], labels: IntArray, files: Mapping[str, str]) -> Matrices:
+    if np.unique(labels).size < labels.size:
+        wrong(next(iter(files.values())), "a dof has two rows", "give node and dof of each row once")
+    parts = {name: of_table(files[name], matrix, labels) for name, matrix in found.items()}
+    return assemble(parts, tuple(dict.fromkeys(files[name] for name in found)), "table")
+
+
+def _read_rows(path: Path) -> IntArray:
+    """Labels of a table with the columns node and dof. Raises SceneError."""
+    with library_errors(path, "pandas", "pandas", "matrices"):
+        table = pd.read_csv(path, skipinitialspace=True)
+    if not {"node", "dof"} <= set(table) or any(table[name].dtype.kind != "i" for name in ("node", "dof")):
+        wrong(path.name, "no columns node and dof of whole numbers", "give a line for each row of the matrices")
+    return label(table["node"].to_numpy(), table["dof"].to_numpy(), path.name)
+
+
+def _read_v73(path: Path) -> dict[str, Any]:
+    """Variables of a .mat file of version 7.3, which is HDF5 and holds arrays transposed."""
+    found: dict[str, Any] = {}
+    with h5py.File(path) as file:
+        for name in (*NAMES, "rows"):
+            if name not in file:
+                continue
+            item = file[name]
+            if isinstance(item, h5py.Group):  # a sparse matrix, column by column
+                places, starts = (item[part][()].astype(np.int64) for part in ("ir", "jc"))
+                shape = int(item.attrs["MATLAB_sparse"]), len(starts) - 1
+                found[name] = sparse.csc_array((item["data"][()], places, starts), shape=shape)
+            else:
+                values = item[()].T
+                found[name] = values["real"] + 1j * values["imag"] if values.dtype.names else values
+    return found

@@ -1,0 +1,106 @@
+"""The frame of the benchmarks: their arguments, what a computation takes, and a table printed row by row."""
+
+import argparse
+import csv
+import itertools
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from solver.clock import computing_time
+from solver.newton import run as newton
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Result of a computation, its CPU seconds without compiling, and iterations of Newton's method."""
+
+    result: Any
+    seconds: float
+    iterations: int
+
+
+def measure(compute: Callable[[], Any]) -> Measured:
+    """Computes, and counts the iterations that are really made."""
+    iterations, own = 0, newton.solve_newton
+
+    def counted(*given: Any, **named: Any) -> Any:
+        nonlocal iterations
+        end = own(*given, **named)
+        iterations += end.iterations
+        return end
+
+    began = computing_time()
+    newton.solve_newton = counted
+    try:
+        result = compute()
+    finally:
+        newton.solve_newton = own
+    return Measured(result, computing_time() - began, iterations)
+
+
+def dense_solve(n: int, repeats: int = 7) -> float:
+    """CPU seconds of one `numpy.linalg.solve` of n unknowns, the unit of run times; the median of some."""
+    matrix, right, spent = np.random.default_rng(0).standard_normal((n, n)), np.ones(n), []
+    for _ in range(repeats):
+        began = time.thread_time()
+        np.linalg.solve(matrix, right)
+        spent.append(time.thread_time() - began)
+    return float(np.median(spent))
+
+
+class Table:
+    """A table of columns, the first one of words; also as comma-separated values where a file is given, or drawn."""
+
+    def __init__(self, *columns: str, file: Path | None = None) -> None:
+        self.widths = [42, *(max(len(column), 9) for column in columns[1:])]
+        self.columns, self.rows, self.file = columns, list[tuple[object, ...]](), file
+        if file is not None:
+            file.write_text("", encoding="utf-8")
+        self.row(*columns)
+
+    def row(self, *values: object) -> None:
+        """Prints a row: numbers with five digits, nothing for None."""
+        self.rows.append(values)
+        words = [
+            "" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value) for value in values
+        ]
+        print(f"{words[0]:<{self.widths[0]}}", *(f"{w:>{n}}" for w, n in zip(words[1:], self.widths[1:], strict=True)),
+              sep="  ", flush=True)  # fmt: skip
+        if self.file is not None:
+            with self.file.open("a", encoding="utf-8", newline="") as file:
+                csv.writer(file).writerow(words)
+
+    def draw(self, picture: Path | None, x: str, y: str, scale: str = "linear") -> None:
+        """Draws one column over another, a line for each first word up to a comma; nothing without a file."""
+        if picture is None:
+            return
+        figure, axes = plt.subplots(figsize=(6.0, 4.2))
+        at = [self.columns.index(name) for name in (x, y)]
+        names = [str(row[0]).split(",")[0] for row in self.rows[1:]]
+        for name, marker in zip(dict.fromkeys(names), itertools.cycle("os^Dvx"), strict=False):
+            own = [row for row, its in zip(self.rows[1:], names, strict=True) if its == name]
+            axes.plot(*([row[place] for row in own] for place in at), marker=marker, label=name)
+        axes.set(xlabel=x, ylabel=y, title=self.columns[0], xscale=scale, yscale=scale)
+        axes.legend()
+        figure.savefig(picture, dpi=110, bbox_inches="tight")
+
+
+def arguments(doc: str | None, choices: Sequence[str] = (), **defaults: Any) -> argparse.Namespace:
+    """The options of the command line, by their defaults; a list takes several values, None a path.
+
+    choices: words that may be named, as `chosen`; all of them by default.
+    """
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    if choices:
+        parser.add_argument("chosen", nargs="*", choices=choices, default=list(choices))
+    for name, default in defaults.items():
+        several = isinstance(default, list)
+        kind = Path if default is None else type(default[0] if several else default)
+        parser.add_argument(f"--{name.replace('_', '-')}", type=kind, default=default, nargs="*" if several else None)
+    return parser.parse_args()
