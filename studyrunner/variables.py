@@ -29,6 +29,7 @@ class Variable:
 
 _CYCLE, _PAIRS, _RESPONSES = ("cycle",), ("cycle", "contact"), ("cycle", "response")
 _FIRST_HARMONIC = "The first harmonic is x(t) = Re(X exp(i omega t))."
+_OWN = "A response with a unit in its name, as root stress [MPa], has this unit."
 _NO_TARGET = "NaN where there is no target, or where the target is not reached: see message."
 _ITS_HISTORY = "Of the history that the point is read from, which points may share."
 
@@ -43,10 +44,16 @@ ASKED = {
         _PAIRS, "Pa", "contact pressure, mean over a period", comment="Force over contact_area, compression positive."
     ),
     "response_amplitude": Variable(
-        _RESPONSES, "m", "amplitude of the first harmonic of the response", comment=f"Magnitude of X. {_FIRST_HARMONIC}"
+        _RESPONSES,
+        "m",
+        "amplitude of the first harmonic of the response",
+        comment=f"Magnitude of X. {_FIRST_HARMONIC} {_OWN}",
     ),
     "response_phase": Variable(
         _RESPONSES, "rad", "phase of the first harmonic of the response", comment=f"Angle of X. {_FIRST_HARMONIC}"
+    ),
+    "response_mean": Variable(
+        _RESPONSES, "m", "mean of the response over a period", comment="Of the static load, and what the wear changes."
     ),
     "response_peak": Variable(
         _RESPONSES, "m", "largest magnitude of the response over a period", comment="With the static displacement."

@@ -292,7 +292,7 @@ def _levels_to_compare(here: ResolvedState) -> tuple[int, int]:
     if cheap == 2:
         return 2, 2
     contact = shortest_contact(at.status_t, at.force_t[:, 0], ACCURACY.negligible * here.case.settings.rtol)
-    highest = reach(model, here.joint.omega, resolution.highest)
+    highest = reach(model, here.case.penalty_omega, resolution.highest)
     seeing, far, reaching = (levels_to(resolution, wanted) for wanted in (0.5 / contact, 1.0 / contact, highest))
     return min(seeing, cheap), min(max(far, reaching), cheap)
 

@@ -201,9 +201,12 @@ class LoadingPath:
     def suffices(self, state: State, at_limit: bool, run: Run) -> bool:
         """As in Path, by one linear solve at most.
 
-        One Newton iteration two levels of harmonics up, with twice the samples, shows the error. False where this error
+        Where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice. Otherwise
+        one Newton iteration two levels of harmonics up, with twice the samples, shows the error. False where this error
         is above rtol, or so far below that fewer harmonics may suffice.
         """
+        if self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any():
+            return True
         case, joint, settings = self.case, self.joint_at(state.parameter), self.case.settings
         resolution, fewest = case.resolution, case.resolution == first_resolution(settings)
         if self.rests(state):

@@ -6,7 +6,7 @@ only on the change of the vibration from node to node. A state between two nodes
 leaves the sweep unchanged. So the state of a point does not depend on the other points of the study.
 
 The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
-slip, up to one step too early. A reference sweep has half the nodes, in the middle of every second step, and harmonics
+slip, up to one step too early. A reference sweep has a node in the middle of every third step, and harmonics
 one level lower where these are automatic. So the difference of both sweeps is at least half the error of the finer one,
 and as a rule the error of the coarser one: with common nodes both might keep the same history too early. There is no
 difference, and no reference, as long as nothing slips or opens, and where each pair slips or opens within the period:
@@ -26,7 +26,7 @@ import numpy as np
 from solver.accuracy.harmonic_levels import fewer
 from solver.accuracy.options import ACCURACY
 from solver.harmonic_balance.state import Failure
-from solver.march.steps import Lengths, take_step
+from solver.march.steps import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
@@ -45,6 +45,9 @@ NODE_ITERATIONS = 5 * SWEEP_ITERATIONS // 16
 ITERATIONS_PER_SAVE = 100
 """Newton iterations after which a sweep is saved at its next node, and its factorisation dropped, so that a resumed
 sweep is equal to the last bit: 1 s of 48 pairs, 17 s of 336."""
+
+STEPS_OF_REFERENCE = 3
+"""Steps of a sweep in one step of its reference."""
 
 KEPT_NODES = 3
 """Last nodes that a sweep keeps: the next one is predicted on the parabola through them."""
@@ -140,16 +143,17 @@ class SweepState:
     """State of a sweep at a node, with which the sweep goes on.
 
     nodes: the last nodes; those before its end where the sweep is lost.
-    length: of the next step.
+    length: of the next step. rate: change in the last one, over the largest change allowed, per length.
     checked: the node at which the harmonics were chosen. at_limit: whether it needs more than a sweep may have.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
     lost, failure: whether the sweep has ended, and the reason why there is no state.
     iterations: Newton iterations so far.
-    reference: last nodes of the reference sweep, None for none; skipped: parameter of the node since then, NaN if none.
+    reference: last nodes of the reference sweep, None for none; skipped: parameters of the nodes since then.
     """
 
     nodes: Nodes
     length: float = 0.0
+    rate: float = 0.0
     checked: Any = None
     at_limit: bool = False
     branch: int = 0
@@ -158,7 +162,7 @@ class SweepState:
     failure: Outcome = Outcome.START_FAILED
     iterations: int = 0
     reference: Nodes | None = None
-    skipped: float = math.nan
+    skipped: tuple[float, ...] = ()
 
 
 class Sweep(Generic[S]):
@@ -178,6 +182,7 @@ class Sweep(Generic[S]):
         self.saved: SweepState | None = None
         self.ahead: Step[S] | None = None
         self.passed: list[float] = []
+        self._rate = 0.0
         self.save: Callable[[], None] = lambda: None
 
     def load(self, state: SweepState) -> None:
@@ -273,6 +278,7 @@ class Sweep(Generic[S]):
     def judge(self, here: S, end: Step[S], length: float) -> float:
         """As in Line: the shortest step is accepted, whatever the change of the vibration is."""
         ratio = self.path.change(here, end.state, 1.0)
+        self._rate = ratio / length
         return min(ratio, 1.0) if length <= self.path.steps[0] else ratio
 
     def rescue(self, here: S, length: float) -> Step[S] | Failure:
@@ -290,12 +296,16 @@ class Sweep(Generic[S]):
         budget.limit = budget.iterations + NODE_ITERATIONS
         taken: tuple[Step[S], float] | Failure = Failure(Outcome.BRANCH_LOST)
         if budget.iterations <= SWEEP_ITERATIONS:
+            self._rate = 0.0
             taken = take_step(self, here, self.state.length, Lengths(1, AIMED_CHANGE, shortest, rescue))
         if isinstance(taken, Failure):
             self.state = replace(self.state, failure=taken.outcome, lost=True)
         else:
             self.ahead, length = taken
-            self.state = replace(self.state, length=min(length, longest))
+            # the change will grow as in the last step: towards a resonance every third step would be refused
+            growth = self._rate / self.state.rate if self.state.rate > 0.0 else 1.0
+            length = min(length / min(max(growth, 1.0), LARGEST_STEP_RATIO), longest)
+            self.state = replace(self.state, length=length, rate=self._rate)
 
     def _advance(self, before: S, step: Step[S]) -> None:
         """Make the next node the current one."""
@@ -319,20 +329,21 @@ class Sweep(Generic[S]):
             self._save()
 
     def _lead_reference(self, before: S, step: Step[S]) -> None:
-        """Lead the reference sweep over a step from the node `before`: to its middle, if it is a second step."""
+        """Lead the reference sweep over a step from the node `before`: to its middle, if it is a third step."""
         if step.folds or self.path.forgets(step.state):
-            self.state = replace(self.state, reference=None, skipped=math.nan)
+            self.state = replace(self.state, reference=None, skipped=())
             return
         if self.state.reference is None:
             if self.path.rests(step.state):
                 return
             self._begin_reference(self.path, before)
-        if math.isnan(self.state.skipped):
-            self.state = replace(self.state, skipped=step.state.parameter)
+        skipped = self.state.skipped
+        if len(skipped) < STEPS_OF_REFERENCE - 1:
+            self.state = replace(self.state, skipped=(*skipped, step.state.parameter))
             return
         middle = 0.5 * (before.parameter + step.state.parameter)
-        led = self._led((middle,)) or self._led((self.state.skipped, middle))
-        self.state = replace(self.state, reference=led, skipped=math.nan)
+        led = self._led((middle,)) or self._led((*skipped, middle))
+        self.state = replace(self.state, reference=led, skipped=())
 
     def _led(self, targets: tuple[float, ...]) -> Nodes | None:
         """Nodes of the reference sweep at the last of some targets, one after the other; None where none is found."""

@@ -78,7 +78,7 @@ class WearHistory(PresentedHistory):
     - worn_volume (n_output,), m3; wear_rate (n_output,), m3 per cycle; wear_depth (n_output, n_contact), m.
     - mean_pressure, Pa, slip_range, m, open_fraction (n_output, n_contact): of a period.
     - response (n_output, n_response): complex first harmonic, m.
-    - response_peak (n_output, n_response): largest magnitude over a period, m.
+    - response_mean, response_peak (n_output, n_response): mean and largest magnitude over a period, m.
     - loop_displacement, loop_force (n_output, n_loops, n_phase, 3): m and N, fretting loops of the chosen pairs, see
       `solver.results.loops.contact_loops`.
     - excitation_frequency, excitation_frequency_error (n_output,): frequency of the excitation and its estimated error,
@@ -121,6 +121,7 @@ class WearHistory(PresentedHistory):
     slip_range: FloatArray
     open_fraction: FloatArray
     response: ComplexArray
+    response_mean: FloatArray
     response_peak: FloatArray
     loop_displacement: FloatArray
     loop_force: FloatArray

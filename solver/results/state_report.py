@@ -56,6 +56,7 @@ class StateReport:
     slip_range: FloatArray
     open_fraction: FloatArray
     response: ComplexArray
+    response_mean: FloatArray
     response_peak: FloatArray
     loop_displacement: FloatArray
     loop_force: FloatArray
@@ -88,6 +89,7 @@ def report_state(
         slip_range=largest_distance(evaluation.state_t) / joint.law.state_stiffness,
         open_fraction=(evaluation.status_t == SEPARATED).mean(axis=1),
         response=to_complex(response_h)[:, 0],
+        response_mean=response_h[:, 0],
         response_peak=largest_responses(joint, evaluation),
         loop_displacement=loop_displacement,
         loop_force=loop_force,

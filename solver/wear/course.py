@@ -26,6 +26,7 @@ INTERPOLATED = (
     "slip_range",
     "open_fraction",
     "response",
+    "response_mean",
     "response_peak",
     "excitation_frequency",
     "excitation_frequency_error",
@@ -232,7 +233,14 @@ def unknown_course(model: ReducedModel, n_loops: int) -> Course:
     loops = np.full((n_loops, LOOP_PHASES, 3), np.nan)
     four = of_pairs, of_pairs, of_pairs, of_pairs
     report = StateReport(
-        *four, of_responses.astype(complex), of_responses, loops, loops, NOT_CERTIFIED, Resolution((), 0)
+        *four,
+        response=of_responses.astype(complex),
+        response_mean=of_responses,
+        response_peak=of_responses,
+        loop_displacement=loops,
+        loop_force=loops,
+        certificate=NOT_CERTIFIED,
+        resolution=Resolution((), 0),
     )
     # before all counts
     return Course(model.contact.area, False, nodes=(Node(-1.0, report, of_pairs, math.nan),))

@@ -55,12 +55,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class FeScene:
-    """A reduced model and its description.
-
-    model: the reduced model.
-    pairs: in the order of the model.
-    summary: values for a user to check.
-    """
+    """A reduced model, its pairs in the order of the model, and values for a user to check."""
 
     model: ReducedModel
     pairs: ContactPairs
@@ -71,12 +66,9 @@ class FeScene:
 class PreparedModel:
     """A model that can be reduced at any nodal diameter.
 
-    reduction: with the forms "stiffness" and "mass", and "elastic" for the stiffness without prestress where that
-        differs.
-    static_load (3 n_nodes,): N.
-    at_rest: the reduction without prestress; None where that is the same.
-    rotation: None for a model at rest.
-    weight (n_nodes,): kg of each node.
+    reduction: with the forms "stiffness" and "mass", "elastic" for the stiffness without prestress where that differs,
+    and "damping" where the model has one. static_load (3 n_nodes,): N. at_rest: the reduction without prestress; None
+    where that is the same. rotation: None for a model at rest. weight (n_nodes,): kg of each node.
     """
 
     reduction: Reduction
@@ -119,7 +111,9 @@ def build_fe_scene(
     Raises SceneError where the model describes no possible joint.
     """
     excited, n_sectors = options.nodal_diameter, 0 if joint.cut is None else joint.cut.axis.n_sectors
-    _check_wave(excited, n_sectors)
+    if excited > n_sectors // 2:
+        most = f"use at most n_sectors // 2 = {n_sectors // 2}"
+        raise SceneError("nodal_diameter", str(excited), most if n_sectors else "only a cyclic sector has one: use 0")
     wanted = needed_nodal_diameters(excited, n_sectors, n_harmonics)
     prepared = prepare_model(model, joint, progress, n_reductions=len({excited, *wanted}))
     pairs, n_nodes = prepared.pairs, len(model.numbers)
@@ -161,14 +155,6 @@ def build_fe_scene(
         pairs=pairs,
         summary=_summary(model, prepared, frequencies),
     )
-
-
-def _check_wave(nodal_diameter: int, n_sectors: int) -> None:
-    """Raises SceneError where a structure of so many sectors has no such nodal diameter."""
-    if nodal_diameter > n_sectors // 2:
-        most = f"use at most n_sectors // 2 = {n_sectors // 2}"
-        remedy = most if n_sectors else "only a cyclic sector has one: use 0"
-        raise SceneError("nodal_diameter", str(nodal_diameter), remedy)
 
 
 def prepare_model(
@@ -261,19 +247,10 @@ def natural_frequencies(
 ) -> NaturalFrequencies:
     """Lowest natural frequencies of the glued structure at all nodal diameters 0..n_sectors // 2.
 
-    Parameters
-    ----------
-    prepare
-        Prepares the model; called only where something is left to compute.
-    known
-        Those of the first nodal diameters, from an interrupted computation.
-    keep
-        Called after each nodal diameter with all that are known.
+    prepare: prepares the model, where something is left to compute. known: those of the first nodal diameters, from an
+    interrupted computation. keep: called after each nodal diameter with all that are known.
 
-    Raises
-    ------
-    SceneError
-        Where the glued structure is not held, or unstable.
+    Raises SceneError where the glued structure is not held, or unstable.
     """
     n_known, n_all = len(known.nodal_diameters), n_sectors // 2 + 1
     if n_known < n_all:

@@ -221,8 +221,15 @@ def as_sentences(*parts: str) -> str:
 def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
     """The dataset with missions as cycles and without what belongs to single blocks, and these variables.
 
-    Of a result without missions the dataset as it is, and None.
+    Of a result without missions the dataset as it is, and None. Responses with a unit of their own in their name, as
+    root stress [MPa], are left out: the others are displacements, which share a scale.
     """
+    if "response" in dataset.coords:
+        own = np.char.endswith(dataset["response"].values.astype(str), "]")
+        if own.any() and not own.all():
+            close = dataset.close
+            dataset = dataset.isel(response=np.flatnonzero(~own))
+            dataset.set_close(close)
     if "block" not in dataset.dims:
         return dataset, None
     renamed = dataset.rename({name: new for name, new in _LIKE_CYCLES.items() if name in dataset.variables})

@@ -19,7 +19,10 @@ def report(depth, value, resolution=RESOLUTIONS[0], **more):
     numbers = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction"), np.full(2, value))
     numbers |= dict.fromkeys(("excitation_frequency", "excitation_frequency_error"), value)
     numbers |= dict.fromkeys(("loop_displacement", "loop_force"), value * LOOP)
-    numbers |= {"response": np.full(1, value * 1j), "response_peak": np.full(1, value)}
+    numbers |= {
+        "response": np.full(1, value * 1j),
+        **dict.fromkeys(("response_mean", "response_peak"), np.full(1, value)),
+    }
     certificate = Certificate(*([value] * 8), stable=value < 2.5)
     return StateReport(
         wear_depth=np.array(depth, float), certificate=certificate, resolution=resolution, **numbers, **more

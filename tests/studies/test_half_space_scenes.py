@@ -199,15 +199,6 @@ def test_the_closed_forms_have_their_published_values(law, ratio, edge, deepest,
     assert not line_worn_depth(np.array([0.0, 0.5]), 0.5, 1.0, 0.7).any()
 
 
-def test_the_frequency_has_no_influence():
-    model = build_scene("cylinder_on_flat", strips=12)
-    settings = SolverSettings(harmonics=3, samples=64)
-    slow, fast = (
-        march_wear(model, at, 1.0, MU, 1e-13, [0.0, 1e4], sweep="ramp", settings=settings) for at in (1.0, 700.0)
-    )
-    assert fast.wear_depth == pytest.approx(slow.wear_depth, rel=1e-9, abs=1e-18)
-
-
 @pytest.mark.parametrize("name", ["cylinder_on_flat", "sphere_on_flat"])
 @pytest.mark.parametrize("values", [{}, {"stroke": 1e-6}])
 def test_the_scenes_are_possible_structures(name, values):

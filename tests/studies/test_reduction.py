@@ -7,7 +7,6 @@ from scipy import linalg
 from studies.finite_element.condensation import projection
 from studies.finite_element.condensation.extend_add import add_lower
 from studies.finite_element.condensation.modes import lowest_modes
-from studies.scenes import scene_frequencies
 from studies.scenes.dovetail_sector import Parameters, build
 
 
@@ -23,17 +22,6 @@ def test_combined_shapes_give_what_condensed_forms_give(monkeypatch):
     for name in ("mass", "damping"):
         own, reference = getattr(combined, name), getattr(condensed, name)
         assert np.abs(own - reference).max() <= 1e-11 * np.abs(reference).max()
-
-
-@pytest.mark.slow
-def test_natural_frequencies_are_those_of_the_reduced_models():
-    parameters = Parameters(mesh=1, nodal_diameter=5)
-    told = scene_frequencies("dovetail_sector", parameters)
-    model = build(parameters, 4)
-    n_relative = 3 * model.contact.n_contact
-    for k, linear in model.linear.items():
-        stuck = np.sqrt(np.diag(linear.stiffness).real[n_relative : n_relative + 6]) / (2.0 * np.pi)
-        assert told.frequencies[k] == pytest.approx(stuck, rel=1e-9)
 
 
 @pytest.mark.parametrize("n_modes", [5, 45, 65])

@@ -16,7 +16,7 @@ from studies.scenes.closed_forms.hertz import (
 )
 from studies.scenes.half_space.influence import composite_modulus
 from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar, round_up
-from tests.studies.half_space_twin import compliances, limit_depth, pressed, solve_pressed
+from tests.studies.half_space_twin import compliances, pressed, solve_pressed
 
 MODULUS = composite_modulus(200e9, 0.3)
 A_LINE = line_half_width(1.2e5, 6e-3, MODULUS)
@@ -84,19 +84,6 @@ def test_a_stroke_slides_where_the_approach_under_the_load_says():
     assert point_stick_under_stroke(1e-9, 0.0, 100.0, A_POINT, 200e9, 0.3) == 0.0
 
 
-@pytest.mark.parametrize("name", ["cylinder_on_flat", "sphere_on_flat"])
-def test_what_needs_no_room_stays_as_it_is(name):
-    much = ExpectedWear(1.0, 1e-9)
-    assert room(name, much) is None
-    assert room(name, much, Q=10.0) is None
-    assert room(name, much, stroke=1e-8) is None
-    assert room(name, ExpectedWear(1.0, 0.0), stroke=1e-5) is None
-    assert room(name, ExpectedWear(1.0, math.inf), stroke=1e-5) is None
-    assert room(name, much, stroke=1e-5, half_width=2e-4) == 2e-4
-    slider = scene_parameters("sdof_slider")()
-    assert scene_with_room("sdof_slider", slider, much) is slider
-
-
 def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears():
     stroke = 2.15e-6
     stick = line_stick_under_stroke(stroke, 0.6, 1.2e5, A_LINE, MODULUS, 6e-3)
@@ -106,22 +93,3 @@ def test_a_stroke_that_nearly_slides_has_room_for_what_partial_slip_wears():
     # a wrong unit is no reason not to build
     assert room("cylinder_on_flat", ExpectedWear(1.0, 1e9), stroke=1e-5) == 2.7e-3
     assert room("sphere_on_flat", ExpectedWear(1.0, 1e9), stroke=1e-5) == 5e-3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "key", "fewest"), [("cylinder_on_flat", "strips", 10), ("sphere_on_flat", "patches", 4)]
-)
-def test_a_few_pairs_hold_what_partial_slip_wears(name, key, fewest):
-    load, contact = (1.2e5, A_LINE) if key == "strips" else (100.0, A_POINT)
-    for share in (0.1, 0.5, 0.8, 0.9):
-        for number in range(fewest, 25, 2):
-            model = build_scene(name, Q=share * 0.6 * load, **{key: number})
-            whole = float(model.linear[0].load_static[2 * model.contact.n_contact])
-            stuck = pressed(model, (1.0 - share) * whole)[0] > 0.0
-            if key == "strips":
-                stuck = model.contact.position[:, 0] < contact * math.sqrt(1.0 - share)
-            edge = model.contact.edge
-            assert edge.any()
-            assert not pressed(model, whole)[0][edge].any()
-            assert not limit_depth(model, stuck)[edge].any(), (share, number)

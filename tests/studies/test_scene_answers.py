@@ -13,7 +13,7 @@ from studies.scene_error import SceneError
 from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_mesh, scene_parameters
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studies.scenes.dovetail_mesh import build_dovetail_mesh
-from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit, slider_wear_depth
+from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit
 
 WEAR = np.array([1.1e-11, 0.0, 1.1e-12])
 CYCLES = np.array([0.0, 1e3, 3e4, 1e5])
@@ -47,27 +47,6 @@ def test_den_hartog_holds_where_the_reference_does_and_has_its_amplitude(ratio, 
     if friction_force > 0.0:
         exact = abs(slider_orbit(mass, 0.0, stiffness, force, friction_force, omega).harmonic(0))
         assert own.first_harmonic(np.array(friction_force)) == pytest.approx(exact, rel=1e-8, abs=0.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("frequency", [160.0, 230.0])
-def test_the_slider_wears_by_its_differential_equation(frequency):
-    found = answer(frequency)
-    for row, wear in enumerate(WEAR):
-        expected = slider_wear_depth(
-            CYCLES,
-            wear_coefficient=max(wear, 1e-30),
-            area=1e-4,
-            friction_coefficient=0.5,
-            normal_load=10.0,
-            normal_stiffness=1e5,
-            amplitude=lambda friction: slider_amplitude(0.1, 0.0, 1.6e5, 10.0, friction, 2 * np.pi * frequency),
-        )
-        assert found.worn_volume[row] == pytest.approx(1e-4 * expected * (wear > 0), rel=1e-9, abs=0.0)
-        for depth, response in zip(expected, found.response_amplitude[row, :, 0], strict=True):
-            friction = 0.5 * (10.0 - 1e5 * depth * (wear > 0))
-            exact = abs(slider_orbit(0.1, 0.0, 1.6e5, 10.0, friction, 2 * np.pi * frequency).harmonic(0))
-            assert response == pytest.approx(exact, rel=1e-8, abs=0.0)
 
 
 def rate_by_hand(law, depth, begun, frequency=160.0):
@@ -114,31 +93,6 @@ def test_the_slider_wears_by_the_differential_equation_of_its_law(law, begun):
         friction = 0.5 * (10.0 - 1e5 * (begun + depth))
         exact = abs(slider_orbit(0.1, 0.0, 1.6e5, 10.0, friction, 2 * np.pi * 160.0).harmonic(0))
         assert response == pytest.approx(exact, rel=1e-7, abs=0.0)
-
-
-def test_a_pair_that_was_worn_open_slides_without_friction():
-    found = answer(worn=1.1e-4)
-    assert not found.worn_volume.any()
-    free = 10.0 / abs(1.6e5 - 0.1 * (2 * np.pi * 160.0) ** 2)
-    assert found.response_amplitude == pytest.approx(free, rel=1e-12)
-    # what stops the mass is the friction that is left
-    assert np.isnan(answer(amplitude=6.0).worn_volume).all()
-    assert np.isfinite(answer(amplitude=6.0, worn=5e-5).worn_volume).all()
-
-
-@pytest.mark.parametrize("law", ["energy", "threshold"])
-def test_under_a_constant_force_each_law_has_a_constant_rate(law):
-    found = answer(law=LAWS[law], worn=2e-5, normal_stiffness=0.0)
-    assert found.worn_volume == pytest.approx(
-        np.outer(WEAR, CYCLES) * 1e-4 * rate_by_hand(LAWS[law], 0.0, 0.0), rel=1e-12, abs=0.0
-    )
-
-
-def test_a_constant_force_wears_at_a_constant_rate():
-    found = answer(normal_stiffness=0.0)
-    amplitude = slider_amplitude(0.1, 0.0, 1.6e5, 10.0, 5.0, 2 * np.pi * 160.0)
-    assert found.worn_volume == pytest.approx(np.outer(WEAR, CYCLES) * 10.0 * 4 * amplitude, rel=1e-12, abs=0.0)
-    assert np.ptp(found.response_amplitude) == 0.0
 
 
 @pytest.mark.parametrize(

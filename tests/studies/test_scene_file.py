@@ -36,19 +36,21 @@ def assert_same_bits(one, other):
         assert first.tobytes() == second.tobytes(), name
 
 
-def rough():
+def with_pairs(**values):
     model = plain()
-    return replace(model, contact=replace(model.contact, friction_coefficient=np.array([0.0, 0.1 + 0.2, 1.5])))
+    return replace(model, contact=replace(model.contact, **values))
 
 
-def open_ended():
-    model = plain()
-    return replace(model, contact=replace(model.contact, edge=np.array([False, True, True])))
+MODELS = (
+    plain(),
+    sector(),
+    with_pairs(friction_coefficient=np.array([0.0, 0.1 + 0.2, 1.5])),
+    with_pairs(edge=np.array([False, True, True])),
+)
 
 
-@pytest.mark.parametrize("build", [plain, sector, rough, open_ended])
-def test_round_trip_is_bitwise(tmp_path, build):
-    model = build()
+@pytest.mark.parametrize("model", MODELS, ids=["plain", "sector", "rough", "open ended"])
+def test_round_trip_is_bitwise(tmp_path, model):
     write_scene(model, tmp_path / "scene.h5")
     assert_same_bits(read_scene(tmp_path / "scene.h5", 5), model)
     assert [path.name for path in tmp_path.iterdir()] == ["scene.h5"]
@@ -134,14 +136,14 @@ def test_what_shows_the_order_of_three_pairs(tmp_path):
     assert read_scene(path).contact.dofs[0].tolist() == [-1, 0, 1]
 
 
-def test_responses_can_be_indices(tmp_path):
-    model = read_scene(changed(tmp_path, plain(), put("response/dofs", np.array([6, 2], dtype=np.int32))))
-    assert model.linear[0].response.tolist() == np.eye(7)[[6, 2]].tolist()
+def test_responses_can_be_indices_and_damping_coefficients(tmp_path):
+    def change(file):
+        put("response/dofs", np.array([6, 2], dtype=np.int32))(file)
+        put("damping", np.array([3.0, 1e-5]))(file)
 
-
-def test_damping_can_be_coefficients_of_mass_and_stiffness(tmp_path):
-    linear = read_scene(changed(tmp_path, plain(), put("damping", np.array([3.0, 1e-5])))).linear[0]
-    assert np.array_equal(linear.damping, 3.0 * plain().linear[0].mass + 1e-5 * plain().linear[0].stiffness)
+    linear, own = read_scene(changed(tmp_path, plain(), change)).linear[0], plain().linear[0]
+    assert linear.response.tolist() == np.eye(7)[[6, 2]].tolist()
+    assert np.array_equal(linear.damping, 3.0 * own.mass + 1e-5 * own.stiffness)
 
 
 def test_other_types_of_numbers_are_read(tmp_path):

@@ -6,7 +6,7 @@ from solver.outcome import Outcome
 from solver.results.history import WearHistory
 
 LIKE_VOLUME = ("worn_volume", "wear_rate", "penetration", "tension", "cone_violation", "energy_error")
-LIKE_DEPTH = ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "response_peak")
+LIKE_DEPTH = ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "response_mean", "response_peak")
 
 
 def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED, loops: np.ndarray | None = None) -> WearHistory:

@@ -8,9 +8,10 @@ from scipy import io
 
 from solver import SolverSettings, march_wear
 from studies.finite_element.joint.surfaces import surface_of_nodes
+from studyrunner.cli import main
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.study.study_file import read_study
-from tests.studies.fe_models.matrix_files import write_abaqus, write_nastran
+from tests.studies.fe_models.matrix_files import write_matrix_input, write_punch
 from tests.studies.fe_models.plates import Plates
 from tests.studyrunner.test_model_studies import message, scene_of
 
@@ -88,21 +89,21 @@ def test_cdb(folder):
 
 @pytest.mark.parametrize("triangles", ["lower", "both"])
 def test_abaqus(folder, triangles):
-    write_abaqus(folder, "job", triangles, Plates().system())
+    write_matrix_input(folder, *Plates().system(), triangles)
     check_same(scene_of("scene.matrices=job"), scene_of())
     check_same(scene_of("scene.matrices=job_STIF1.mtx"), scene_of())
 
 
 def test_nastran(folder):
-    write_nastran(folder, "job", system=Plates().system())
+    write_punch(folder, *Plates().system())
     check_same(scene_of("scene.matrices=job"), scene_of(), 1e-5)  # of 10 digits, and thin plates
 
 
-def test_a_table_of_nodes_with_matrices_wears_as_the_deck(folder):
+def test_a_table_of_nodes_with_matrices_wears_as_the_deck(folder, capsys):
     """Matrices of all nodes that are not held; forces at the tip as a column beside them."""
     plates = Plates()
-    stiffness, mass, node, dof = plates.system()
-    free = ~np.isin(node, plates.numbers["GROUND"])
+    whole, rows = plates.system()
+    free = ~np.isin(rows[:, 0], plates.numbers["GROUND"])
     surface = surface_of_nodes(plates.mesh, "UNDER", plates.sets["UNDER"])
     area, normals = surface.areas_and_normals(plates.mesh.coordinates)
     lines = ["node,x,y,z,sets,area,normal_x,normal_y,normal_z"]
@@ -113,22 +114,35 @@ def test_a_table_of_nodes_with_matrices_wears_as_the_deck(folder):
             place = map(repr, plates.mesh.coordinates[row].tolist())
             lines.append(",".join(map(str, [number, *place, sets, *contact[0]])))
     (folder / "nodes.csv").write_text("\n".join(lines) + "\n")
-    named = {name: each[np.ix_(free, free)] for name, each in (("stiffness", stiffness), ("mass", mass))}
-    io.savemat(folder / "job.mat", {**named, "rows": np.stack([node, dof], axis=1)[free]})
+    named = {name: each[np.ix_(free, free)] for name, each in whole.items()}
+    io.savemat(folder / "job.mat", {**named, "rows": rows[free]})
+    tip = [f"{number},3,{2e3 / len(plates.sets['TIP'])!r}" for number in plates.numbers["TIP"]]
+    (folder / "stress.csv").write_text("\n".join(["node,dof,end [MPa]", *tip]) + "\n")
     (folder / "wear.toml").write_text(STUDY.replace("[axes]", "stuck_modes = 200\n[axes]", 1))
+    of_table = '"nodes.csv"\nmatrices = "job"\nrecovery = "stress.csv"'
     (folder / "table.toml").write_text(
-        (folder / "wear.toml").read_text().replace('"lap.inp"', '"nodes.csv"\nmatrices = "job"')
+        (folder / "wear.toml").read_text().replace('"lap.inp"', of_table)
         .replace('clamp = ["GROUND"]\n', "").replace("material =", "# material =")
     )  # fmt: skip
+    assert main(["table.toml", "--check"]) == 0
+    assert "rigid      5 motions with all pairs open" in capsys.readouterr().out
     expected, found = (build_study_scene(read_study(name)) for name in ("wear.toml", "table.toml"))
     check_same(found, expected)
     settings = SolverSettings(harmonics=1, samples=32)
     worn = [
-        march_wear(each, 300.0, 20.0, 0.3, 1e-11, 1e3, scheme="implicit", step=500.0, settings=settings).worn_volume[-1]
+        march_wear(each, 300.0, 20.0, 0.3, 1e-11, 1e3, scheme="implicit", step=500.0, settings=settings)
         for each in (expected, found)
     ]
-    assert worn[0] > 0.0
-    assert worn[1] == pytest.approx(worn[0], rel=1e-9)
+    volumes = [each.worn_volume[-1] for each in worn]
+    assert volumes[0] > 0.0
+    assert volumes[1] == pytest.approx(volumes[0], rel=1e-9)
+    # 2000 MPa over 1 m of the tip
+    for name in ("response", "response_mean", "response_peak"):
+        displacement, stress = getattr(worn[1], name).T
+        np.testing.assert_allclose(stress, 2e3 * displacement, rtol=1e-9)
+        np.testing.assert_allclose(displacement, getattr(worn[0], name)[:, 0], rtol=1e-6)
+    # vibration about the mean
+    assert (worn[1].response_peak <= abs(worn[1].response_mean) + 1.1 * abs(worn[1].response)).all()
 
 
 @pytest.mark.parametrize(
@@ -147,5 +161,5 @@ def test_a_table_of_nodes_with_matrices_wears_as_the_deck(folder):
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_a_sentence(overrides, expected, folder):
     (folder / "lap.med").write_text("")
-    write_abaqus(folder, system=Plates().system())
+    write_matrix_input(folder, *Plates().system())
     assert expected in message(*overrides)

@@ -95,7 +95,7 @@ def test_from_deck_to_worn_volume(folder, capsys):
         (["scene.load.set=TOP"], 'wear.toml: scene.load.set: there is no set of nodes or surface "TOP"'),
         (["scene.response.tip.set=TPI"], 'scene.response.tip.set: there is no set of nodes or surface "TPI"'),
         (["scene.model=none.inp"], "scene.model: there is no file none.inp: give a path relative to the study file"),
-        (["scene.matrices=none"], "scene.matrices: there is no none.sti, none_STIF1.mtx"),
+        (["scene.matrices=none"], "scene.matrices: there is no none.sti, "),
         (["scene.units=inch"], 'scene.units = "inch": give'),
         (["scene.n_sectors=47"], "scene.n_sectors: cut faces are 30 degrees apart, 47 sectors need 7.66: give"),
         (["scene.friction_coefficient={BLADE=0.3}"], "coefficient.BLADE: no contact has this name: give one of"),

@@ -25,7 +25,7 @@ EXAMPLES = [
 
 @pytest.fixture
 def files(folder):
-    """What the examples name: a result, a scene file, decks."""
+    """What the examples name: a result, a scene file, decks, reduced matrices."""
     depth = np.zeros((1, 1, 4, 24))
     coordinates = {"frequency": [211.5], "scheme": ["adaptive"], "cycle": [0.0, 1e4, 5e4, 1e5]}
     result = xr.Dataset({"wear_depth": (("frequency", "scheme", "cycle", "contact"), depth)}, coordinates)
@@ -33,6 +33,8 @@ def files(folder):
     assert main(["sdof_slider", "--write-scene", "my_root.h5"]) == 0
     shutil.copy(SECTOR, "sector.inp")
     shutil.copy(ROOT / "studies" / "blade_root.inp", "blade_root.inp")
+    for name in ("nodes.csv", "blade.pch", "stress.csv"):
+        Path(name).touch()
 
 
 @pytest.mark.parametrize("text", EXAMPLES)

@@ -68,7 +68,7 @@ CONTRACT = {
         (("cycle", "contact"), "m", "wear_depth slip_range wear_depth_error"),
         (("cycle", "contact"), "Pa", "mean_pressure"),
         (("cycle", "contact"), "1", "open_fraction"),
-        (("cycle", "response"), "m", "response_amplitude response_peak"),
+        (("cycle", "response"), "m", "response_amplitude response_mean response_peak"),
         (("cycle", "response"), "rad", "response_phase"),
         (("cycle",), "1", "residual penetration tension cone_violation energy_error response_error wear_rate_error"),
         (("cycle",), "1", "worn_volume_error harmonics_used samples_used stable"),

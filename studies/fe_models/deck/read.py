@@ -12,10 +12,6 @@ from studies.fe_models.deck.resolve import resolve
 from studies.fe_models.text.keyword_lines import Block, read_blocks, read_name
 from studies.fe_models.text.read_errors import shown
 
-_LONG = ("NODE", "ELEMENT", "NSET", "ELSET")
-_MOST_LINES = 300_000  # of all other keywords that are read: a surface of so many faces takes seconds
-_MOST_LONG = 6_000_000  # of these, those of a part once for each of its instances
-_MOST_INSTANCES = 1000
 _OF_PARTS = ("PART", "ENDPART", "INSTANCE", "ENDINSTANCE")
 
 
@@ -55,7 +51,6 @@ def read_deck(path: Path) -> Deck:
 class _Reading:
     def __init__(self, draft: Draft) -> None:
         self.draft = draft
-        self.left = {True: _MOST_LONG, False: _MOST_LINES}
 
     def take(self, block: Block) -> None:
         """The next keyword of the file: of a part it is put aside until there is an instance."""
@@ -68,15 +63,7 @@ class _Reading:
         elif draft.part:
             draft.parts[draft.part].append(block)
         else:
-            self._read(block)
-
-    def _read(self, block: Block) -> None:
-        long = block.keyword in _LONG
-        self.left[long] -= len(block.lines)
-        if self.left[long] < 0:
-            most, remedy = (_MOST_LONG if long else _MOST_LINES), "name what is meant by sets of nodes or elements"
-            raise block.place.wrong(f"more than {most} lines below *{block.written} and others", remedy)
-        read_keyword(self.draft, block)
+            read_keyword(draft, block)
 
     def _part(self, block: Block) -> None:
         name = block.name("NAME")
@@ -94,12 +81,10 @@ class _Reading:
         if part not in draft.parts or draft.part or draft.scope or name in draft.placed:
             found = f"*INSTANCE {shown(name)} of {shown(part)}, which is no part, or again"
             raise block.place.wrong(found, "give *PART above it, and each instance once")
-        if len(draft.placed) >= _MOST_INSTANCES:
-            raise block.place.wrong(f"more than {_MOST_INSTANCES} instances", "reduce the model")
         draft.placed[name] = read_placement(block)
         draft.scope, draft.system = name, draft.world
         for each in draft.parts[part]:
-            self._read(each)
+            read_keyword(draft, each)
         # sets of the assembly with all of the instance
         for parameter, sets in (("NSET", draft.node_sets), ("ELSET", draft.element_sets)):
             if parameter in block.parameters:

@@ -12,9 +12,7 @@ from studies.fe_models.text.keyword_lines import Block, read_name
 from studies.fe_models.text.numbers import LARGEST_NUMBER, is_integer, read_fields, read_integer
 from studies.fe_models.text.read_errors import Place, shown
 
-_MOST_MEMBERS = 50_000_000  # of all sets together
 _DEEPEST = 100
-_MOST_NOTES = 100
 
 Key = tuple[str, str]
 """Scope and name of a set or surface. The scope is the name of an instance, "" outside of instances."""
@@ -157,7 +155,6 @@ class Resolver:
         self.notes: list[str] = []
         self._done: dict[Key, IntArray] = {}
         self._open: list[Key] = []
-        self._left = _MOST_MEMBERS
 
     def find(self, reference: Reference) -> IntArray:
         """Numbers (m,) that a reference stands for, ascending. Raises SceneError where there is no such set."""
@@ -172,7 +169,7 @@ class Resolver:
         raise reference.place.wrong(found, "define it, or remove it here")
 
     def members(self, key: Key, place: Place) -> IntArray:
-        """Numbers (m,) of a set, ascending. Raises SceneError where it contains itself, or all become too many."""
+        """Numbers (m,) of a set, ascending. Raises SceneError where it contains itself."""
         if key in self._done:
             return self._done[key]
         if key in self._open:
@@ -183,19 +180,11 @@ class Resolver:
         parts = [np.empty(0, dtype=np.int64)]
         for item in self.sets.items[key]:
             parts.append(self.find(item) if isinstance(item, Reference) else self._kept(item, f"set {shown(key[1])}"))
-            self._count(parts[-1].size, place)
         if self.nodes_of is not None:
-            for reference in self.sets.of_elements.get(key, ()):
-                parts.append(self.nodes_of(reference))
-                self._count(parts[-1].size, place)
+            parts += [self.nodes_of(reference) for reference in self.sets.of_elements.get(key, ())]
         self._open.pop()
         self._done[key] = np.unique(np.concatenate(parts)).astype(np.int64)
         return self._done[key]
-
-    def _count(self, n: int, place: Place) -> None:
-        self._left -= n
-        if self._left < 0:
-            raise place.wrong(f"the sets have more than {_MOST_MEMBERS} members", "remove sets that are not used")
 
     def _kept(self, members: _Members, where: str) -> IntArray:
         """Those numbers that exist; a note says which of those that are named do not."""
@@ -214,8 +203,6 @@ class Resolver:
         there = (self.existing[at] == numbers) & (numbers <= last_of_scope)
         if not there.all():
             missing = members.numbers[~there]
-            if len(self.notes) < _MOST_NOTES:
-                self.notes.append(
-                    f"{where}: {missing.size} of its {self.sets.what} do not exist, the first is {missing[0]}."
-                )
+            what = self.sets.what
+            self.notes.append(f"{where}: {missing.size} of its {what} do not exist, the first is {missing[0]}.")
         return np.asarray(numbers[there])

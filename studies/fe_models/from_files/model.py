@@ -31,7 +31,7 @@ from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.fe_models.mesh_files import read_mesh_file
 from studies.fe_models.model_files import ModelFiles
-from studies.fe_models.nodal_matrices import order_by_nodes
+from studies.fe_models.nodal_matrices import NodalMatrices, order_by_nodes
 from studies.fe_models.units import Units, find_units
 from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.joint.cut_faces import CyclicAxis
@@ -106,16 +106,13 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     surfaces = find_surfaces(selections, parameters, units, axis)
     cut, clamped = find_cut(selections, parameters, axis, surfaces.contacts), find_clamped(selections, parameters)
     on_cut = np.empty(0, dtype=np.int64) if cut is None else np.concatenate([cut.left, cut.right])
-    matrices, nodal, held_speed = None, None, None
+    imported = None
     if files.matrices:
-        matrices = _read_matrices(files, parameters, deck, progress)
-        if deck.contact_nodes is not None:
-            check_table(deck, matrices, parameters, mesh.numbers[on_cut])
-        else:
-            held_speed = _check_export(deck, matrices, mesh, surfaces, parameters, units, rotation)
-        nodal = order_by_nodes(matrices, units, mesh.numbers, mesh.coordinates)
-        clamped = None if clamped is None else np.pad(clamped, ((0, len(nodal.missing) - len(clamped)), (0, 0)))
-    numbers = mesh.numbers if nodal is None else nodal.model.numbers
+        progress(f"reading {', '.join(path.name for path in files.matrices)}")
+        imported = _import(files, parameters, deck, mesh, surfaces, units, rotation)
+    numbers = mesh.numbers if imported is None else imported.nodal.model.numbers
+    if clamped is not None:
+        clamped = np.pad(clamped, ((0, len(numbers) - len(clamped)), (0, 0)))
     supported = find_constraints(deck, numbers, clamped, units, on_cut)
     selections = replace(selections, references=supported.references)
     preload = _preload(selections, parameters, units, supported)
@@ -124,17 +121,19 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         name: _motion(selections, each, f"response.{name}.set") for name, each in parameters.responses.items()
     }
     model: MeshModel | MatrixModel
-    if nodal is None or matrices is None:
+    if imported is None:
         model = MeshModel(mesh, rotation, parameters.stress_stiffening, preload, gravity, extra=supported.extra)
     else:
-        if deck.contact_nodes is None:
-            _check_free_nodes(matrices, mesh, np.asarray(supported.own[: mesh.n_nodes].all(axis=1)))
-        else:
+        matrices, nodal = imported.matrices, imported.nodal
+        if deck.contact_nodes is not None:
+            check_table(deck, matrices, parameters, mesh.numbers[on_cut])
             preload = preload + constant_forces(matrices, nodal, units, len(supported.held))
+        else:
+            _check_free_nodes(matrices, mesh, np.asarray(supported.own[: mesh.n_nodes].all(axis=1)))
         supported.held[: len(nodal.missing)] |= nodal.missing
         model = replace(nodal.model.with_nodes(supported.extra), rotation=rotation, preload=preload, gravity=gravity)
         if files.recovery is not None:
-            responses |= read_recovery(files.recovery, matrices, nodal, units)
+            responses |= read_recovery(files.recovery, matrices, nodal, units, responses)
     joint = JointDefinition(
         contacts=surfaces.contacts,
         held=supported.held,
@@ -146,7 +145,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         constraints=supported.constraints,
         pairs=_pairs_of_table(deck, model, surfaces, units, axis),
     )
-    return LoadedModel(deck, units, mesh, model, joint, held_speed)
+    return LoadedModel(deck, units, mesh, model, joint, None if imported is None else imported.omega_squared_held)
 
 
 def _check_assembled(deck: Deck, units: Units) -> None:
@@ -204,17 +203,45 @@ def _pressed(deck: Deck, mesh: SolidMesh, n_nodes: int, units: Units) -> FloatAr
     return forces
 
 
-def _read_matrices(files: ModelFiles, parameters: Parameters, deck: Deck, progress: Progress) -> Matrices:
-    """The matrices of a model; its mesh is that of the deck. Raises SceneError."""
+@dataclass(frozen=True)
+class _Imported:
+    """Matrices of another program, by rows and by nodes; omega_squared_held as in `LoadedModel`."""
+
+    matrices: Matrices
+    nodal: NodalMatrices
+    omega_squared_held: float | None
+
+
+def _import(
+    files: ModelFiles,
+    parameters: Parameters,
+    deck: Deck,
+    mesh: SolidMesh,
+    surfaces: Surfaces,
+    units: Units,
+    rotation: Rotation | None,
+) -> _Imported:
+    """Reads matrices; those of a mesh are whole, and nothing joins surfaces in contact. Raises SceneError."""
     if not parameters.stress_stiffening:
         raise SceneError("stress_stiffening", "false", "leave it out: the matrices hold it or not")
     if deck.n_instances > 1:
         found = f"{deck.path} has {deck.n_instances} instances, whose nodes have other numbers in matrices"
         raise SceneError("matrices", found, "write a flat deck, or leave `matrices` out")
-    progress(f"reading {', '.join(path.name for path in files.matrices)}")
-    matrices = read_matrices(files.matrices[0])
+    matrices, held_speed = read_matrices(files.matrices[0]), None
     check_mesh_is_of_matrices(deck, matrices)
-    return matrices
+    if deck.contact_nodes is None:
+        check_translations(matrices)
+        check_units(deck, mass_of(deck, matrices), units)
+        check_mass(deck, matrices, units)
+        for each in (*surfaces.contacts, *surfaces.ties):
+            for surface in (each.first, each.second):
+                check_nodes_have_dofs(matrices, mesh.numbers[surface.nodes], surface.name)
+        for each in surfaces.contacts:
+            nodes = mesh.numbers[each.first.nodes], mesh.numbers[each.second.nodes]
+            check_contact_removed(deck, matrices, nodes, (each.first.name, each.second.name), units)
+        if rotation is not None:
+            held_speed = _check_rotation(deck, matrices, rotation, parameters, units)
+    return _Imported(matrices, order_by_nodes(matrices, units, mesh.numbers, mesh.coordinates), held_speed)
 
 
 def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotation | None) -> Retainer | None:
@@ -228,31 +255,6 @@ def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotatio
     if axis is None:
         raise SceneError("retention_direction", "missing", "give it: the model has no axis")
     return Retainer(parameters.retention_stiffness, axis)
-
-
-def _check_export(
-    deck: Deck,
-    matrices: Matrices,
-    mesh: SolidMesh,
-    surfaces: Surfaces,
-    parameters: Parameters,
-    units: Units,
-    rotation: Rotation | None,
-) -> float | None:
-    """The matrices are those of the mesh, with the nodes of all surfaces, and nothing joins those in contact.
-
-    Returns the square of the speed that they hold, as `_check_rotation` does.
-    """
-    check_translations(matrices)
-    check_units(deck, mass_of(deck, matrices), units)
-    check_mass(deck, matrices, units)
-    for each in (*surfaces.contacts, *surfaces.ties):
-        for surface in (each.first, each.second):
-            check_nodes_have_dofs(matrices, mesh.numbers[surface.nodes], surface.name)
-    for each in surfaces.contacts:
-        nodes = mesh.numbers[each.first.nodes], mesh.numbers[each.second.nodes]
-        check_contact_removed(deck, matrices, nodes, (each.first.name, each.second.name), units)
-    return None if rotation is None else _check_rotation(deck, matrices, rotation, parameters, units)
 
 
 def _check_free_nodes(matrices: Matrices, mesh: SolidMesh, held: FloatArray) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -50,12 +50,15 @@ def constant_forces(matrices: Matrices, nodal: NodalMatrices, units: Units, n_no
     return found
 
 
-def read_recovery(path: Path, matrices: Matrices, nodal: NodalMatrices, units: Units) -> Mapping[str, RowMotion]:
+def read_recovery(
+    path: Path, matrices: Matrices, nodal: NodalMatrices, units: Units, taken: Collection[str]
+) -> Mapping[str, RowMotion]:
     """Quantities by name, as sums over the displacements of a model.
 
-    A quantity with a unit in its name, as "root stress [MPa]", has this unit; one without is a displacement, m.
+    A quantity with a unit in its name, as "root stress [MPa]", has this unit; one without is a displacement, m. taken:
+    names of other responses.
 
-    Raises SceneError about "recovery" where a column is no numbers, or a row is none of the matrices.
+    Raises SceneError about "recovery" where a column is no numbers, a row is none of the matrices, or a name is taken.
     """
     with library_errors(path, "pandas", "pandas", "recovery"):
         table = pd.read_csv(path, skipinitialspace=True)
@@ -68,6 +71,9 @@ def read_recovery(path: Path, matrices: Matrices, nodal: NodalMatrices, units: U
         unknown = "no quantity" if not names else f"node {rows[own < 0][0][0]} with dof {rows[own < 0][0][1]} is no row"
         remedy = f"give a column for each quantity, over the rows of {matrices.files[0]}"
         raise SceneError("recovery", f"{path.name}: {unknown}", remedy)
+    twice = [name for name in names if name in taken]
+    if twice:
+        raise SceneError("recovery", f"{path.name}: a response has the name {twice[0]} as well", "give another name")
     motions = {}
     for name, column in zip(names, values.T, strict=True):
         weights = np.zeros(nodal.missing.size)

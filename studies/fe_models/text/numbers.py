@@ -73,37 +73,21 @@ def read_floats(block: Block, line: int, least: int) -> list[float]:
 
 def read_points(block: Block) -> tuple[IntArray, FloatArray]:
     """Numbers (n,) and coordinates (n, 3) of data lines "number, x, y, z"; coordinates that are missing are 0."""
-    n = len(block.lines)
-    numbers = np.empty(n, dtype=np.int64)
-    coordinates = np.zeros((n, 3))
-    step = 50_000
-    for first in range(0, n, step):
-        lines = block.lines[first : first + step]
-        last = first + len(lines)
-        text = ",".join(lines)
-        if "_" not in text and all(line.count(",") == 3 for line in lines):
-            parts = text.split(",")
-            try:
-                numbers[first:last] = list(map(int, parts[::4]))
-                for axis in range(3):
-                    coordinates[first:last, axis] = list(map(float, parts[axis + 1 :: 4]))
-            except (ValueError, OverflowError):
-                pass
-            else:
-                if (
-                    np.isfinite(coordinates[first:last]).all()
-                    and (numbers[first:last] > 0).all()
-                    and (numbers[first:last] <= LARGEST_NUMBER).all()
-                ):
-                    continue
-        for line in range(first, last):
-            place = block.place_of(line)
-            fields = read_fields(block, line)
-            if len(fields) > 4:
-                fields = fields[:4]  # Abaqus: direction of a normal behind the position
-            numbers[line] = read_integer(fields[0] if fields else "", place, "a node number")
-            values = [read_float(part, place) for part in fields[1:]]
-            coordinates[line] = values + [0.0] * (3 - len(values))
+    numbers = np.zeros(len(block.lines), dtype=np.int64)
+    coordinates = np.full((len(block.lines), 3), np.nan)
+    for line, text in enumerate(block.lines):
+        try:
+            number, x, y, z = text.split(",")
+            numbers[line], coordinates[line] = int(number), (float(x), float(y), float(z))
+        except (ValueError, OverflowError):
+            pass
+    plain = np.isfinite(coordinates).all(axis=1) & (numbers > 0) & (numbers <= LARGEST_NUMBER)
+    for line in np.flatnonzero(~plain).tolist():
+        place = block.place_of(line)
+        fields = read_fields(block, line)[:4]  # Abaqus: direction of a normal behind the position
+        numbers[line] = read_integer(fields[0] if fields else "", place, "a node number")
+        values = [read_float(part, place) for part in fields[1:]]
+        coordinates[line] = values + [0.0] * (3 - len(values))
     return numbers, coordinates
 
 
@@ -120,8 +104,6 @@ def read_records(block: Block, length: int, what: str) -> IntArray:
     for line, text in enumerate(block.lines):
         parts = text.rstrip(", \t").split(",")
         try:
-            if "_" in text:  # which int() takes for part of a number
-                raise ValueError
             values.extend(list(map(int, parts)))
         except (ValueError, OverflowError):
             for part in parts:

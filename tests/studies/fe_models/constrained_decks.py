@@ -1,18 +1,15 @@
 """Decks of two blocks in contact with what tests add to them, their glued frequencies, and those of CalculiX."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 
-from studies.fe_models.deck.read import read_deck
 from studies.fe_models.from_files.model import find_files, load_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.finite_element.reduced_joint import glued_frequencies, prepare_model
 from tests.studies.fe_models.decks import write
 from tests.studies.fe_models.solid_meshes import run_ccx
 
-FULL_MODEL = Path(__file__).parent / "full_model.inp"
 """A deck of two parts in one sector of twelve, with a coupling, equations and cylindrical directions."""
 
 
@@ -115,30 +112,3 @@ def of_calculix(folder, text, step="*STEP\n*FREQUENCY\n4\n*END STEP\n", every=1)
     table = (folder / "job.dat").read_text()
     rows = re.findall(rf"^ +\d+ +(?:\d+ +)?{number} +{number} +{number} +{number} *$", table, re.MULTILINE)
     return np.array([float(row[2]) for row in rows])[: 4 * every : every]
-
-
-def flat_full_model():
-    """FULL_MODEL without instances, for CalculiX: it holds no node that follows its image."""
-    deck = read_deck(FULL_MODEL)
-    places = zip(deck.node_numbers, deck.coordinates, strict=True)
-    lines = ["*NODE", *(f"{n}, {x:.14g}, {y:.14g}, {z:.14g}" for n, (x, y, z) in places)]
-    lines.append("*ELEMENT, TYPE=C3D8, ELSET=EALL1")
-    for block in deck.blocks:
-        rows = zip(block.numbers, block.nodes.tolist(), strict=True)
-        lines += [f"{n}, {', '.join(map(str, nodes))}" for n, nodes in rows]
-    for name, of_deck in (("SUP", "B.INSIDE"), ("SLOW", "D.OUTSIDE"), ("SE", "TIPFACE")):
-        faces = deck.surfaces[of_deck]
-        lines += [f"*SURFACE, NAME={name}", *(f"{e}, S{f}" for e, f in zip(faces.elements, faces.faces, strict=True))]
-    for name in ("LOWS", "HIGHS"):
-        lines += [f"*SURFACE, NAME={name}, TYPE=NODE", *(f"{n}," for n in deck.surfaces[name].nodes)]
-    alone = np.setdiff1d(deck.node_sets["BORE"], deck.surfaces["LOWS"].nodes)
-    lines += ["*NSET, NSET=BORE", *(f"{n}," for n in alone), "*TIE, NAME=G, POSITION TOLERANCE=0.1", "SUP, SLOW"]
-    lines += ["*TIE, CYCLIC SYMMETRY, NAME=CUT, POSITION TOLERANCE=0.1", "LOWS, HIGHS"]
-    lines += ["*CYCLIC SYMMETRY MODEL, N=12, TIE=CUT, NGRAPH=1", "0, 0, 0, 0, 0, 1"]
-    lines += [f"*COUPLING, CONSTRAINT NAME=C, REF NODE={deck.node_sets['TIP'][0]}, SURFACE=SE", "*KINEMATIC", "1, 3"]
-    for each in deck.equations:
-        terms = zip(each.nodes, each.dofs, each.coefficients, strict=True)
-        lines += ["*EQUATION", str(len(each.nodes)), ", ".join(f"{n}, {dof}, {value:g}" for n, dof, value in terms)]
-    lines += ["*TRANSFORM, NSET=BORE, TYPE=C", "0, 0, 0, 0, 0, 1", "*BOUNDARY", "BORE, 2, 3", "*MATERIAL, NAME=S"]
-    lines += ["*ELASTIC", "210000., 0.3", "*DENSITY", "7.85E-9", "*SOLID SECTION, ELSET=EALL1, MATERIAL=S", ""]
-    return "\n".join(lines)

@@ -1,4 +1,7 @@
-"""Files with matrices that the tests write, after the manuals of the codes, and matrices to write."""
+"""Files with matrices that the tests write, after the manuals of the codes.
+
+Each writer takes matrices and forces by name, and node and dof of the rows (n, 2), and writes job.*.
+"""
 
 import shutil
 import subprocess
@@ -21,77 +24,82 @@ def run_ccx(folder: Path, text: str, name: str = "sector") -> Path:
     return folder / name
 
 
-System = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-"""Stiffness and mass, dense, and node and direction (from 1) of the rows."""
-
-
-def chain(nodes: tuple[int, ...] = (1, 2, 10)) -> System:
-    """Stiffness and mass (dense, definite) of some nodes, and node and direction (from 1) of the rows."""
+def chain(nodes: tuple[int, ...] = (1, 2, 10)):
+    """Matrices (dense, definite) of some nodes, and their rows."""
     n = 3 * len(nodes)
     generator = np.random.default_rng(5)
     stiffness = generator.normal(size=(n, n))
     stiffness = 1e9 * (stiffness + stiffness.T + n * np.eye(n))
     mass = np.diag(np.arange(1.0, n + 1)) * 1e-3
     mass[0, 1] = mass[1, 0] = 2e-4
-    return stiffness, mass, np.repeat(nodes, 3), np.tile([1, 2, 3], len(nodes))
+    named = {"stiffness": stiffness, "mass": mass, "damping": mass, "load": np.arange(float(n))}
+    return named, np.stack([np.repeat(nodes, 3), np.tile([1, 2, 3], len(nodes))], axis=1)
 
 
-def entries(matrix: np.ndarray, lower: bool = False, both: bool = False) -> list[tuple[int, int, float]]:
-    """Row, column (from 0) and value of the upper triangle, column by column, or the lower one, or both."""
-    n = len(matrix)
-    found = [(row, column, matrix[row, column]) for column in range(n) for row in range(n) if matrix[row, column]]
-    return [(r, c, v) for r, c, v in found if both or (r >= c if lower else r <= c)]
+def entries(matrix, triangles="upper"):
+    """Row, column (from 0) and value of a triangle, or both, column by column."""
+    keep = {"upper": np.triu, "lower": np.tril, "both": np.asarray}[triangles](matrix)
+    return [(row, column, keep[row, column]) for column, row in np.argwhere(keep.T)]
 
 
-def write_calculix(
-    folder: Path, name: str = "job", nodes: tuple[int, ...] = (1, 2, 10), system: System | None = None
-) -> Path:
-    stiffness, mass, node, direction = system or chain(nodes)
-    for matrix, end in ((stiffness, "sti"), (mass, "mas")):
-        lines = [f"{r + 1} {c + 1}  {v:.13e}" for r, c, v in entries(matrix)]
-        (folder / f"{name}.{end}").write_text("\n".join(lines) + "\n")
-    (folder / f"{name}.dof").write_text("".join(f"{n}.{d}\n" for n, d in zip(node, direction, strict=True)))
-    return folder / name
+def write_calculix(folder, named, rows):
+    for name, end in (("stiffness", "sti"), ("mass", "mas")):
+        lines = [f"{r + 1} {c + 1}  {v:.13e}" for r, c, v in entries(named[name])]
+        (folder / f"job.{end}").write_text("\n".join(lines) + "\n")
+    (folder / "job.dof").write_text("".join(f"{node}.{dof}\n" for node, dof in rows))
 
 
-def write_abaqus(folder: Path, name: str = "job", triangles: str = "lower", system: System | None = None) -> Path:
-    stiffness, mass, node, direction = system or chain((1, 2, -7))
-    for matrix, end in ((stiffness, "STIF1"), (mass, "MASS1")):
-        lines = [
-            f"{node[r]},{direction[r]}, {node[c]},{direction[c]}, {v:.15e}"
-            for r, c, v in entries(matrix, triangles == "lower", triangles == "both")
-        ]
-        (folder / f"{name}_{end}.mtx").write_text("** a matrix\n" + "\n".join(lines) + "\n")
-    return folder / name
+def write_matrix_input(folder, named, rows, triangles="lower"):
+    """Of *MATRIX OUTPUT, FORMAT=MATRIX INPUT, and forces."""
+    for name, end in (("stiffness", "STIF1"), ("mass", "MASS1"), ("damping", "DMPV1")):
+        if name in named:
+            lines = [
+                f"{','.join(map(str, rows[r]))}, {','.join(map(str, rows[c]))}, {v:.16e}"
+                for r, c, v in entries(named[name], triangles)
+            ]
+            (folder / f"job_{end}.mtx").write_text("** a matrix\n" + "\n".join(lines) + "\n")
+    if "load" in named:
+        lines = [f"{node},{dof}, {value:.16e}" for (node, dof), value in zip(rows, named["load"], strict=True) if value]
+        (folder / "job_LOAD1.mtx").write_text("*CLOAD, OP=NEW\n" + "\n".join(lines) + "\n")
 
 
-def write_nastran(folder: Path, name: str = "job", large: bool = True, system: System | None = None) -> Path:
+def write_punch(folder, named, rows, large=True):
     """DMIG entries in large fields as Nastran punches them, or in small fields, two entries a line."""
-    stiffness, mass, node, direction = system or chain()
     lines = ["$ matrices of a superelement", "GRID,1,,0.,0.,0."]
-    for title, matrix in (("KAAX", stiffness), ("PAX", stiffness), ("MAAX", mass)):
-        lines.append(f"{'DMIG':8}{title:8}{0:8d}{9 if title == 'PAX' else 6:8d}{2:8d}{0:8d}")
-        for column in range(len(matrix)):
-            rows = [row for row in range(column, len(matrix)) if matrix[row, column]]
-            at = node[column], direction[column]
+    for title, of in (("KAAX", "stiffness"), ("MAAX", "mass"), ("BAAX", "damping"), ("PAX", "load")):
+        if of not in named:
+            continue
+        matrix = np.atleast_2d(named[of].T).T
+        lines.append(f"{'DMIG':8}{title:8}{0:8d}{9 if of == 'load' else 6:8d}{2:8d}{0:8d}")
+        for column in range(matrix.shape[1]):
+            node, dof = (1, 0) if of == "load" else rows[column]
+            own = [row for row in range(0 if of == "load" else column, len(matrix)) if matrix[row, column]]
             if large:
-                lines.append(f"{'DMIG*':8}{title:16}{at[0]:16d}{at[1]:16d}")
-                for row in rows:
-                    value = f"{matrix[row, column]:.9E}".replace("E", "D")
-                    lines.append(f"{'*':8}{node[row]:16d}{direction[row]:16d}{value:>16}")
+                lines.append(f"{'DMIG*':8}{title:16}{node:16d}{dof:16d}")
+                values = [f"{matrix[row, column]:.9E}".replace("E", "D") for row in own]
+                lines += [f"{'*':8}{rows[r][0]:16d}{rows[r][1]:16d}{v:>16}" for r, v in zip(own, values, strict=True)]
                 continue
-            groups = [f"{node[r]:8d}{direction[r]:8d}{_short(matrix[r, column]):>8}{'':8}" for r in rows]
-            lines.append(f"{'DMIG':8}{title:8}{at[0]:8d}{at[1]:8d}{'':8}{groups[0][:24]}")
-            for first in range(1, len(groups), 2):
-                lines.append(f"{'':8}{''.join(groups[first : first + 2])}")
-    (folder / f"{name}.pch").write_text("\n".join(lines) + "\n")
-    return folder / name
+            groups = [f"{rows[r][0]:8d}{rows[r][1]:8d}{_short(matrix[r, column]):>8}{'':8}" for r in own]
+            lines.append(f"{'DMIG':8}{title:8}{node:8d}{dof:8d}{'':8}{groups[0][:24] if groups else ''}")
+            lines += [f"{'':8}{''.join(groups[at : at + 2])}" for at in range(1, len(groups), 2)]
+    (folder / "job.pch").write_text("\n".join(lines) + "\n")
 
 
-def _short(value: float) -> str:
+def _short(value):
     """A number in 8 characters, as Nastran has it: 1.234+9."""
     mantissa, exponent = f"{value:.3e}".split("e")
     return f"{mantissa}{int(exponent):+d}"
+
+
+def write_user_element(folder, named, rows):
+    """Of *SUBSTRUCTURE MATRIX OUTPUT: a node for each row, as CalculiX writes it, four entries a line."""
+    lines = ["**", f"*USER ELEMENT, NODES={len(rows)}, LINEAR", "** ELEMENT NODES"]
+    lines += ["** " + ", ".join(str(node) for node, _ in rows[at : at + 10]) for at in range(0, len(rows), 10)]
+    lines += [f"{rows[0][1]}", *(f"{place}, {dof}" for place, (_, dof) in enumerate(rows[1:], 2))]
+    for kind, of in (("STIFFNESS", "stiffness"), ("MASS", "mass"), ("VISCOUS DAMPING", "damping")):
+        values = [f"{v:.16e}" for column in range(len(rows)) for v in named[of][: column + 1, column]]
+        lines += [f"*MATRIX,TYPE={kind}", *(" , ".join(values[at : at + 4]) for at in range(0, len(values), 4))]
+    (folder / "job.mtx").write_text("\n".join(lines) + "\n")
 
 
 def write_rows(folder, rows):
@@ -107,7 +115,7 @@ def write_mat_73(folder, named, rows):
     with h5py.File(folder / "job.mat", "w", userblock_size=512) as file:
         for name, values in {**named, "rows": rows.astype(float)}.items():
             if name != "mass":
-                file[name] = np.atleast_2d(values).T if values.ndim == 2 else values[None]
+                file[name] = values.T if values.ndim == 2 else values[None]
         columns = sparse.csc_array(named["mass"])
         group = file.create_group("mass")
         group.attrs["MATLAB_sparse"] = np.uint64(columns.shape[0])
@@ -127,41 +135,6 @@ def write_harwell_boeing(folder, named, rows):
     write_rows(folder, rows)
     for name, values in named.items():
         io.hb_write(folder / f"job_{name}.rb", sparse.csc_matrix(np.atleast_2d(values.T).T))
-
-
-def write_matrix_input(folder, named, rows):
-    """Of *MATRIX OUTPUT, FORMAT=MATRIX INPUT: one triangle, and forces."""
-    for name, end in (("stiffness", "STIF1"), ("mass", "MASS1"), ("damping", "DMPV1")):
-        lines = [f"{','.join(map(str, (*rows[r], *rows[c])))}, {v:.16e}" for r, c, v in entries(named[name], True)]
-        (folder / f"job_{end}.mtx").write_text("\n".join(lines) + "\n")
-    lines = [f"{node},{dof}, {value:.16e}" for (node, dof), value in zip(rows, named["load"], strict=True) if value]
-    (folder / "job_LOAD1.mtx").write_text("*CLOAD, OP=NEW\n" + "\n".join(lines) + "\n")
-
-
-def write_user_element(folder, named, rows, name="job"):
-    """Of *SUBSTRUCTURE MATRIX OUTPUT: a node for each row, as CalculiX writes it, four entries a line."""
-    lines = ["**", f"*USER ELEMENT, NODES={len(rows)}, LINEAR", "** ELEMENT NODES"]
-    lines += ["** " + ", ".join(str(node) for node, _ in rows[at : at + 10]) for at in range(0, len(rows), 10)]
-    lines += [f"{rows[0][1]}", *(f"{place}, {dof}" for place, (_, dof) in enumerate(rows[1:], 2))]
-    for kind, of in (("STIFFNESS", "stiffness"), ("MASS", "mass"), ("VISCOUS DAMPING", "damping")):
-        values = [f"{v:.16e}" for column in range(len(rows)) for v in named[of][: column + 1, column]]
-        lines += [f"*MATRIX,TYPE={kind}", *(" , ".join(values[at : at + 4]) for at in range(0, len(values), 4))]
-    (folder / f"{name}.mtx").write_text("\n".join(lines) + "\n")
-
-
-def write_punch(folder, named, rows):
-    """DMIG entries in large fields."""
-    lines = []
-    for title, of in (("KAAX", "stiffness"), ("MAAX", "mass"), ("BAAX", "damping"), ("PAX", "load")):
-        matrix = np.atleast_2d(named[of].T).T
-        lines.append(f"{'DMIG':8}{title:8}{0:8d}{9 if title == 'PAX' else 6:8d}{2:8d}{0:8d}{'':8}{'':8}")
-        for column in range(matrix.shape[1]):
-            at = rows[column] if title != "PAX" else (1, 0)
-            lines.append(f"{'DMIG*':8}{title:16}{at[0]:16d}{at[1]:16d}")
-            for row in range(column if title != "PAX" else 0, len(matrix)):
-                value = f"{matrix[row, column]:.9E}".replace("E", "D")
-                lines.append(f"{'*':8}{rows[row][0]:16d}{rows[row][1]:16d}{value:>16}")
-    (folder / "job.pch").write_text("\n".join(lines) + "\n")
 
 
 def op4_strings(column, sparsely):
@@ -221,4 +194,4 @@ REDUCED = {
     "op4 binary sparse": partial(write_op4, binary=True, sparsely=True),
     "op4 many rows": partial(write_op4, binary=True, sparsely=True, many=True),
 }
-"""What writes job.* with matrices and forces by name, of rows (n, 2) with node and dof."""
+"""Those of reduced matrices."""

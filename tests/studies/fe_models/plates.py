@@ -3,7 +3,6 @@
 import numpy as np
 
 from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness
-from tests.studies.fe_models.matrix_files import System
 from tests.studies.fe_models.solid_meshes import block, deck_lines, joined, node_set
 
 SETS = ("GROUND", "UNDER", "OVER", "TIP")
@@ -75,11 +74,12 @@ class Plates:
             lines += [component(name, numbers)]
         return "\n".join([*lines, "FINISH"]) + "\n"
 
-    def system(self) -> System:
-        """Stiffness and mass as this project assembles them, dense, and node and direction of the rows."""
+    def system(self):
+        """Stiffness and mass as this project assembles them, dense, by name; node and dof of the rows."""
         n = self.mesh.n_nodes
         stiffness, mass = assemble_stiffness(self.mesh), assemble_mass(self.mesh)
-        return stiffness.toarray(), mass.toarray(), np.repeat(self.mesh.numbers, 3), np.tile([1, 2, 3], n)
+        rows = np.stack([np.repeat(self.mesh.numbers, 3), np.tile([1, 2, 3], n)], axis=1)
+        return {"stiffness": stiffness.toarray(), "mass": mass.toarray()}, rows
 
 
 def component(name, numbers):

@@ -57,14 +57,6 @@ def test_matrices_of_another_mass(sector, factor):
 
 
 @needs_ccx
-def test_matrices_without_the_fixed_nodes_have_less_mass(sector):
-    deck, matrices = sector
-    rows = np.flatnonzero(~np.isin(matrices.node, deck.node_sets["BLADEC"]))
-    mass, stiffness = (part[rows][:, rows] for part in (matrices.mass, matrices.stiffness))
-    check_mass(deck, Matrices(stiffness, mass, matrices.node[rows], matrices.direction[rows], ("j",), "calculix"), SI)
-
-
-@needs_ccx
 def test_whole_export(sector):
     deck, matrices = sector
     blades, disks = deck.node_sets["BLADEC"], deck.node_sets["DISKC"]
@@ -91,16 +83,6 @@ def test_dofs_eliminated(tmp_path):
     check_nodes_have_dofs(matrices, deck.node_sets["DISKC"], "DISKS")
     # ties are no hindrance for a rigid translation
     assert omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
-
-
-@needs_ccx
-def test_held_model_does_not_tell_its_speed(tmp_path):
-    deck, matrices = exported(tmp_path, changed("*BOUNDARY,OP=NEW\n", ""))
-    assert omega_squared_of(deck, matrices, AXIS) is None
-    rotation = check_speed(deck, matrices, MM)
-    assert (rotation.omega_squared, rotation.point.tolist()) == (250000.0, [0.0, 0.0, 0.0])
-    with pytest.raises(SceneError, match=r"BORE: 18 of 21 nodes have no dof in sector.dof"):
-        check_nodes_have_dofs(matrices, deck.node_sets["BORE"], "BORE")
 
 
 CONTACT = """\

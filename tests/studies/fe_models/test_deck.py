@@ -72,12 +72,6 @@ def test_steps(cubes):
     assert (force.nodes.tolist(), force.dof, force.value) == ([15, 16, 17, 18], 3, -5.0)
 
 
-def test_what_was_skipped_is_said(cubes):
-    text = f"deck.inp, line {line_of('*NODE PRINT, NSET=TOP')}: *NODE PRINT"
-    assert cubes.skipped == (text,)
-    assert cubes.remarks == (("skipped", text),)
-
-
 def test_part_and_instance(tmp_path):
     deck = read_deck(write(tmp_path, PART))
     # shifted by 10 along x, then turned by 90 degrees about the line x = 10, y = 0

@@ -1,12 +1,10 @@
-"""Element matrices against scikit-fem, CalculiX and closed forms."""
+"""Element matrices against CalculiX and closed forms."""
 
 import shutil
 
 import numpy as np
 import pytest
-import skfem
 from scipy.sparse.linalg import spsolve
-from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from studies.finite_element.elements.assembly import (
     assemble_mass,
@@ -16,7 +14,7 @@ from studies.finite_element.elements.assembly import (
     check_elements,
     spin_softening,
 )
-from studies.finite_element.elements.kinds import ASSEMBLED_KINDS, ELEMENT_KINDS
+from studies.finite_element.elements.kinds import ASSEMBLED_KINDS
 from studies.finite_element.elements.solid_mesh import ElementGroup, Rotation, SolidMesh
 from studies.scene_error import SceneError
 from tests.studies.fe_models.solid_meshes import (
@@ -32,15 +30,6 @@ from tests.studies.fe_models.solid_meshes import (
 
 KINDS = ASSEMBLED_KINDS
 needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
-
-# How scikit-fem names the element, and the degree that makes it take the same integration points.
-SCIKIT_FEM = {
-    "C3D4": (skfem.MeshTet1, skfem.ElementTetP1(), 1),
-    "C3D8": (skfem.MeshHex1, skfem.ElementHex1(), 3),
-    "C3D10": (skfem.MeshTet1, skfem.ElementTetP2(), 2),
-    "C3D20": (skfem.MeshHex1, skfem.ElementHexS2(), 5),
-    "C3D20R": (skfem.MeshHex1, skfem.ElementHexS2(), 3),
-}
 
 
 def skewed(points):
@@ -63,40 +52,6 @@ def warped(seed):
         return skewed(points + moved)
 
     return shape
-
-
-@pytest.mark.parametrize("kind", SCIKIT_FEM)
-def test_agrees_with_scikit_fem(kind):
-    mesh, _ = block(kind, (2, 1, 1), skewed)
-    make, element, degree = SCIKIT_FEM[kind]
-    n_corners = len(ELEMENT_KINDS[kind].reference.corners)
-    elements = mesh.groups[0].nodes
-    corners, renumbered = np.unique(elements[:, :n_corners], return_inverse=True)
-    order = range(4)
-    if n_corners == 8:
-        own = ELEMENT_KINDS[kind].reference.corners
-        order = [int(np.flatnonzero((2.0 * p - 1.0 == own).all(axis=1))[0]) for p in skfem.refdom.RefHex.p.T]
-    cells = renumbered.reshape(-1, n_corners)[:, order]
-    theirs = make(mesh.coordinates[corners].T.copy(), np.ascontiguousarray(cells.T))
-    basis = skfem.Basis(theirs, skfem.ElementVector(element), intorder=degree)
-    stiffness = linear_elasticity(*lame_parameters(STEEL.young_modulus, STEEL.poisson_ratio)).assemble(basis)
-
-    @skfem.BilinearForm
-    def inertia(u, v, _):
-        return STEEL.density * skfem.helpers.dot(u, v)
-
-    mass = inertia.assemble(basis)
-    # their dofs by place and direction
-    place = np.argmin(np.linalg.norm(basis.doflocs.T[:, None] - mesh.coordinates, axis=2), axis=1)
-    direction = np.empty(basis.N, dtype=int)
-    for dofs in (basis.nodal_dofs, basis.edge_dofs):
-        for row, members in enumerate(dofs):
-            direction[members] = row % 3
-    number = 3 * place + direction
-    assert len(np.unique(number)) == basis.N
-    for own, reference in ((assemble_stiffness(mesh), stiffness), (assemble_mass(mesh), mass)):
-        reference = reference.toarray()
-        assert np.abs(own.toarray()[np.ix_(number, number)] - reference).max() < 1e-12 * np.abs(reference).max()
 
 
 @needs_ccx
@@ -197,22 +152,3 @@ def test_inverted_element_is_named():
     check_elements(mesh)
     with pytest.raises(SceneError, match=r"element 4 \(C3D10\) is turned inside out"):
         check_elements(wrong)
-
-
-def test_elements_without_matrices_are_named():
-    mesh, _ = block("C3D8R", (1, 1, 1))
-    with pytest.raises(SceneError, match=r"element 1 is a C3D8R, .*; give matrices, or use one of C3D4, "):
-        check_elements(mesh)
-
-
-@pytest.mark.parametrize("kind", ELEMENT_KINDS)
-def test_faces_point_outwards_and_hold_their_mid_side_nodes(kind):
-    reference = ELEMENT_KINDS[kind].reference
-    nodes, centre = reference.nodes, reference.corners.mean(axis=0)
-    for loop in ELEMENT_KINDS[kind].faces:
-        n = {3: 3, 6: 3, 4: 4, 8: 4}[len(loop)]
-        corners = nodes[list(loop[:n])]
-        normal = np.cross(corners[1] - corners[0], corners[2] - corners[1])
-        assert normal @ (corners.mean(axis=0) - centre) > 0.0
-        for place, middle in enumerate(loop[n:]):
-            assert np.allclose(nodes[middle], 0.5 * (corners[place] + corners[(place + 1) % n]))

@@ -1,19 +1,13 @@
 """Reduced models against dense linear algebra, the bundled dovetail and closed forms."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy import linalg, sparse
 
 from studies.fe_models.from_files.check import describe_rest
-from studies.fe_models.matrices.matrices import Matrices
-from studies.fe_models.nodal_matrices import order_by_nodes
-from studies.fe_models.units import find_units
 from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness, spin_softening
 from studies.finite_element.elements.solid_mesh import Material, Rotation
 from studies.finite_element.joint import ordering, reduction
-from studies.finite_element.joint.cut_faces import find_cut_faces
 from studies.finite_element.joint.pairing import ContactSurfaces
 from studies.finite_element.joint.surfaces import surface_of_faces
 from studies.finite_element.joint_model import (
@@ -27,8 +21,6 @@ from studies.finite_element.joint_model import (
 from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.model_check import check_model
 from studies.scene_error import SceneError
-from studies.scenes import dovetail_sector
-from studies.scenes.dovetail_sector import Parameters
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, faces_where, wedge_shape
 from tests.studies.fe_models.solid_meshes import block, joined
 
@@ -133,55 +125,6 @@ def test_pairs_on_cut_faces_and_planes_of_symmetry():
     assert np.array_equal(present, np.arange(len(present)))
     assert (contact.dofs[:, 0] >= 0).all()
     check_model(scene.model)
-
-
-def as_foreign_model(parameters):
-    """The bundled sector as a deck gives it: pairs, cut faces and layers are found, not known."""
-    model, joint = dovetail_sector.define_sector(parameters)
-    cut = find_cut_faces(
-        model.coordinates, model.numbers, model.mesh.bodies, joint.cut.axis, np.empty(0, dtype=np.int64)
-    )
-    return replace(model, layers=None), replace(joint, pairs=None, cut=cut)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("nodal_diameter", [0, 3])
-def test_bundled_dovetail_as_a_foreign_model(nodal_diameter):
-    parameters = Parameters(mesh=1, nodal_diameter=nodal_diameter)
-    expected = dovetail_sector.build(parameters, 2)
-    options = ReductionOptions(nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
-    model = build_fe_scene(*as_foreign_model(parameters), options, 2).model
-    check_model(model, 2)
-    assert model.linear.keys() == expected.linear.keys()
-    # pairs by their places, relative displacements by their frames
-    theirs, ours = expected.contact, model.contact
-    apart = np.linalg.norm(theirs.position[:, None] - ours.position, axis=2)
-    place = apart.argmin(axis=1)
-    assert apart.min(axis=1).max() < 1e-9
-    assert np.allclose(ours.area[place], theirs.area, rtol=1e-10)
-    frames = dovetail_sector.define_sector(parameters)[1].pairs.frames
-    own_frames = build_fe_scene(*as_foreign_model(parameters), options, 0).pairs.frames
-    n = 3 * theirs.n_contact
-    size = n + parameters.stuck_modes
-    turn = np.zeros((size, size))
-    for row, column in enumerate(place):
-        part = frames[row] @ own_frames[column].T
-        assert np.allclose(np.abs(part), np.eye(3), atol=1e-9)
-        turn[3 * row : 3 * row + 3, 3 * column : 3 * column + 3] = part
-    for k, linear in model.linear.items():
-        reference = expected.linear[k]
-        for name in ("stiffness", "mass", "damping"):
-            matrix, other = getattr(linear, name), getattr(reference, name)
-            relative = turn[:n, :n] @ matrix[:n, :n] @ turn[:n, :n].T
-            assert np.abs(relative - other[:n, :n]).max() < 1e-8 * np.abs(other[:n, :n]).max()
-        modal = np.diag(linear.stiffness)[n:].real
-        assert np.allclose(modal, np.diag(reference.stiffness)[n:].real, rtol=1e-8)
-        static = (turn[:n, :n] @ linear.load_static[:n], reference.load_static[:n])
-        assert np.abs(static[0] - static[1]).max() <= 1e-8 * np.abs(static[1]).max()
-        # modes may differ by a phase
-        for name in ("load_harmonic", "response"):
-            sizes = [np.abs(np.ravel(getattr(each, name))[n:]) for each in (linear, reference)]
-            assert np.abs(sizes[0] - sizes[1]).max() <= 1e-6 * sizes[1].max()
 
 
 def plates(lower="C3D10", upper="C3D8", prestress=False):
@@ -313,29 +256,6 @@ def test_matrices_with_nodes_that_have_no_place():
     assert np.allclose(ours.summary.glued_frequencies[0], reference.summary.glued_frequencies[0], rtol=1e-9)
     assert ours.summary.mass == pytest.approx(reference.summary.mass, rel=1e-12)
     assert np.isfinite(ours.model.linear[0].load_static).all()
-
-
-def test_matrices_are_put_in_the_order_of_the_nodes():
-    model, _ = plates()
-    stiffness, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
-    n = model.mesh.n_nodes
-    rows = np.random.default_rng(5).permutation(3 * n)
-    left_out = rows == 17
-    rows = rows[~left_out]
-    # and a node that the mesh does not have
-    more = sparse.block_diag([stiffness[rows][:, rows], sparse.eye(3)], format="csr")
-    node = np.append(model.numbers[rows // 3], [-4, -4, -4])
-    direction = np.append(rows % 3, [2, 0, 1])
-    heavy = sparse.block_diag([mass[rows][:, rows], sparse.diags([1.0, 2.0, 3.0])], format="csr")
-    given = Matrices(sparse.csr_array(more), sparse.csr_array(heavy), node, direction, ("job",), "table")
-    ordered = order_by_nodes(given, find_units("SI"), model.numbers, model.coordinates)
-    assert np.array_equal(np.argwhere(ordered.missing), [[17 // 3, 17 % 3]])
-    found = ordered.model
-    assert found.numbers[-1] == -4
-    assert np.isnan(found.coordinates[-1]).all()
-    kept = np.setdiff1d(np.arange(3 * n), [17])
-    assert np.abs(found.stiffness[kept][:, kept] - stiffness[kept][:, kept]).max() == 0.0
-    assert np.array_equal(found.mass.diagonal()[-3:], [2.0, 3.0, 1.0])
 
 
 @pytest.mark.parametrize("small", [0, 900])

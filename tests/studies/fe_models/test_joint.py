@@ -9,7 +9,6 @@ from studies.finite_element.joint.closest_point import closest_points
 from studies.finite_element.joint.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
 from studies.finite_element.joint.pairing import ContactSurfaces, build_contact_pairs
 from studies.finite_element.joint.surfaces import (
-    describe_mesh,
     loops_of_faces,
     pressure_forces,
     surface_of_faces,
@@ -58,19 +57,6 @@ def test_areas_and_normals_of_a_cylinder(kind):
     again = surface_of_nodes(mesh, "INSIDE", nodes)
     assert np.array_equal(again.nodes, nodes)
     assert np.allclose(again.areas_and_normals(mesh.coordinates)[0], area, rtol=1e-12)
-
-
-def test_pictured_faces_close_the_body():
-    for kind in ("C3D10", "C3D15", "C3D20"):
-        mesh, _ = block(kind, (2, 1, 2), lambda points: points * [2.0, 1.0, 3.0], part="disk")
-        picture = describe_mesh(mesh)
-        corners = picture.nodes[picture.quads]
-        vectors = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-        # volume by the divergence theorem, positive as the faces look outwards
-        assert np.einsum("ij,ij->", corners.mean(axis=1), vectors) / 3.0 == pytest.approx(6.0, rel=1e-12)
-        assert np.abs(vectors.sum(axis=0)).max() < 1e-12
-        assert np.linalg.norm(vectors, axis=1).sum() == pytest.approx(22.0)
-        assert set(picture.parts) == {"disk"}
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -156,12 +142,6 @@ def test_no_pair_goes_through_a_body(layers, tolerance):
         SceneError, match=r"between A and B there is material: at 9 of 9 nodes B is up to 0.02 m below A"
     ):
         build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(top, bottom, tolerance)], Z)
-
-
-def test_interference_is_no_material():
-    mesh, low, up = blocks_on_each_other("C3D8", "C3D10", (2, 2, 1), (3, 3, 1), lift=-1e-3)
-    pairs = build_contact_pairs(mesh.coordinates, mesh.numbers, [ContactSurfaces(low, up, with_gaps=True)], Z)
-    assert np.allclose(pairs.gap, -1e-3)
 
 
 def test_wrong_surfaces_are_named():

@@ -83,29 +83,6 @@ def calculix_frequencies(folder, sector, nodal_diameters, prestress):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("disk_kind", "blade_kind", "tolerance"), [("C3D10", "C3D10", 1e-5), ("C3D20R", "C3D15", 1e-5)]
-)
-def test_matching_sector_at_nodal_diameters(disk_kind, blade_kind, tolerance, tmp_path):
-    sector = matching(disk_kind, blade_kind)
-    prepared = prepare_model(sector.model(), sector.joint())
-    expected = calculix_frequencies(tmp_path, sector, (0, 3), prestress=True)
-    own = np.array([glued_frequencies(prepared, k, N_MODES) for k in (0, 3)])
-    assert np.abs(own / expected - 1.0).max() < tolerance
-
-
-def matching(disk_kind, blade_kind):
-    """A sector whose disk has the blade's mesh on its outer face: the blade as wide as the face, untwisted."""
-    half = np.tan(np.pi / N_SECTORS)
-
-    def blade(points):
-        x, y, z = points.T
-        return np.stack([0.2 + 0.1 * x, (0.2 * half) * (y - 0.5), 0.01 + 0.02 * z], axis=1)
-
-    return Sector(disk_kind, blade_kind, (1, 4, 2), (2, 2, 1), blade_shape=blade)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(("disk_kind", "blade_kind", "disk", "blade"), [("C3D20R", "C3D20R", (2, 6, 4), (3, 4, 5))])
 def test_meshes_that_do_not_match(disk_kind, blade_kind, disk, blade, tmp_path):
     sector = Sector(disk_kind, blade_kind, disk, blade)

@@ -45,46 +45,6 @@ def test_gmsh_41(tmp_path):
     assert deck.element_sets["BLOCK"].tolist() == [1, 2]
 
 
-@needs_meshio
-def test_gmsh_saved_whole(tmp_path):
-    """Mesh.SaveAll: entities without a physical group are in the file as well."""
-    text = GMSH_41.replace("1 0 0 0 1 1 0 1 1 0", "1 0 0 0 1 1 0 0 0")
-    assert text != GMSH_41
-    deck = read_library_mesh(write(tmp_path, text))
-    assert [block.nodes.tolist() for block in deck.blocks] == [[[1, 2, 3, 4], [2, 3, 4, 5]]]
-    assert set(deck.node_sets) == {"BLOCK"}
-
-
-@needs_meshio
-def test_elements_of_two_groups_are_there_once(tmp_path):
-    """Format 2.2 writes an element once for each of its groups."""
-    text = GMSH_22.replace('"Block"', '"Block"\n3 7 "upper"').replace("$PhysicalNames\n3", "$PhysicalNames\n4")
-    lines = text.split("\n")
-    lines.insert(lines.index("5 4 2 2 1 5 7 8 9") + 1, "6 4 2 7 1 5 7 8 9")
-    count = lines.index("$Elements") + 1
-    lines[count] = str(int(lines[count]) + 1)
-    deck = read_library_mesh(write(tmp_path, "\n".join(lines)))
-    assert {block.kind: block.numbers.tolist() for block in deck.blocks} == {"C3D8I": [1], "C3D4": [2, 3]}
-    assert {name: numbers.tolist() for name, numbers in deck.element_sets.items()} == {"BLOCK": [1, 2, 3], "UPPER": [3]}
-
-
-@needs_meshio
-@pytest.mark.parametrize(
-    ("old", "new", "sentence"),
-    [
-        ("4 4 2 2 1 5 6 7 9\n5 4 2 2 1 5 7 8 9", "4 7 2 2 1 5 6 7 8 9\n5 4 2 2 1 5 7 8 9", "elements of type pyramid"),
-        ("3 5 2 2 1 1 2 3 4 5 6 7 8", "3 5 2 2 1 1 2 3 4 5 6 7 99", "mesh.msh is damaged"),
-        ("$Nodes\n13", "$Nodes\n999999999999999", "mesh.msh is damaged"),
-        ("$Nodes\n13", "$Nodes\n1000000000", "mesh.msh is damaged"),
-        ("6 1 0 1\n", "6 nan 0 1\n", "coordinate is not a finite number|is damaged"),
-    ],
-)
-def test_damaged_gmsh(tmp_path, old, new, sentence):
-    assert old in GMSH_22
-    with pytest.raises(SceneError, match=sentence):
-        read_library_mesh(write(tmp_path, GMSH_22.replace(old, new)))
-
-
 def write_cdb(folder, commands="", types="ET,        1,185\n"):
     """A cube with two components, as CDWRITE writes it."""
     corners = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
@@ -122,37 +82,6 @@ def test_cdb(tmp_path, types):
     assert deck.node_sets["FOOT"].tolist() == [1, 2, 3, 4]
     held = [(each.nodes.tolist(), each.first_dof, each.last_dof, each.value) for each in deck.boundaries]
     assert held == [([1], 1, 1, 0.0), ([2], 1, 3, 0.0)]
-
-
-@needs_ansys
-@pytest.mark.parametrize(
-    ("commands", "types", "sentence"),
-    [
-        ("CE,R5.0,DEFI, 2, 1", "", r"line 33: CE may change the model.*; export without constraint equations: CEDELE"),
-        ("ACEL,0,0,2*9.81", "", "line 33: ACEL may change the model.*`preload`"),
-        ("KEYOPT,1,2,1", "", "elements of reduced integration"),
-        ("PSTRES,ON", "", "PSTRES may change the model.*; delete it, and give `rotation_speed`"),
-        ("OMEGA,0,0,300.", "", "OMEGA may change the model.*`rotation_speed` and `axis`"),
-        ("D,FOOT,UX,0", "", r"D of FOOT, UX = 0; delete it, and give `clamp` in the study"),
-        ("CYCLIC,STATUS", "", "CYCLIC may change the model.*`n_sectors`"),
-        ("UNHEARD,1", "", "UNHEARD may change the model, and is not acted upon; delete it if it does not"),
-        ("", "ET,1,174\n", r"line 7: contact elements \(CONTA174\); delete these elements .*`contact`"),
-        ("", "ET,2,185\n", "elements of the type 1, which neither ET nor ETBLOCK gives"),
-    ],
-)
-def test_commands_that_change_the_model(tmp_path, commands, types, sentence):
-    with pytest.raises(SceneError, match=sentence):
-        read_library_mesh(write_cdb(tmp_path, commands, types or ETBLOCK))
-
-
-@needs_ansys
-def test_cdb_of_two_materials(tmp_path):
-    path = write_cdb(tmp_path, "LUMPM,0\nOMEGA,,,0.0")
-    text = path.read_text()
-    (element,) = (line for line in text.splitlines() if len(line) == 19 * 9)
-    other = f"{2:9d}" + element[9:].replace(f"{8:9d}{0:9d}{5:9d}", f"{8:9d}{0:9d}{6:9d}")
-    path.write_text(text.replace(element, element + "\n" + other).replace("1,        1\n(19i9)", "2,        2\n(19i9)"))
-    assert read_library_mesh(path).unassembled == ("mesh.cdb has materials 1 and 2, of which the study gives one",)
 
 
 def test_meshes_by_their_ending(tmp_path):

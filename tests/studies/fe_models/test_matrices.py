@@ -1,6 +1,7 @@
 """Matrices come out of the files of the codes as they went in."""
 
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,48 +16,44 @@ from tests.studies.fe_models.matrix_files import (
     chain,
     needs_ccx,
     run_ccx,
-    write_abaqus,
     write_calculix,
-    write_nastran,
+    write_matrix_input,
+    write_punch,
 )
 from tests.studies.fe_models.mutations import mutate
 from tests.studies.fe_models.solid_meshes import block, deck_lines
 
 
-def check(read, nodes, rtol):
-    """The matrices of `chain`, whose rows the reader sorts by node."""
-    stiffness, mass, node, direction = chain(nodes)
-    order = np.lexsort((direction, node))
-    assert read.node.tolist() == node[order].tolist()
-    assert (read.direction + 1).tolist() == direction[order].tolist()
-    for found, expected in ((read.stiffness, stiffness), (read.mass, mass)):
-        np.testing.assert_allclose(found.toarray(), expected[np.ix_(order, order)], rtol=rtol)
+def check(read, named, rows, rtol):
+    """The matrices that were written; the reader sorts rows by node."""
+    order = np.lexsort((rows[:, 1], rows[:, 0]))
+    np.testing.assert_array_equal(np.stack([read.node, read.direction + 1], axis=1), rows[order])
+    for name in ("stiffness", "mass"):
+        np.testing.assert_allclose(getattr(read, name).toarray(), named[name][np.ix_(order, order)], rtol=rtol)
 
 
-def test_calculix(tmp_path):
-    # 1.1 and 10.1: read as numbers, node 10 would be node 1, and 1.10 a direction
-    read = read_matrices(write_calculix(tmp_path, nodes=(1, 10, 100)))
-    check(read, (1, 10, 100), 1e-13)
-    assert (read.code, read.files) == ("calculix", ("job.sti", "job.mas", "job.dof"))
-
-
-@pytest.mark.parametrize("triangles", ["lower", "upper", "both"])
-def test_abaqus(tmp_path, triangles):
-    read = read_matrices(write_abaqus(tmp_path, triangles=triangles))
-    check(read, (1, 2, -7), 1e-14)
-    assert read.files == ("job_STIF1.mtx", "job_MASS1.mtx")
-
-
-@pytest.mark.parametrize(("large", "rtol"), [(True, 1e-9), (False, 6e-4)])
-def test_nastran(tmp_path, large, rtol):
-    check(read_matrices(write_nastran(tmp_path, large=large)), (1, 2, 10), rtol)
+@pytest.mark.parametrize(
+    ("write", "nodes", "rtol"),
+    [
+        # 1.1 and 10.1: read as numbers, node 10 would be node 1, and 1.10 a direction
+        (write_calculix, (1, 10, 100), 1e-13),
+        *((partial(write_matrix_input, triangles=each), (1, 2, -7), 1e-14) for each in ("lower", "upper", "both")),
+        (write_punch, (1, 2, 10), 1e-9),
+        (partial(write_punch, large=False), (1, 2, 10), 6e-4),
+    ],
+)
+def test_matrices_come_out_as_they_went_in(write, nodes, rtol, tmp_path):
+    named, rows = chain(nodes)
+    write(tmp_path, named, rows)
+    check(read_matrices(tmp_path / "job"), named, rows, rtol)
 
 
 def test_names_of_files(tmp_path):
-    job = write_calculix(tmp_path)
+    job = tmp_path / "job"
+    write_calculix(tmp_path, *chain())
     assert [path.suffix for path in find_matrix_files(job)] == [".sti", ".mas", ".dof"]
     assert find_matrix_files(tmp_path / "job.mas") == find_matrix_files(job)
-    write_abaqus(tmp_path)
+    write_matrix_input(tmp_path, *chain())
     with pytest.raises(SceneError, match=r"there are job.sti and job_STIF1.mtx; give the name of one"):
         read_matrices(job)
     assert read_matrices(tmp_path / "job_MASS1.mtx").code == "abaqus"
@@ -64,7 +61,7 @@ def test_names_of_files(tmp_path):
         read_matrices(tmp_path / "other")
 
 
-WRITERS = {".sti": write_calculix, ".dof": write_calculix, "_STIF1.mtx": write_abaqus, ".pch": write_nastran}
+WRITERS = {".sti": write_calculix, ".dof": write_calculix, "_STIF1.mtx": write_matrix_input, ".pch": write_punch}
 
 
 @pytest.mark.parametrize(
@@ -85,26 +82,26 @@ WRITERS = {".sti": write_calculix, ".dof": write_calculix, "_STIF1.mtx": write_a
     ],
 )  # fmt: skip
 def test_wrong_files(tmp_path, end, old, new, sentence):
-    job = WRITERS[end](tmp_path)
+    WRITERS[end](tmp_path, *chain())
     path = tmp_path / f"job{end}"
     changed = re.sub(old, new, path.read_text(), count=1, flags=re.MULTILINE)
     assert changed != path.read_text()
     path.write_text(changed)
     with pytest.raises(SceneError, match=sentence):
-        read_matrices(job)
+        read_matrices(tmp_path / "job")
 
 
 @pytest.mark.parametrize("kind", ["mat", "market"])
 def test_tables_without_their_rows_or_with_complex_numbers(tmp_path, kind):
-    stiffness, mass, node, dof = chain()
-    rows = np.stack([node, dof], axis=1)
+    named, rows = chain()
+    stiffness = named["stiffness"]
     for matrix, of_rows, sentence in (
         (stiffness, rows[:-1], "9 x 9 entries for 8 rows"),
         (stiffness, np.ones_like(rows), "a dof has two rows"),
         (stiffness * 1j, rows, "complex numbers; give .* nd/<k>"),
         (stiffness + np.triu(stiffness), rows, "not symmetric"),
     ):
-        REDUCED[kind](tmp_path, {"stiffness": matrix, "mass": mass}, of_rows)
+        REDUCED[kind](tmp_path, {**named, "stiffness": matrix}, of_rows)
         with pytest.raises(SceneError, match=sentence):
             read_matrices(tmp_path / "job")
 
@@ -129,25 +126,27 @@ def test_a_substructure_of_calculix(tmp_path):
     np.testing.assert_allclose(read.stiffness.toarray(), expected, atol=1e-9 * abs(expected).max())
 
 
-FILES = {"job.sti": write_calculix, "job.dof": write_calculix, "job_STIF1.mtx": write_abaqus, "job.pch": write_nastran}
-DAMAGED = {"op4": "job.op4", "op4 binary sparse": "job.op4", "user element": "job.mtx", "mat": "job.mat"}
+DAMAGED = {
+    "job.sti": write_calculix,
+    "job.dof": write_calculix,
+    "job_STIF1.mtx": write_matrix_input,
+    "job.pch": write_punch,
+    "job.mtx": REDUCED["user element"],
+    "job.mat": REDUCED["mat"],
+    "job.op4": REDUCED["op4 binary sparse"],
+}
 
 
-@pytest.mark.parametrize("name", [*FILES, *DAMAGED])
+@pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_matrices(tmp_path, name):
     """What is read is symmetric and finite; what is not ends in a sentence that names the file."""
-    if name in FILES:
-        job, path = FILES[name](tmp_path), tmp_path / name
-    else:
-        stiffness, mass, node, dof = chain()
-        named = {"stiffness": stiffness, "mass": mass, "damping": mass, "load": np.arange(9.0)}
-        REDUCED[name](tmp_path, named, np.stack([node, dof], axis=1))
-        job, path = tmp_path / "job", tmp_path / DAMAGED[name]
+    DAMAGED[name](tmp_path, *chain())
+    path = tmp_path / name
     good, said = path.read_bytes(), []
     for seed in range(25):
         path.write_bytes(mutate(good, seed))
         try:
-            read = read_matrices(job)
+            read = read_matrices(tmp_path / "job")
         except SceneError as error:
             said.append(str(error))
             continue

@@ -99,6 +99,9 @@ def test_tables_that_do_not_fit_are_named(tmp_path):
     (tmp_path / "stress.csv").write_text("node,dof,root [MPa]\n1,7,1.0\n")
     with pytest.raises(SceneError, match=r"recovery: stress.csv: node 1 with dof 7 is no row"):
         model_of(tmp_path)
+    (tmp_path / "stress.csv").write_text(sector().recovery_table().replace("root [MPa]", "tip"))
+    with pytest.raises(SceneError, match=r"recovery: stress.csv: a response has the name tip as well"):
+        model_of(tmp_path)
 
 
 def test_a_model_in_python_is_the_same():
