@@ -63,81 +63,56 @@ def frequency_response(
 
     Where a point fails, its `outcome` and `message` say why. The other points are computed all the same.
 
-    Parameters
-    ----------
-    model
-        The model, from `build_model`, `studies.build_scene` or `studies.read_scene`.
-    frequency
-        (n_frequency,) or one number, Hz, in any order. The state at a frequency does not depend on the others.
-    excitation_amplitude
-        Amplitude, N. It multiplies the unit harmonic load of the model.
-    friction_coefficient
-        One number for all pairs, or (n_contact,) for each pair. None for a model with its own, e.g. from a scene file.
-    sweep
-        Way to a state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
-    settings
-        The defaults of `SolverSettings` if not given.
-    wear_depth
-        (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
+    model: from `build_model`, `studies.build_scene` or `studies.read_scene`.
+    frequency: (n_frequency,) or one number, Hz, in any order. The state at a frequency does not depend on the others.
+    excitation_amplitude: N, multiplies the unit harmonic load of the model.
+    friction_coefficient: one number for all pairs, or (n_contact,) for each pair. None for a model with its own.
+    sweep: way to a state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
+    settings: the defaults of `SolverSettings` if not given.
+    wear_depth: (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
 
-    Raises
-    ------
-    ValueError
-        A number is out of its range; the model lacks nodal diameters that the harmonics need; friction coefficients
-        are given twice, not at all, or not to each pair.
+    Raises ValueError where a number is out of its range, where the model lacks nodal diameters that the harmonics need,
+    and where friction coefficients are given twice, not at all, or not to each pair.
     """
     settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("frequency", frequency, above=0.0)
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     model = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
-    starts = dict(follow_branch(model, friction, load, ascending, sweep, settings))
-    points = [_Point.of(model, friction, settings, starts[index]) for index in range(ascending.size)]
-    points = [points[index] for index in place.tolist()]
+    found = dict(follow_branch(model, friction, load, ascending, sweep, settings))
+    starts = [found[index] for index in place.tolist()]
+    response, peak, outcome, message = zip(*(_read(model, friction, settings, start) for start in starts), strict=True)
     return FrequencyResponse(
         frequency=wanted,
-        response=np.array([point.response for point in points]),
-        response_peak=np.array([point.peak for point in points]),
-        response_error=np.array([point.error for point in points]),
-        outcome=tuple(point.outcome for point in points),
-        message=tuple(point.message for point in points),
-        branch=np.array([point.start.branch for point in points], np.int64),
-        fold_frequency=np.array([point.start.fold_frequency for point in points]),
+        response=np.array(response),
+        response_peak=np.array(peak),
+        response_error=np.array([math.nan if start.state is None else start.response_error for start in starts]),
+        outcome=outcome,
+        message=message,
+        branch=np.array([start.branch for start in starts], np.int64),
+        fold_frequency=np.array([start.fold_frequency for start in starts]),
     )
 
 
-@dataclass(frozen=True)
-class _Point:
-    """Values of a point as in `FrequencyResponse`."""
-
-    start: StartState
-    response: ComplexArray
-    peak: FloatArray
-    error: float
-    outcome: Outcome
-    message: str
-
-    @staticmethod
-    def of(
-        model: ReducedModel, friction: float | FloatArray | None, settings: SolverSettings, start: StartState
-    ) -> _Point:
-        """The values of a state."""
-        state, outcome, message = start.state, start.outcome, start.message
-        if state is None:
-            nothing = np.full(len(model.response_names), np.nan)
-            return _Point(start, nothing.astype(np.complex128), nothing, math.nan, outcome, message)
-        case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
-        joint = case.joint(state.omega, state.excitation_amplitude)
-        at = evaluated(joint, state)[1]
-        pressure = state.contact_force_h[:, 0, 0] / model.contact.area
-        if not math.isnan(first_cut_off(model.contact, np.zeros(1), pressure[None], state.wear_depth[None])):
-            outcome, message = Outcome.CONTACT_CUT_OFF, describe_cut_off(0.0)
-        elif outcome is Outcome.INACCURATE:
-            error = {"response": start.response_error, "wear rate": start.wear_rate_error}
-            name = max(error, key=lambda each: error[each])
-            message = f"the {name} {known_to(error[name], settings.rtol)}"
-        response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
-        return _Point(start, response, largest_responses(joint, at), start.response_error, outcome, message)
+def _read(
+    model: ReducedModel, friction: float | FloatArray | None, settings: SolverSettings, start: StartState
+) -> tuple[ComplexArray, FloatArray, Outcome, str]:
+    """Response, peak, outcome and message of a point, as in `FrequencyResponse`."""
+    state, outcome, message = start.state, start.outcome, start.message
+    if state is None:
+        nothing = np.full(len(model.response_names), np.nan)
+        return nothing.astype(np.complex128), nothing, outcome, message
+    case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
+    joint = case.joint(state.omega, state.excitation_amplitude)
+    at = evaluated(joint, state)[1]
+    pressure = state.contact_force_h[:, 0, 0] / model.contact.area
+    if not math.isnan(first_cut_off(model.contact, np.zeros(1), pressure[None], state.wear_depth[None])):
+        outcome, message = Outcome.CONTACT_CUT_OFF, describe_cut_off(0.0)
+    elif outcome is Outcome.INACCURATE:
+        error, name = max((start.wear_rate_error, "wear rate"), (start.response_error, "response"))
+        message = f"the {name} {known_to(error, settings.rtol)}"
+    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
+    return response, largest_responses(joint, at), outcome, message
 
 
 def check_case(

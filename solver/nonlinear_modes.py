@@ -63,10 +63,8 @@ def backbone(
 ) -> Backbone:
     """Natural frequency and damping ratio of a joint over the amplitude: the backbone curve of a nonlinear mode.
 
-    Extended periodic motion concept, Krack, Computers and Structures 154 (2015) 59-71: periodic motion of
-    `M x'' + (C - 2 zeta omega M) x' + K x + (contact forces) = f_0` without excitation. f_0 is the static load.
-
-    Where a point fails, its `outcome` and `message` say why. The other points are computed all the same.
+    By the extended periodic motion concept (`solver.modes.modal_model`). Where a point fails, its `outcome` and
+    `message` say why; the other points are computed all the same.
 
     Parameters
     ----------
@@ -104,13 +102,8 @@ def backbone(
     worn = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
     found = dict(follow_mode(worn, friction, ascending, int(mode), sweep, settings))
-    points = [found[index] for index in place.tolist()]
-    columns = {
-        field.name: [getattr(point, field.name) for point in points]
-        for field in fields(Backbone)
-        if field.name != "amplitude"
-    }
-    gathered: dict[str, Any] = {
-        name: tuple(values) if name in ("outcome", "message") else np.array(values) for name, values in columns.items()
-    }
-    return Backbone(amplitude=wanted, **gathered)
+    columns: dict[str, Any] = {}
+    for name in (field.name for field in fields(Backbone) if field.name != "amplitude"):
+        values = [getattr(found[index], name) for index in place.tolist()]
+        columns[name] = tuple(values) if name in ("outcome", "message") else np.array(values)
+    return Backbone(amplitude=wanted, **columns)

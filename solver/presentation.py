@@ -97,10 +97,7 @@ class Presented:
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draws the main values over the dimension, into new axes of matplotlib if none are given. Returns the axes."""
-        if axes is None:
-            from matplotlib import pyplot
-
-            axes = pyplot.subplots()[1]
+        axes = axes or _new_axes()
         at = getattr(self, self.OVER[0])
         order = np.argsort(at)
         for number, name in enumerate(self.DRAWN):
@@ -119,11 +116,21 @@ class Presented:
         own: Any = self
         points, outcomes = getattr(self, self.OVER[0]), own.outcome
         ends, messages = (each if isinstance(each, tuple) else (each,) for each in (outcomes, own.message))
-        words = ", ".join(f"{number} {outcome}" for outcome, number in Counter(ends).items())
+        counts = Counter(ends)
+        words = ", ".join(
+            f"{number} {outcome}" if len(ends) > 1 else str(outcome) for outcome, number in counts.items()
+        )
         rows = [(name, _span(getattr(self, name), _OF_VALUES.get(name, ("", "1"))[1])) for name in self.SHOWN]
         rows.append(("message", next((text for text in messages if text), "none")))
         first = f"{type(self).__name__}: {self.OVER[1]} {_span(points, '')}: {words}"
         return "\n".join((first, *(f"  {name:<18} {text}" for name, text in rows)))
+
+
+def _new_axes() -> Axes:
+    from matplotlib import pyplot
+
+    axes: Axes = pyplot.subplots()[1]
+    return axes
 
 
 def _span(values: Any, unit: str) -> str:
@@ -152,25 +159,21 @@ class PresentedResponse(Presented):
 
 
 class PresentedCurve(Presented):
-    """A response curve through folds, over its points."""
+    """A response curve through folds, over its points; solid where it is stable."""
 
     OVER = ("point", "point")
     SHOWN = ("frequency", "excitation_amplitude", "response")
-    DRAWN = ("response",)
 
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draws the responses over what varies along the curve, solid where they are stable. Returns the axes."""
-        if axes is None:
-            from matplotlib import pyplot
-
-            axes = pyplot.subplots()[1]
+        """As for other results, over the parameter that changes along the curve."""
         own: Any = self
-        values, size = getattr(own, own.parameter), np.abs(own.response)
-        stable = np.array(own.stability) == "stable"
-        for place in range(size.shape[1]):
-            (line,) = axes.plot(values, size[:, place], ":")
-            axes.plot(values, np.where(stable, size[:, place], np.nan), color=line.get_color())
-        axes.set(xlabel=f"{own.parameter.replace('_', ' ')} in {_OF_VALUES[own.parameter][1]}", ylabel="response in m")
+        axes = axes or _new_axes()
+        at, stable = getattr(self, own.parameter), np.array(own.stability) == "stable"
+        for size in np.abs(own.response).T:
+            (line,) = axes.plot(at, size, ":")
+            axes.plot(at, np.where(stable, size, np.nan), color=line.get_color())
+        label = f"{own.parameter.replace('_', ' ')} in {_OF_VALUES[own.parameter][1]}"
+        axes.set(xlabel=label, ylabel="response in m", title="solid where stable")
         return axes
 
 

@@ -12,8 +12,8 @@ from studies.scenes import BUNDLED, scene_parameters
 
 _PAGE = """# Bundled scenes
 
-The keys in each section are keys of `[scene]` in a study file; `run-study --scene-help dovetail_sector` prints what each of
-them means, and its unit. A study may also name [a scene file or a finite-element model](OWN_MODEL.md).
+The keys in each section are those of `[scene]` in a study file; `run-study --scene-help dovetail_sector` prints what
+each of them means, and its unit. A study may also name [a scene file or a finite-element model](OWN_MODEL.md).
 `contact_stiffness` is explained in [rough joints](ROUGH_JOINTS.md), `python -m studies.scene_help` prints this page."""
 
 

@@ -65,19 +65,6 @@ class _Parser(argparse.ArgumentParser):
         raise UserError("command line", "options", None, f"{message}; run-study --help lists them")
 
 
-class _SceneHelp(argparse.Action):
-    """Prints the description of a bundled scene and ends, as --help does."""
-
-    def __call__(self, parser: argparse.ArgumentParser, _: object, values: object, __: str | None = None) -> NoReturn:
-        from studies.scene_help import scene_help
-        from studies.scenes import BUNDLED
-
-        if values not in BUNDLED:
-            raise UserError("command line", "--scene-help", str(values), f"give one of {', '.join(BUNDLED)}")
-        print(scene_help(str(values)), flush=True)
-        parser.exit()
-
-
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "study",
@@ -107,13 +94,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated",
     )
     parser.add_argument("--write-scene", type=Path, metavar="PATH.h5", help="write the scene as a scene file and stop")
-    parser.add_argument(
-        "--scene-help",
-        action=_SceneHelp,
-        default=argparse.SUPPRESS,
-        metavar="SCENE",
-        help="print what a bundled scene is, and its parameters",
-    )
+    parser.add_argument("--scene-help", metavar="SCENE", help="print what a bundled scene is, and its parameters")
     parser.add_argument("--fresh", action="store_true", help="start over: forget what an earlier run of it has left")
     parser.add_argument("--overwrite", action="store_true", help="replace the result of another study")
     parser.add_argument(
@@ -139,15 +120,28 @@ def parse_options(arguments: Sequence[str]) -> Options:
     )
     _add_options(parser)
     found = vars(parser.parse_args(list(arguments)))
-    new, deck = found.pop("new"), found.pop("deck")
+    new, deck, scene = (found.pop(name) for name in ("new", "deck", "scene_help"))
     if deck is not None and new is None:
         raise UserError("command line", "--from", str(deck), "give --new NAME beside it: the name of the new study")
-    if new is not None:
-        from studyrunner.study.keys import write_new_study
-
-        path = write_new_study(new, deck)
-        print(f"{path}: run-study {path} computes it", flush=True)
+    if scene is not None or new is not None:
+        print(_scene_help(scene) if new is None else _new_study(new, deck), flush=True)
         parser.exit()
     if found["date"] is not None:
         found["date"] = check_date(found["date"], "command line", "--date")
     return Options(**found)
+
+
+def _scene_help(scene: str) -> str:
+    from studies.scene_help import scene_help
+    from studies.scenes import BUNDLED
+
+    if scene not in BUNDLED:
+        raise UserError("command line", "--scene-help", scene, f"give one of {', '.join(BUNDLED)}")
+    return scene_help(scene)
+
+
+def _new_study(name: str, deck: Path | None) -> str:
+    from studyrunner.study.keys import write_new_study
+
+    path = write_new_study(name, deck)
+    return f"{path}: run-study {path} computes it"

@@ -48,27 +48,18 @@ def compute_worn_joint(
 ) -> dict[str, xr.Dataset]:
     """What a result does not hold of one worn joint, from the wear depths that it holds.
 
-    Parameters
-    ----------
-    path
-        Result file with `wear_depth` or `wear_depth_last`, of wear histories.
-    folder
-        For the result files of what is computed; what is there already is not computed twice.
-    loops
-        Contact pairs: gives `"loops"`, their `loop_displacement`, m, and `loop_force`, N, with dimensions (cycle,
-        contact, phase, component), at the first count where the file holds its depths and at the last count.
-    response
-        Gives `"response"`: `response_amplitude`, m (cycle, frequency, response), and its relative error at the
-        frequencies of the study; with a followed frequency over its range, and of the new joint as well.
-    natural_frequencies
-        Gives `"natural_frequencies"`: those of the sector with the joint stuck, Hz (nodal_diameter, mode).
-    point
-        Values of axes, as text; by default the point that wears most.
+    path: result file with `wear_depth` or `wear_depth_last`, of wear histories. folder: for the result files of what is
+    computed; what is there already is not computed twice. point: values of axes, as text; by default the point that
+    wears most. The result has
 
-    Raises
-    ------
-    UserError
-        Where the file does not hold the depths, or the study has no such pairs or frequencies.
+    - of contact pairs `loops` the entry `"loops"`: `loop_displacement`, m, and `loop_force`, N, (cycle, contact, phase,
+      component), at the first count where the file holds its depths and at the last count;
+    - with `response` the entry `"response"`: `response_amplitude`, m (cycle, frequency, response), and its relative
+      error at the frequencies of the study; with a followed frequency over its range, and of the new joint as well;
+    - with `natural_frequencies` the entry `"natural_frequencies"`: those of the sector with the joint stuck, Hz
+      (nodal_diameter, mode).
+
+    Raises UserError where the file does not hold the depths, or the study has no such pairs or frequencies.
     """
     result, folder = open_for_report(path, point), Path(folder)
     with result.dataset:

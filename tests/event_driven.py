@@ -176,6 +176,16 @@ class Orbit:
     start_time: float
     residual: float
 
+    def multipliers(self, step: float = 1e-6) -> NDArray[np.complex128]:
+        """Floquet multipliers (2 n,), largest first, by differences of the period map; step: over the largest state."""
+        y, name, system = self.segments[0].start, self.segments[0].phase, self.system
+        length, columns = step * np.abs(y[: 2 * system.n]).max(), []
+        for moved in length * np.eye(y.size)[: 2 * system.n]:
+            ends = [system.advance(system.phase_at(name, at), at, system.period)[1] for at in (y + moved, y - moved)]
+            columns.append((ends[0] - ends[1])[: 2 * system.n] / (2.0 * length))
+        found = np.linalg.eigvals(np.array(columns).T)
+        return found[np.lexsort((-found.imag, -np.abs(found)))]
+
     def harmonic(self, dof: int, order: int = 1) -> complex:
         """Amplitude X of a displacement: `x(t)` has the harmonic `Re(X exp(i order omega t))`; the mean for order 0."""
         total, time = 0.0 + 0.0j, self.start_time

@@ -1,8 +1,8 @@
 """The reference solution: a second computation whose difference, pair by pair, is taken for the error.
 
-It starts from another sweep: half the nodes, placed between those of the fine sweep (`solver.loading_history`). The
-difference of the tangential histories of both sweeps is extrapolated: the reference solution starts from twice this
-difference. It is coarser in all: its steps on the slow time have twice the tolerance, and it has the next lower
+It starts from another sweep: a third of the nodes, placed between those of the fine sweep (`solver.loading_history`).
+The difference of the tangential histories of both sweeps is extrapolated: the reference solution starts from twice
+this difference. It is coarser in all: its steps on the slow time have twice the tolerance, and it has the next lower
 harmonics (the next higher ones where the harmonics are few) with the samples that belong to them.
 
 A history with given Euler steps has no reference solution of its own: it is compared with the adaptive history, whose

@@ -105,7 +105,7 @@ class BlockCase:
 
     mission, place: the mission, and the place of the block in it.
     depth (n_contact,): m, worn before the block.
-    settings: with the time that is left.
+    deadline: CPU time of the thread, s, at which the time of the history is over.
     carried: state that the block continues; None for a block that begins anew.
     begun, like: of this block in an earlier mission, and in the history for its reference solution; else None.
     with_slope: whether the slope of the growth is asked for.
@@ -115,7 +115,7 @@ class BlockCase:
     mission: Mission
     place: int
     depth: FloatArray
-    settings: SolverSettings
+    deadline: float = math.inf
     carried: StartState | None = None
     begun: Begun | None = None
     like: Like | None = None
@@ -139,14 +139,15 @@ class BlockCase:
         contact = self.block.model.contact
         return replace(self.block.model, contact=replace(contact, gap=contact.gap + self.depth))
 
-    def left(self, began: float) -> BlockCase:
-        """The same with the time that is left after a begin at a CPU time, s."""
-        limit = self.settings.time_limit - (computing_time() - began)
-        return replace(self, settings=replace(self.settings, time_limit=limit))
+    @property
+    def settings(self) -> SolverSettings:
+        """The settings, with the time that is left."""
+        return replace(self.mission.settings, time_limit=self.deadline - computing_time())
 
+    @property
     def run(self) -> Run:
-        """A computation with the time of the settings."""
-        return Run(self.settings.tolerance, Budget(deadline=computing_time() + self.settings.time_limit))
+        """A computation until the deadline."""
+        return Run(self.mission.settings.tolerance, Budget(deadline=self.deadline))
 
     def line(self, sweep: Direction, amplitude: float | None = None) -> FrequencySweep:
         """A sweep at the depth before the block. amplitude: N; that of the block if not given."""
@@ -154,6 +155,7 @@ class BlockCase:
         load = block.excitation_amplitude if amplitude is None else amplitude
         line = FrequencySweep(model, block.friction_coefficient, load, sweep, self.settings)
         line.every = self.every
+        line.set_deadline(self.deadline)
         return line
 
     def work(self, start: StartState) -> WearingJoint:
@@ -173,11 +175,10 @@ class BlockCase:
 
 def run_block(case: BlockCase) -> BlockRun | Failure:
     """Compute a block of steady vibration, or why it does not come to its end. Raises OutOfTimeError, LinAlgError."""
-    began = computing_time()
     start, begun = find_start(case)
     if start.state is None:
         return Failure(start.outcome, start.message)
-    case, law, (_, cycles) = case.left(began), case.mission.law.begun_at(case.depth), case.block.steady
+    law, (_, cycles) = case.mission.law.begun_at(case.depth), case.block.steady
     work, counts = case.work(start), np.array([0.0, cycles])
     asked = SlowTime(work.wear_coefficient, "adaptive", counts, law=law, ends_at_last=True)
     solutions = Solutions(work.case, start, asked)
@@ -261,7 +262,7 @@ def _again(case: BlockCase, begun: Begun) -> StartState | None:
     state keeps nothing of its way, and follows from the depths alone. None where the way has jumped over a fold, where
     there is no stable state, or where the vibration has changed so much that the way may lead to another branch.
     """
-    start, run = begun.start, case.run()
+    start, run = begun.start, case.run
     if start is None or start.state is None or start.branch > 0:
         return None
     ramp, omega, (work, begins) = case.block.way == "ramp", start.state.omega, case.begin(start)
@@ -315,7 +316,7 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
     an extrapolated step may have changed. Then amplitude and frequency change, one after the other, the frequency at
     the smaller of both amplitudes. Raises OutOfTimeError, LinAlgError.
     """
-    before, run, (frequency, _) = carried.state, case.run(), case.block.steady
+    before, run, (frequency, _) = carried.state, case.run, case.block.steady
     assert before is not None
     work, begins = case.begin(carried)
     at = begins.point.evaluation
@@ -339,7 +340,6 @@ def _continued(case: BlockCase, carried: StartState) -> StartState:
         if here.excitation_amplitude == load if way == "ramp" else here.omega == 2.0 * np.pi * target:
             continue
         line, (work, begins) = case.line(way, load), case.begin(start)
-        line.set_deadline(run.budget.deadline)
         parameter = here.excitation_amplitude / load if way == "ramp" else here.omega
         if not line.go_on_from(work.case, replace(begins.point, parameter=parameter), target):
             return replace(start, state=None, outcome=Outcome.UNSETTLED)

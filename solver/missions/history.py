@@ -21,6 +21,7 @@ from solver.model import FloatArray
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, unpack
 from solver.results.cut_off import describe_cut_off
+from solver.results.verdict import describe_uncertain
 
 ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
 """Outcomes of a reference solution that are those of the history."""
@@ -152,7 +153,7 @@ def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> F
     if history.error_estimate > SENSITIVE_ERROR:
         outcome, last = Outcome.SENSITIVE, np.flatnonzero(np.isfinite(history.worn_volume))[-1]
         volumes = history.worn_volume[last], history.reference_volume[last]
-        said.append(_two_volumes(*volumes, history.error_estimate, rtol))
+        said.append(describe_uncertain(*volumes, history.error_estimate, rtol, "in coarser steps"))
     elif inaccurate[worst] > 0.0:
         outcome = Outcome.INACCURATE
         said.append(f"in {mission.called(worst)} the vibration {known_to(float(inaccurate[worst]), rtol)}")
@@ -163,11 +164,3 @@ def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> F
         passes = f"passes at {rate:.2g} (zeta f)^2" if np.isfinite(rate) else "has no damping where the joint sticks"
         said.append(f"{name} {passes}: it may wear otherwise than its steady states (see the error)")
     return Failure(outcome, "; ".join(said))
-
-
-def _two_volumes(volume: float, other: float, error: float, rtol: float) -> str:
-    """Sentence about an uncertain worn volume, m3: that of the history and of its reference solution."""
-    known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
-    if abs(volume - other) < 0.5 * error * volume:
-        return f"worn volume {1e9 * volume:.3g} mm3, {known} although coarser steps agree: see the errors of its blocks"
-    return f"worn volume {1e9 * volume:.3g} mm3, but {1e9 * other:.3g} mm3 in coarser steps: {known}"

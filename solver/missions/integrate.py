@@ -121,10 +121,10 @@ class Missions:
         # as in a wear history: stability is tested at the begin and the end
         every = fine is None and number in (1, mission.missions[-1])
         runs: list[BlockRun] = []
+        deadline = self._began + mission.settings.time_limit
         for place, block in enumerate(mission.blocks):
-            settings = replace(mission.settings, time_limit=mission.settings.time_limit - self.spent)
             like, begun = likes[place].like if likes else None, self._begun[place]
-            case = BlockCase(mission, place, depth, settings, carried, begun, like, with_slopes, every)
+            case = BlockCase(mission, place, depth, deadline, carried, begun, like, with_slopes, every)
             through = run_passage if isinstance(block.frequency, Passage) else run_block
             found = guarded(partial(through, case))
             if isinstance(found, Failure):

@@ -185,7 +185,7 @@ def parts_of(states: Sequence[SweptState]) -> FloatArray:
 def find_states(case: BlockCase) -> Swept | Failure:
     """The states of one passage at the depth before it, as many as its wear needs."""
     passage, area = passage_of(case), case.mission.area
-    aim = FREQUENCY_ERROR * (1.0 if case.like is None else RTOL_RATIO) * case.settings.rtol
+    aim = FREQUENCY_ERROR * (1.0 if case.like is None else RTOL_RATIO) * case.mission.settings.rtol
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
     # the mission before has found the frequencies that count: a second sweep is then seldom needed
@@ -262,7 +262,7 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
 
 def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    passage, began, found = passage_of(case), computing_time(), []
+    passage, found = passage_of(case), []
     line = case.line(passage.sweep)
     if case.like is not None:
         # errors of a reference solution are not used
@@ -270,7 +270,7 @@ def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Fa
     for index, start in follow_line(line, frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)
-        if computing_time() - began > case.settings.time_limit:
+        if computing_time() > case.deadline:
             return Failure(Outcome.TIME_LIMIT)
         work, begun = case.begin(start)
         at, joint, frequency = begun.point.evaluation, work.at(begun), float(frequencies[index])

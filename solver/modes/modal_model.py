@@ -24,7 +24,7 @@ from typing import cast
 import numpy as np
 import scipy.linalg
 
-from solver.model import BoolArray, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+from solver.model import BoolArray, FloatArray, LinearModel, Matrix, ReducedModel
 from solver.settings import NEGLIGIBLE
 
 
@@ -42,14 +42,19 @@ class LinearMode:
     damping_ratio: float
 
 
-def natural_frequencies(linear: LinearModel, held: IntArray) -> tuple[FloatArray, Matrix]:
-    """Natural frequencies (k,), rad/s, ascending, and mass-normalised modes (n, k), rigid motions left out.
+def linear_mode(
+    model: ReducedModel, closed: BoolArray, friction: FloatArray, *, number: int = 1, near: float | None = None
+) -> LinearMode | None:
+    """A mode of the joint with its closed pairs held, rigid motions left out; None where the joint has fewer modes.
 
-    held: indices of the displacements that are 0.
+    closed, friction (n_contact,): pairs held in the normal direction, and in the tangential ones with friction above 0.
+    number: of the mode, from 1 on in ascending frequency. near: rad/s; the mode nearest to a frequency instead.
     """
+    linear, dofs = model.harmonic_structure(1), model.contact.dofs
+    held = np.concatenate([dofs[closed, 0], dofs[closed & (friction > 0.0), 1:].ravel()])
     free = np.setdiff1d(np.arange(len(linear.mass)), held)
     if not free.size:
-        return np.zeros(0), np.zeros((len(linear.mass), 0))
+        return None
     mass, stiffness = (part[np.ix_(free, free)] for part in (linear.mass, linear.stiffness))
     # shift and limit of a rigid motion: 1e-12 of the ratio of the traces is of the order of round-off
     shift = NEGLIGIBLE * float(np.real(np.trace(stiffness)) / max(np.real(np.trace(mass)), 1e-300))
@@ -58,29 +63,16 @@ def natural_frequencies(linear: LinearModel, held: IntArray) -> tuple[FloatArray
     values, vectors = values[::-1], vectors[:, ::-1]
     with np.errstate(divide="ignore"):
         square = 1.0 / np.maximum(values, 0.0) - shift
-    elastic = (square > NEGLIGIBLE * shift) & (values > 1e-12 * values[0])
-    shapes = np.zeros((len(linear.mass), int(elastic.sum())), vectors.dtype)
-    shapes[free] = vectors[:, elastic] / np.sqrt(values[elastic])
-    return np.sqrt(square[elastic]), cast("Matrix", shapes)
-
-
-def linear_mode(
-    model: ReducedModel, closed: BoolArray, friction: FloatArray, *, number: int = 1, near: float | None = None
-) -> LinearMode | None:
-    """A mode of the joint with its closed pairs held; None where the structure has fewer modes.
-
-    closed, friction (n_contact,): pairs held in the normal direction, and in the tangential ones with friction above 0.
-    number: of the mode, from 1 on in ascending frequency. near: rad/s; the mode nearest to a frequency instead.
-    """
-    linear, dofs = model.harmonic_structure(1), model.contact.dofs
-    held = np.concatenate([dofs[closed, 0], dofs[closed & (friction > 0.0), 1:].ravel()])
-    omegas, shapes = natural_frequencies(linear, held[held >= 0])
-    if len(omegas) < (number if near is None else 1):
+    elastic = np.flatnonzero((square > NEGLIGIBLE * shift) & (values > 1e-12 * values[0]))
+    if len(elastic) < (number if near is None else 1):
         return None
-    place = number - 1 if near is None else int(np.argmin(np.abs(omegas - near)))
-    omega, shape = float(omegas[place]), shapes[:, place]
+    omegas = np.sqrt(square[elastic])
+    place = elastic[number - 1 if near is None else int(np.argmin(np.abs(omegas - near)))]
+    shape = np.zeros(len(linear.mass), vectors.dtype)
+    shape[free] = vectors[:, place] / np.sqrt(values[place])
     largest = shape[np.argmax(np.abs(shape))]
     shape = cast("Matrix", shape * (np.conj(largest) / np.abs(largest)))
+    omega = float(np.sqrt(square[place]))
     return LinearMode(omega, shape, float(np.real(np.vdot(shape, linear.damping @ shape))) / (2.0 * omega))
 
 

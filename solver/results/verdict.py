@@ -30,7 +30,9 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
         return Outcome.CONTACT_CUT_OFF, describe_cut_off(history.cut_off_cycle / slower)
     error = float(history.worn_volume_error[last])
     if error > SENSITIVE_ERROR:
-        return Outcome.SENSITIVE, "; ".join((_two_volumes(history, last, error, rtol), *remarks))
+        volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
+        coarser = "with longer steps, fewer harmonics and a coarser sweep"
+        return Outcome.SENSITIVE, "; ".join((describe_uncertain(*volumes, error, rtol, coarser), *remarks))
     # inf means "never", but is the count of a final state, too
     if math.inf > history.inaccurate_from <= history.cycles[last]:
         begin = f"from cycle {history.inaccurate_from / slower:,.0f} on ".replace(",", " ")
@@ -52,16 +54,18 @@ def last_error(history: WearHistory, rows: IntArray, last: float) -> float:
     return float(history.worn_volume_error[rows[-1]])
 
 
-def _two_volumes(history: WearHistory, row: int, error: float, rtol: float) -> str:
-    """Sentence about an uncertain worn volume: the values of the history and of its reference solution."""
-    volume, other = 1e9 * history.worn_volume[row], 1e9 * history.reference_volume[row]
+def describe_uncertain(volume: float, other: float, error: float, rtol: float, coarser: str) -> str:
+    """Sentence about an uncertain worn volume, m3, beside that of the reference solution; NaN where that ended before.
+
+    coarser: what the reference solution is, in words.
+    """
     known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
-    coarser = "with longer steps, fewer harmonics and a coarser sweep"
+    own, its = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
     if not math.isfinite(other):
-        return f"worn volume {volume:.3g} mm3, {known}: {coarser} the history does not go so far"
+        return f"{own}, {known}: {coarser} the history does not go so far"
     if abs(volume - other) < 0.5 * error * volume:
-        return f"worn volume {volume:.3g} mm3, {known}: {other:.3g} mm3 {coarser}, but worn at other pairs or counts"
-    return f"worn volume {volume:.3g} mm3, but {other:.3g} mm3 {coarser}: {known}"
+        return f"{own}, {known}: {its}, but worn at other pairs or counts"
+    return f"{own}, but {its}: {known}"
 
 
 def describe_hold(cycle: float) -> str:

@@ -92,8 +92,9 @@ class Uniform(Distribution):
 
     @model_validator(mode="after")
     def _check_ends(self) -> Uniform:
-        if (self.low is None) != (self.high is None) or (self.high is not None and self.low >= self.high):
-            raise ValueError("give low and a high above low")
+        ends = [each for each in (self.low, self.high) if each is not None]
+        if len(ends) == 1 or (ends and ends[0] >= ends[1]):
+            raise ValueError("give a low, and a high above it")
         return self
 
     def at(self, own: Array, score: Array) -> Array:
@@ -101,8 +102,8 @@ class Uniform(Distribution):
         from scipy.special import ndtr  # where it is used: it takes a while to load
 
         if self.low is not None and self.high is not None:
-            return self.low + (self.high - self.low) * ndtr(score)
-        return own + (self.half_width or 0.0) * (2.0 * ndtr(score) - 1.0)
+            return np.asarray(self.low + (self.high - self.low) * ndtr(score))
+        return np.asarray(own + (self.half_width or 0.0) * (2.0 * ndtr(score) - 1.0))
 
 
 class Scattered(Section):

@@ -62,8 +62,7 @@ class SceneFacts:
         return self.surface, self.position.tobytes(), self.area.tobytes()
 
 
-def _silent(_: str) -> None:
-    """Tells nobody."""
+def _silent(_: str) -> None: ...
 
 
 def build_study_scene(
@@ -71,15 +70,11 @@ def build_study_scene(
 ) -> ReducedModel:
     """Reduced model of the scene for the largest number of harmonics of the study and those that show the error.
 
-    progress: takes a line on the next step, where a step may take long. computed: holds the model of an earlier run.
+    With automatic harmonics a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE; a scene file may hold
+    fewer, see `largest_harmonics`. progress: takes a line on the next step, where a step may take long. computed: holds
+    the model of an earlier run.
 
-    With automatic harmonics a bundled scene is built for at least AUTOMATIC_HARMONICS_OF_A_WAVE. A scene file may have
-    as few nodal diameters as one harmonic needs; `largest_harmonics` then gives the limit.
-
-    Raises
-    ------
-    UserError
-        Where the parameters or the scene file are wrong, or the scene lacks what the study asks for.
+    Raises UserError where the parameters or the scene file are wrong, or the scene lacks what the study asks for.
     """
     model = _build(study, progress, InMemory() if computed is None else computed)
     check_outputs(study, model)

@@ -52,14 +52,12 @@ def check_outputs(study: Study, model: ReducedModel) -> None:
             raise UserError(study.source, "outputs.loops", pair, remedy)
     own = {"contact": n_contact, "response": len(model.response_names), "cycle": len(study.cycles_kept)}
     sizes = {**own, **study.sizes}
-    of_loops = 8.0 * loop_numbers(study)
     # the variables of the certificate are there whether they are asked for or not
-    size = of_loops + 8.0 * sum(math.prod(sizes[name] for name in each.dimensions) for each in study.variables.values())
-    if size > _LARGEST_HISTORY:
-        loops_alone = of_loops > _LARGEST_HISTORY
-        key, value = ("loops", list(loops)) if loops_alone else ("outputs", len(study.cycles_kept))
-        remedy = f"give fewer{' pairs or slow_time.outputs' if loops_alone else ''}: one point would take {1e-9 * size:.1f} GB"
-        raise UserError(study.source, f"{'outputs' if loops_alone else 'slow_time'}.{key}", value, remedy)
+    n_values = sum(math.prod(sizes[name] for name in each.dimensions) for each in study.variables.values())
+    if (size := 8.0 * (loop_numbers(study) + n_values)) > _LARGEST_HISTORY:
+        remedy = f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
+        key = "outputs.loops" if loops else "slow_time.outputs"
+        raise UserError(study.source, key, list(loops) if loops else len(study.cycles_kept), remedy)
     if "natural_frequency" in study.scene_variables and not _has_frequencies(study):
         with _user_errors(study):
             stuck_frequencies(model)

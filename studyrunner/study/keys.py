@@ -5,11 +5,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
 import numpy as np
-from pydantic.fields import FieldInfo
 
 from studyrunner.study.mission import MissionBlock
 from studyrunner.study.mistakes import scene_errors
@@ -107,12 +107,11 @@ def _tables_of_deck(path: Path) -> dict[str, Given]:
 def _new_study(name: str, tables: dict[str, Given]) -> str:
     lines = [_HEAD.format(name=name)]
     for table in ("study", "scene", "axes", "slow_time", "wear", "solver", "outputs"):
-        lines.append(f"[{table}]")
         given: Given = {"name": (name, "")} if table == "study" else tables.get(table, {})
+        lines.append(f"[{table}]")
         lines += [f"{key} = {toml_value(value)}" + f" # {note}" * bool(note) for key, (value, note) in given.items()]
-        for key, field in SECTIONS[table].model_fields.items() if table != "scene" else ():
-            if key not in given and (default := _default(table, field)) not in ("required", "-"):
-                lines.append(f"# {key} = {default} # {_meaning(field)}")
+        others = [each for each in _keys(table, SECTIONS[table]) if each[0] not in given] if table != "scene" else []
+        lines += [f"# {key} = {default} # {meaning}" for key, default, meaning in others if default]
         lines.append("")
     return "\n".join([*lines, _TAIL])
 
@@ -122,31 +121,30 @@ def key_list() -> str:
     lines = []
     kinds: dict[str, type[Section]] = {**SECTIONS, "scene": SceneSection, "mission": MissionBlock}
     for table in ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", "loading", "scatter", "mission"):
-        for key, field in kinds[table].model_fields.items():
-            if field.description and not (table == "axes" and key in SOLVER_AXES):
-                default = _default(table, field)
-                shown = {"required": f"`{table}.{key}` (required)", "-": f"`{table}.{key}`"}
-                lines.append(f"- {shown.get(default, f'`{table}.{key} = {default}`')}: {_meaning(field)}")
+        for key, default, meaning in _keys(table, kinds[table]):
+            if not (table == "axes" and key in SOLVER_AXES):
+                shown = f"`{table}.{key} = {default}`" if default else f"`{table}.{key}`"
+                needed = " (required)" if kinds[table].model_fields[key].is_required() else ""
+                lines.append(f"- {shown}{needed}: {meaning}")
     return "\n".join(lines)
 
 
-def _meaning(field: FieldInfo) -> str:
-    words = [f'"{each}"' for each in _words(field.annotation)]
-    return f"{', '.join(words)}: {field.description}" if words else str(field.description)
+def _keys(table: str, kind: type[Section]) -> Iterator[tuple[str, str, str]]:
+    """Each key with its default, empty where it has none, and its meaning, after the words that it takes."""
+    for key, field in kind.model_fields.items():
+        value = None if field.is_required() else field.default
+        if table in ("axes", "solver") and isinstance(value, tuple):
+            value = value[0]
+        words = "".join(f'"{each}", ' for each in _words(field.annotation)).removesuffix(", ")
+        if field.description:
+            default = "" if value is None else toml_value(value)
+            yield key, default, f"{words}: {field.description}" if words else field.description
 
 
 def _words(annotation: object) -> list[str]:
-    """All words that a type takes."""
     if get_origin(annotation) is Literal:
         return [each for each in get_args(annotation) if isinstance(each, str)]
     return [word for each in get_args(annotation) for word in _words(each)]
-
-
-def _default(table: str, field: FieldInfo) -> str:
-    if field.is_required():
-        return "required"
-    value = field.default[0] if table == "axes" and isinstance(field.default, tuple) else field.default
-    return "-" if value is None else toml_value(value)
 
 
 if __name__ == "__main__":

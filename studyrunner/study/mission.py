@@ -35,19 +35,17 @@ class MissionBlock(Section):
 
     name: Annotated[str, AfterValidator(_check_name)] = Field(description="of the block, a coordinate of the result")
     frequency: Positive | Annotated[dict[str, Positive], AfterValidator(_check_passage)] | None = Field(
-        None, description="Hz; or {start, stop, rate}: a passage, with rate in Hz/s; that of [axes] if missing"
+        None, description="Hz; or {start, stop, rate}: a passage, rate in Hz/s; or that of [axes]"
     )
-    engine_order: Positive | None = Field(
-        None, description="in place of a frequency, which is then the order times rotation_speed / 60"
-    )
+    engine_order: Positive | None = Field(None, description="in place of frequency: order times rotation_speed / 60")
     cycles: Positive | None = Field(None, description="of steady vibration in one mission; or seconds")
     seconds: Positive | None = Field(None, description="s, of steady vibration in one mission; or cycles")
     begin: Literal["ramp", "sweep", "continue"] = Field(
         "ramp",
-        description="the excitation rises from the static state, a sweep as axes.sweep says, or from the last state"
-        " of the block before; a passage is a sweep",
+        description="the excitation rises from the static state, a sweep as axes.sweep says, or the last state of the"
+        " block before",
     )
-    excitation_amplitude: Positive | None = Field(None, description="N; that of [axes] if missing")
+    excitation_amplitude: Positive | None = Field(None, description="N; or that of [axes]")
     parameters: dict[str, Any] = Field(default_factory=dict, exclude=True)
 
     def rules(self) -> Iterator[Wrong]:

@@ -29,11 +29,9 @@ class Mistakes:
         self._found: dict[str, UserError] = {}
 
     def __contains__(self, key: str) -> bool:
-        """Whether there is a mistake under this key."""
         return key in self._found
 
     def __len__(self) -> int:
-        """How many there are."""
         return len(self._found)
 
     def add(self, key: str, value: object, remedy: str) -> None:
@@ -78,7 +76,8 @@ def check_table(
 
     Raises UserError with all that is wrong in the table.
     """
-    found, wrong = Mistakes(source), iter(())
+    found = Mistakes(source)
+    wrong: Iterator[Wrong] = iter(())
     try:
         # tables of scenes are made for other callers as well, and take this from their caller
         checked = kind.model_validate(table, strict=None if issubclass(kind, Section) else True)
@@ -120,10 +119,9 @@ def _wrong(kind: type[BaseModel], key: str, found: Sequence[Mapping[str, Any]], 
     if details["type"] == "extra_forbidden":
         return Wrong(key, details["input"], f"unknown key, give {_nearest(kind, names, others)}")
     if details["type"] == "missing":
-        of_list = isinstance(details["loc"][-1], int)
-        return Wrong(
-            key, details["input"] if of_list else None, f"{'give more' if of_list else 'missing: give it'}{unit}"
-        )
+        if isinstance(details["loc"][-1], int):
+            return Wrong(key, details["input"], f"give more values{unit}")
+        return Wrong(key, None, f"missing: give it{unit}")
     cause = details.get("ctx", {}).get("error")
     if isinstance(cause, WrongValueError | SceneError):
         value = Verbatim(cause.value) if isinstance(cause, SceneError) else cause.value
@@ -139,8 +137,10 @@ def flat_errors(error: ValidationError) -> Iterator[dict[str, Any]]:
     """All that is wrong, with its way from the table, also in tables that were checked on the way."""
     for details in error.errors(include_url=False):
         cause = details.get("ctx", {}).get("error")
-        inner = flat_errors(cause) if isinstance(cause, ValidationError) else [{**details, "loc": ()}]
-        yield from ({**each, "loc": (*details["loc"], *each["loc"])} for each in inner)
+        if isinstance(cause, ValidationError):
+            yield from ({**each, "loc": (*details["loc"], *each["loc"])} for each in flat_errors(cause))
+        else:
+            yield {**details}
 
 
 def _places(table: object, details: Mapping[str, Any]) -> list[str | int]:
@@ -189,7 +189,11 @@ def _nearest(kind: type[BaseModel], names: Sequence[str], others: Sequence[str])
 def nearest_name(name: str, known: Iterable[str]) -> str:
     """The known name that is meant by `name`, or all of them: "one of a, b"."""
     names = list(dict.fromkeys(known))
+    return close_name(name, names) or "one of " + ", ".join(names)
+
+
+def close_name(name: str, known: Sequence[str]) -> str:
+    """The known name that is meant by `name`; empty where none is."""
     # a longer name for the same, or a shorter one
-    parts = [key for key in names if len(name) > 3 and (name.lower() in key or key in name.lower())]
-    near = difflib.get_close_matches(name, names, n=1) or parts[:1]
-    return near[0] if near else "one of " + ", ".join(names)
+    parts = [key for key in known if len(name) > 3 and (name.lower() in key or key in name.lower())]
+    return next(iter(difflib.get_close_matches(name, known, n=1) or parts), "")

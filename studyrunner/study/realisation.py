@@ -7,7 +7,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,11 +16,9 @@ from studyrunner.scatter.drawn_values import Drawn, ScatteredPairs, drawn
 from studyrunner.scatter.section import OF_PAIRS, Scattered
 from studyrunner.study.kinds import NUMBERS
 from studyrunner.study.mission import MissionBlock
-from studyrunner.study.mistakes import nearest_name
 from studyrunner.study.room_for_wear import with_room_for_wear
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, WrongValueError
-from studyrunner.values import Wrong
 
 _NO_PAIRS = ScatteredPairs(("",), np.zeros((1, 3)))
 """Stands for the pairs where inputs are drawn that do not belong to pairs."""
@@ -42,12 +39,8 @@ class Realisation:
 def realise(study: Study) -> tuple[Realisation, ...]:
     """The parts of a study, in the order of their places; the study itself where it has no such axes and samples.
 
-    Values that differ between the pairs of a contact are not in the parts, see `draw_pairs`.
-
-    Raises
-    ------
-    UserError
-        Where a sample draws a value that is none.
+    Values that differ between the pairs of a contact are not in the parts, see `draw_pairs`. Raises UserError where a
+    sample draws a value that is none.
     """
     places = itertools.product(*(range(len(axis.values)) for axis in study.scene_axes))
     variants = zip(study.variants or (study,), places, strict=True)
@@ -90,40 +83,6 @@ def draw_pairs(
 def is_of_pairs(name: str, scattered: Scattered) -> bool:
     """Whether an input belongs to contact pairs: gaps, areas, a friction coefficient with draws of its own."""
     return name in OF_PAIRS and (name != "friction_coefficient" or scattered.of != "all pairs")
-
-
-def wrong_scatter(study: Study) -> Iterator[Wrong]:
-    """What is wrong with inputs of [scatter] beside the other tables: unknown ones, and those that cannot scatter."""
-    section = study.scatter
-    if section is None:
-        return
-    of_pairs = [name for name, each in section.inputs.items() if is_of_pairs(name, each)]
-    if of_pairs and "exact" in study.outputs.variables:
-        remedy = f"leave it out: the closed form knows nothing of the {of_pairs[0]} that [scatter] draws for each pair"
-        yield Wrong("outputs.variables", "exact", remedy)
-    fields = type(study.scene.parameters).model_fields
-    # numbers with fractions
-    floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
-    known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *floats, *study.wear.numbers]
-    for name, scattered in section.inputs.items():
-        key, given, absolute = f"scatter.{name}", scattered.distribution, scattered.distribution.is_absolute
-        if name not in known:
-            yield Wrong(key, None, f"unknown input, give {nearest_name(name, known)}")
-        if name == "frequency" and study.follow is not None:
-            remedy = f'leave it out: with axes.frequency = "{study.follow.of}" each sample finds its own frequency'
-            yield Wrong(key, None, remedy)
-        several = name in NUMBERS and len(getattr(study.axes, name)) > 1
-        if absolute and (several or any(axis.name == name for axis in study.scene_axes)):
-            remedy = f"give one value of axes.{name}, or a distribution around the study's own values, as {{std = ...}}"
-            yield Wrong(key, given.model_dump(exclude_none=True), remedy)
-        for block in study.mission:
-            if block.gives(name) and (absolute or name == "frequency"):
-                other = "leave it out" if name == "frequency" else "give a distribution around own values"
-                yield Wrong(
-                    key,
-                    given.model_dump(exclude_none=True),
-                    f"{other}: the block {block.name} gives a {name} of its own",
-                )
 
 
 def block_of_input(study: Study, name: str) -> MissionBlock | None:

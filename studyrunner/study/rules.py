@@ -1,30 +1,96 @@
-"""Rules between the tables of a study. Each yields what breaks it; one that needs a table that is wrong is left out."""
+"""Rules between the tables of a study. Each yields what breaks it; one that needs a table that is wrong is left out.
+
+They look at what the study file gives, and at complete studies.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any, get_args
 
 from studyrunner.coordinates import SCENE
-from studyrunner.study.kinds import WEAR
-from studyrunner.study.mistakes import Mistakes
-from studyrunner.study.realisation import wrong_scatter
-from studyrunner.study.sections import AUTO
+from studyrunner.scatter.section import OF_PAIRS
+from studyrunner.study.kinds import MISSIONS, MODES, NUMBERS, WEAR
+from studyrunner.study.mistakes import Mistakes, nearest_name
+from studyrunner.study.realisation import is_of_pairs
+from studyrunner.study.sections import AUTO, DEFAULT, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.values import Wrong
+from studyrunner.variables import KEPT
 
 _MOST_POINTS = 1_000_000
 
 
 def check_rules(study: Study, found: Mistakes, *, complete: bool) -> None:
     """Notes what breaks a rule. complete: whether the study has all tables; it has none that are wrong themselves."""
-    for rule in (_variables, size_of_result, _solver, _end, _followed, wrong_scatter):
+    for rule in (_kind, _slow_time, _frequency, _variables, size_of_result, _solver, _end, wrong_scatter):
         try:
             for wrong in rule(study):
                 found.add(*wrong)
         except AttributeError:
             if complete:
                 raise
+
+
+def _kind(study: Study) -> Iterator[Wrong]:
+    """Keys have a use in a study of this kind."""
+    kind, axes = study.kind, study.axes
+    for name, keys in kind.unused.items():
+        table = getattr(study, name)
+        for key in [key for key in keys if key in table.model_fields_set]:
+            if (value := getattr(table, key)) != ():
+                yield Wrong(f"{name}.{key}", value, kind.why)
+    if kind is MODES and "ramp" in axes.sweep:
+        yield Wrong("axes.sweep", "ramp", 'give "up" or "down": the modal amplitude is raised or lowered')
+    if kind is not MODES and axes.mode != (1,):
+        remedy = "give axes.modal_amplitude as well: mode is that of a nonlinear mode"
+        yield Wrong("axes.mode", axes.mode, remedy)
+
+
+def _slow_time(study: Study) -> Iterator[Wrong]:
+    """Missions are counted where there are blocks."""
+    missions = study.slow_time.missions
+    if study.kind is MISSIONS and missions is None:
+        remedy = "missing: give the number of missions, how often the blocks are repeated"
+        yield Wrong("slow_time.missions", None, remedy)
+    elif study.kind is WEAR and missions is not None:
+        remedy = "give blocks under [[mission]], which are repeated so often, or slow_time.cycles in its place"
+        yield Wrong("slow_time.missions", missions, remedy)
+
+
+def _frequency(study: Study) -> Iterator[Wrong]:
+    """The frequency is given once: in Hz, as a ratio, or as a resonance in a range."""
+    axes, word, frequency = study.axes, _followed(study), list(study.axes.frequency or ())
+    given = axes.model_fields_set & {"frequency", "frequency_ratio"}
+    if study.kind is WEAR and not given:
+        yield Wrong("axes.frequency", None, "missing: give it, in Hz, or frequency_ratio")
+    if len(given) > 1:
+        yield Wrong("axes.frequency", frequency, "leave it out, or frequency_ratio: give one of both")
+    if word is None and study.loading is not None:
+        remedy = 'leave it out, or give axes.frequency = "resonance" or "peak", which is followed in this range'
+        yield Wrong("loading", study.loading.model_dump(), remedy)
+    if word is None:
+        return
+    followed = f'axes.frequency = "{word}" changes'
+    if study.kind is MISSIONS:
+        yield Wrong("axes.frequency", word, "give frequencies in Hz: blocks of a mission follow no resonance")
+    if len(frequency) > 1:
+        remedy = f'give "{word}" alone: every point has the frequency that it finds; the other is another study'
+        yield Wrong("axes.frequency", frequency, remedy)
+    if "ramp" in axes.sweep:
+        yield Wrong("axes.sweep", "ramp", f'give "up" or "down": a ramp has a fixed frequency, and {followed}')
+    if "final" in axes.scheme:
+        remedy = f'give "adaptive": the scheme "final" has a fixed frequency, and {followed}'
+        yield Wrong("axes.scheme", "final", remedy)
+
+
+def _followed(study: Study) -> str | None:
+    """What the frequency follows, also before the study is complete."""
+    if study.follow is not None:
+        return study.follow.of
+    given: tuple[Any, ...] = study.axes.frequency or ()
+    return next((each for each in given if isinstance(each, str)), None)
 
 
 def size_of_result(study: Study) -> Iterator[Wrong]:
@@ -44,18 +110,23 @@ def _variables(study: Study) -> Iterator[Wrong]:
     """Variables are of the kind of study and of the scene."""
     known = dict.fromkeys((*study.variables, *(name for name in SCENE if name != "exact" or study.kind is WEAR)))
     for name in study.outputs.variables:
-        if name not in known:
+        if name not in (DEFAULT, *KEPT, *known):
             remedy = f"give names out of {', '.join(known)}: {study.kind.name} do not have it"
             yield Wrong("outputs.variables", name, remedy)
         elif name in ("mesh", "exact") and name not in study.scene.offers:
             yield Wrong("outputs.variables", name, f"leave it out: the scene {study.scene.model} has none")
-        elif name == "exact" and (study.to_the_end or study.follow is not None):
+        elif name == "exact" and (study.to_the_end or _followed(study) or study.axes.frequency_ratio):
             remedy = "leave it out: it is of given frequencies and given cycle counts, which this study does not have"
             yield Wrong("outputs.variables", "exact", remedy)
 
 
 def _solver(study: Study) -> Iterator[Wrong]:
-    """Samples in a period resolve the harmonics; a law that depends on depths knows the depths."""
+    """Samples in a period resolve the harmonics, which are given once; a law that depends on depths knows them."""
+    for key in SOLVER_AXES:
+        if getattr(study.axes, key) is not None and key in study.solver.model_fields_set:
+            values = getattr(study.solver, key)
+            shown = values[0] if len(values) == 1 else list(values)
+            yield Wrong(f"solver.{key}", shown, f"give it once, here or as axes.{key}")
     most = max(study.given_harmonics, default=0)
     fewest = min((number for number in study.samples if number != AUTO), default=None)
     if fewest is not None and fewest <= 2 * most:
@@ -80,13 +151,31 @@ def _end(study: Study) -> Iterator[Wrong]:
         yield Wrong("slow_time.until", study.slow_time.until, remedy)
 
 
-def _followed(study: Study) -> Iterator[Wrong]:
-    """A frequency that is followed is not fixed."""
-    if study.follow is None:
+def wrong_scatter(study: Study) -> Iterator[Wrong]:
+    """What is wrong with inputs of [scatter] beside the other tables: unknown ones, and those that cannot scatter."""
+    section = study.scatter
+    if section is None:
         return
-    followed = f'axes.frequency = "{study.follow.of}" changes'
-    if "ramp" in study.axes.sweep:
-        yield Wrong("axes.sweep", "ramp", f'give "up" or "down": a ramp has a fixed frequency, and {followed}')
-    if "final" in study.axes.scheme:
-        remedy = f'give "adaptive": the scheme "final" has a fixed frequency, and {followed}'
-        yield Wrong("axes.scheme", "final", remedy)
+    of_pairs = [name for name, each in section.inputs.items() if is_of_pairs(name, each)]
+    if of_pairs and "exact" in study.outputs.variables:
+        remedy = f"leave it out: the closed form knows nothing of the {of_pairs[0]} that [scatter] draws for each pair"
+        yield Wrong("outputs.variables", "exact", remedy)
+    fields = type(study.scene.parameters).model_fields
+    # numbers with fractions
+    floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
+    known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *floats, *study.wear.numbers]
+    for name, scattered in section.inputs.items():
+        key, given, absolute = f"scatter.{name}", scattered.distribution, scattered.distribution.is_absolute
+        if name not in known:
+            yield Wrong(key, None, f"unknown input, give {nearest_name(name, known)}")
+        if name == "frequency" and (_followed(study) or study.axes.frequency_ratio):
+            yield Wrong(key, None, "leave it out: each sample finds its own frequency")
+        several = name in NUMBERS and len(getattr(study.axes, name) or ()) > 1
+        if absolute and (several or any(axis.name == name for axis in study.scene_axes)):
+            remedy = f"give one value of axes.{name}, or a distribution around the study's own values, as {{std = ...}}"
+            yield Wrong(key, given.model_dump(exclude_none=True), remedy)
+        for block in study.mission:
+            if block.gives(name) and (absolute or name == "frequency"):
+                other = "leave it out" if name == "frequency" else "give a distribution around own values"
+                remedy = f"{other}: the block {block.name} gives a {name} of its own"
+                yield Wrong(key, given.model_dump(exclude_none=True), remedy)

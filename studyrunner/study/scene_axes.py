@@ -58,7 +58,8 @@ def take_scene_axes(tables: Mapping[str, Any], scene: type[BaseModel], found: Mi
         of_scene = name in scene.model_fields
         if not of_scene and name not in WearSection.AXES:
             continue
-        value, table = tables["axes"].pop(name), "scene" if of_scene else "wear"
+        value = tables["axes"].pop(name)
+        table: Literal["scene", "wear"] = "scene" if of_scene else "wear"
         for inner, values in value.items() if is_table(value) else [(None, value)]:
             key = (name,) if inner is None else (name, str(inner))
             wrong = _wrong_place(tables[table], table, key, values)

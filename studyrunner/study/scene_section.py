@@ -13,7 +13,7 @@ from studies.contact_compliance import ContactStiffness
 from studies.fe_models.model_files import ModelFiles
 from studies.scene_error import SceneError
 from studies.scenes import scene_has, scene_parameters
-from studyrunner.study.mistakes import Mistakes, check_table, scene_errors
+from studyrunner.study.mistakes import Mistakes, check_table, close_name, scene_errors
 from studyrunner.study.study_of_result import SCENE_GROUP, Archived
 from studyrunner.study.worn import Worn
 from studyrunner.user_error import UserError
@@ -107,6 +107,9 @@ def parameters_of(model: object, source: str) -> type[BaseModel]:
 def check_scene(table: Mapping[str, Any], origin: Origin) -> SceneSection:
     """The scene in a table. Raises UserError."""
     model = table.get("model")
+    for key in table if model is None else ():
+        if close_name(key, ["model"]):
+            raise UserError(origin.source, f"scene.{key}", table[key], "unknown key, give model")
     kind = parameters_of(model, origin.source)
     assert isinstance(model, str)
     given = {key: value for key, value in table.items() if key not in ("model", "worn")}

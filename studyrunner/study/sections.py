@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, ClassVar, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, cast
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from solver.contact.wear_law import WearLaw, WearTable
-from solver.settings import TARGETS
+from solver.settings import TARGETS, Followed
 from studyrunner.coordinates import SCENE
 from studyrunner.mission_variables import OF_MISSIONS
 from studyrunner.mode_variables import OF_MODES
@@ -76,6 +76,12 @@ def _check_target(value: dict[str, float]) -> dict[str, float]:
 _Knots = Annotated[Listed[float], Field(min_length=1, max_length=_MOST_KNOTS), AfterValidator(ascending)]
 
 
+if TYPE_CHECKING:
+    _Frequencies = tuple[float, ...]  # of a complete study
+else:
+    _Frequencies = Axis[Positive | Followed] | None
+
+
 class StudySection(Section):
     """[study]: name and title of the study."""
 
@@ -86,8 +92,9 @@ class StudySection(Section):
 class AxesSection(Section):
     """[axes]: every axis becomes a dimension of the result, in the order of the values given here."""
 
-    frequency: Axis[Positive] = Field(
-        description='Hz; or "resonance" or "peak", followed in the range of [loading]; not for modes and missions'
+    frequency: _Frequencies = Field(
+        cast("Any", None),
+        description="Hz; a word is followed in the range of [loading]; needed for wear histories, or frequency_ratio",
     )
     frequency_ratio: Axis[Positive] | None = Field(
         None, description="in place of frequency: over the first natural frequency of the same scene, all pairs stuck"
@@ -97,12 +104,12 @@ class AxesSection(Section):
     step: Axis[Positive] = Field((1000.0,), description="h, cycles: length of implicit and explicit steps")
     scheme: Axis[Scheme] = Field(("adaptive",), description="how wear is integrated over the cycles")
     sweep: Axis[Sweep] = Field(
-        ("up",), description="how the unworn state is reached: the frequency rises, or falls, or the excitation rises"
+        ("up",), description="to the unworn state the frequency rises, or falls, or the excitation rises"
     )
     modal_amplitude: Axis[Positive] | None = Field(
         None, description="m sqrt(kg), of nonlinear modes, in place of a frequency"
     )
-    mode: Axis[Mode] | None = Field(None, description="number of the nonlinear mode, by frequency, from 1 on")
+    mode: Axis[Mode] = Field((1,), description="number of the nonlinear mode, by frequency, from 1 on")
     harmonics: Axis[Harmonics] | None = Field(None, description="harmonics above the static one")
     samples: Axis[Samples] | None = Field(None, description="time samples in a period")
     tolerance: Axis[Fraction] | None = Field(None, description="of the scaled residual")
@@ -176,23 +183,23 @@ class SlowTimeSection(Section):
         100_000.0, description="of vibration; 0: the unworn states only, inf: until nothing wears any more"
     )
     missions: Annotated[Whole, Field(ge=1, le=10_000_000)] | None = Field(
-        None, description="how often the blocks under [[mission]] are repeated, in place of cycles"
+        None, description="repetitions of the blocks under [[mission]], in place of cycles"
     )
     final_share: Fraction = Field(
         1e-4,
-        description="with cycles = inf: share of its largest wear rate below which a pair wears no more",
+        description="of its largest wear rate, below which a pair wears no more with cycles = inf",
     )
     outputs: (
         Annotated[Whole, Field(ge=1, le=1_000_000)]
         | Annotated[Listed[NotNegative], Field(min_length=1), AfterValidator(ascending)]
     ) = Field(
         101,
-        description="number of equally spaced cycle counts, 0 and the last included, or a list of cycle counts",
+        description="number of equally spaced cycle counts with 0 and the last, or a list",
     )
     until: Annotated[dict[str, Positive], AfterValidator(_check_target)] | None = Field(
         None,
-        description="wear at which a point ends: {wear_depth = 1e-5}, m, of the deepest pair, {worn_volume = 1e-9}, m3,"
-        " or {frequency_shift = 0.01}, relative change of the resonance",
+        description="end of a point: {wear_depth = 1e-5}, m, of the deepest pair, {worn_volume = 1e-9}, m3,"
+        " or {frequency_shift = 0.01}, relative",
     )
     largest_depth: Positive | None = Field(
         None, description="m, that a pair wears in an explicit step, Eq. (22); in place of step"
@@ -219,12 +226,14 @@ class SlowTimeSection(Section):
 
 
 class SolverSection(Section):
-    """[solver]: resolution and accuracy. A key under [axes] replaces the key here."""
+    """[solver]: resolution and accuracy. Several values of the first keys are an axis, as under [axes]."""
 
-    harmonics: Harmonics = Field(AUTO, description="or number of harmonics above the static one")
-    samples: Samples = Field(AUTO, description="or number of time samples in a period, more than twice the harmonics")
-    tolerance: Fraction = Field(1e-8, description="of the scaled residual")
-    rtol: Fraction = Field(1e-2, description="aim for the relative error of worn volume and response")
+    harmonics: Axis[Harmonics] = Field((AUTO,), description="or number of harmonics above the static one")
+    samples: Axis[Samples] = Field(
+        (AUTO,), description="or number of time samples in a period, more than twice the harmonics"
+    )
+    tolerance: Axis[Fraction] = Field((1e-8,), description="of the scaled residual")
+    rtol: Axis[Fraction] = Field((1e-2,), description="aim for the relative error of worn volume and response")
     shortcuts: bool = Field(True, description="whether points with the same history share one")
     time_limit: Positive | None = Field(None, description="s, CPU time that a start state or a wear history may take")
 
@@ -233,7 +242,7 @@ class OutputsSection(Section):
     """[outputs]: variables of the result; `outcome` and the totals of a point are always there."""
 
     variables: Annotated[Listed[str], BeforeValidator(_check_variables), AfterValidator(once)] = Field(
-        (DEFAULT,), description="list of names; default stands for the usual ones, see RESULT_FILE.md"
+        (DEFAULT,), description="list of names; default: the usual ones, see RESULT_FILE.md"
     )
     loops: Annotated[
         Listed[Annotated[Whole, Field(ge=0, le=1_000_000)]],
@@ -247,7 +256,7 @@ class LoadingSection(Section):
     """[loading]: range of a frequency that is followed."""
 
     between: Annotated[tuple[Positive, Positive], Field(strict=False), AfterValidator(ascending)] = Field(
-        description='Hz, [lowest, highest] frequency of the excitation with axes.frequency = "resonance" or "peak"'
+        description='Hz, [lowest, highest], with axes.frequency = "resonance" or "peak"'
     )
 
 

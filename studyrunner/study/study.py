@@ -144,23 +144,23 @@ class Study(Section):
 
     @property
     def harmonics(self) -> tuple[int | Automatic, ...]:
-        """Values of `harmonics`, from its axis or the one under [solver]; so for the other solver keys."""
-        return self.axes.harmonics or (self.solver.harmonics,)
+        """Values of `harmonics`, under [axes] or [solver]; so for the other solver keys."""
+        return self.axes.harmonics or self.solver.harmonics
 
     @property
     def samples(self) -> tuple[int | Automatic, ...]:
         """Values of `samples`."""
-        return self.axes.samples or (self.solver.samples,)
+        return self.axes.samples or self.solver.samples
 
     @property
     def tolerance(self) -> tuple[float, ...]:
         """Values of `tolerance`."""
-        return self.axes.tolerance or (self.solver.tolerance,)
+        return self.axes.tolerance or self.solver.tolerance
 
     @property
     def rtol(self) -> tuple[float, ...]:
         """Values of `rtol`."""
-        return self.axes.rtol or (self.solver.rtol,)
+        return self.axes.rtol or self.solver.rtol
 
     @property
     def given_harmonics(self) -> tuple[int, ...]:
@@ -171,7 +171,8 @@ class Study(Section):
     def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
         names = {} if self.axes.frequency_ratio is None else {"frequency": "frequency_ratio"}
-        found = {names.get(name, name): getattr(self.axes, name) for name in self.own_axes} | self.axes_of_parts
+        own = {names.get(name, name): self if name in SOLVER_AXES else self.axes for name in self.own_axes}
+        found = {name: getattr(table, name) or () for name, table in own.items()} | self.axes_of_parts
         if self.axes.modal_amplitude is None:
             return found
         worn = found.pop("cycle", (0.0,))
@@ -196,4 +197,5 @@ class Study(Section):
     def own_axes(self) -> tuple[str, ...]:
         """Names of the axes that are neither keys of [scene] or [wear] nor samples."""
         used = (name for name in self.kind.axes if name not in self.idle_axes)
-        return (*used, *(key for key in SOLVER_AXES if getattr(self.axes, key) is not None))
+        several = [key for key in SOLVER_AXES if getattr(self.axes, key) or len(getattr(self.solver, key)) > 1]
+        return (*used, *several)

@@ -6,29 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from pydantic import BaseModel
 
+from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter.section import flat_table
-from studyrunner.study.kinds import (
-    IDLE_FREQUENCY,
-    MODES,
-    Tables,
-    kind_of,
-    take_followed,
-    take_ratio,
-    take_unused,
-    with_idle_values,
-    without_idle_values,
-)
+from studyrunner.study.kinds import MODES
 from studyrunner.study.mission import OWN_AXES, MissionBlock, check_used_axes, engine_frequency, read_blocks
-from studyrunner.study.mistakes import Mistakes, check_table, nearest_name
+from studyrunner.study.mistakes import Mistakes, check_table, close_name, nearest_name
 from studyrunner.study.overrides import override
-from studyrunner.study.realisation import wrong_scatter
 from studyrunner.study.room_for_wear import with_room_for_wear
-from studyrunner.study.rules import check_rules, size_of_result
+from studyrunner.study.rules import check_rules, size_of_result, wrong_scatter
 from studyrunner.study.scene_axes import (
     SceneAxis,
     as_checked,
@@ -39,39 +29,39 @@ from studyrunner.study.scene_axes import (
     take_scene_axes,
 )
 from studyrunner.study.scene_section import Origin, check_scene, parameters_of
-from studyrunner.study.sections import DEFAULT, SECTIONS, SOLVER_AXES, VARIABLES, AxesSection, WearSection
+from studyrunner.study.sections import (
+    DEFAULT,
+    SECTIONS,
+    SOLVER_AXES,
+    VARIABLES,
+    AxesSection,
+    SlowTimeSection,
+    WearSection,
+)
 from studyrunner.study.study import Study
 from studyrunner.study.study_of_result import read_archived
 from studyrunner.study.toml_text import format_toml, read_toml, read_toml_file
 from studyrunner.study.worn import AXIS as WORN_AXIS
 from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError
+from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
+Tables = dict[str, Any]
+
+_IDLE_FREQUENCY = 1.0  # Hz, where no point has a frequency of the axis
 _ON_REQUEST = ("scatter", "loading", "mission")
 _TABLES = ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", *_ON_REQUEST)
 
 
 def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Study:
-    """Read and check a study.
+    """Read and check a study; every default is filled in.
 
-    Parameters
-    ----------
-    study
-        Path of a TOML file or of a result file, or the name of a bundled study.
-    overrides
-        Values of keys by their dotted names, as `{"slow_time.cycles": 1e4, "axes.frequency": [210.0, 210.5]}`; numpy
-        arrays and tuples stand for lists. Or texts KEY=VALUE; VALUE is TOML or a bare word.
+    study: path of a TOML file or of a result file, or the name of a bundled study. overrides: values of keys by their
+    dotted names, as `{"slow_time.cycles": 1e4, "axes.frequency": [210.0, 210.5]}`, where numpy arrays and tuples stand
+    for lists; or texts KEY=VALUE, where VALUE is TOML or a bare word.
 
-    Returns
-    -------
-    Study
-        Every default filled in.
-
-    Raises
-    ------
-    UserError
-        Where there is no such study or something in it is wrong: for each mistake a line that says what would be right.
+    Raises UserError where there is no such study or something in it is wrong: a line for each mistake.
     """
     argument = str(study)
     path = _study_path(argument)
@@ -120,15 +110,15 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     """The study in a table as TOML has it, every default filled in. Raises UserError with all that is wrong."""
     found = Mistakes(origin.source)
     tables = _known_tables(table, found)
-    take_unused(tables, found)
-    moved = take_ratio(tables, found)
     _take_worn(tables, origin, found)
-    moved |= _move_solver_axes(tables, found)
     axes, blocks = _axes_and_blocks(tables, origin, found)
-    parts, renamed = [], {**moved, **keys_below_axes(axes)}
+    sections = _check_sections(tables, origin, found)
+    if blocks or "mission" not in tables:
+        sections["mission"] = blocks
+    parts, renamed = [], keys_below_axes(axes)
     for part in combinations(tables, axes):
         with found.collecting(renamed):
-            checked = _check_part(part, origin, blocks, found)
+            checked = _check_part(part, sections, origin, found)
             parts.append(checked if found else _complete(checked))
     found.raise_any(table)
     study = parts[0]
@@ -148,7 +138,10 @@ def _known_tables(table: Mapping[str, object], found: Mistakes) -> Tables:
         if name not in _TABLES:
             meant = nearest_name(name, _TABLES)
             found.add(name, section, f"unknown table, give {meant}")
-            needed = [each for each in needed if each != meant]
+            if meant in tables and meant not in table and isinstance(section, dict):
+                # what it holds may be wrong as well
+                tables[meant] = dict(section)
+                needed = [each for each in needed if each != meant]
         elif name == "mission":
             tables[name] = section
         elif not isinstance(section, dict):
@@ -168,24 +161,9 @@ def _take_worn(tables: Tables, origin: Origin, found: Mistakes) -> None:
         return
     with found.collecting():
         tables["scene"]["worn"] = read_worn(worn, origin.source, origin.path.parent)
-        if kind_of(tables) is MODES and not tables["scene"]["worn"]["cycle"]:
+        if "modal_amplitude" in tables["axes"] and not tables["scene"]["worn"]["cycle"]:
             remedy = "missing: give the cycle count of each depth, which is the coordinate cycle of the modes"
             found.add("scene.worn.cycle", None, remedy)
-
-
-def _move_solver_axes(tables: Tables, found: Mistakes) -> dict[str, str]:
-    """Makes axes of the solver keys with several values. Returns for each of these axes the key that was given."""
-    solver, axes, moved = tables["solver"], tables["axes"], {}
-    for key in SOLVER_AXES:
-        value = solver.get(key)
-        if key in solver and key in axes:
-            found.add(f"solver.{key}", solver.pop(key), f"give it once, here or as axes.{key}")
-        elif isinstance(value, list) and len(value) == 1:
-            solver[key] = value[0]
-        elif isinstance(value, list | dict):
-            axes[key] = solver.pop(key)
-            moved[f"axes.{key}"] = f"solver.{key}"
-    return moved
 
 
 def _scene_kind(tables: Tables, origin: Origin) -> type[BaseModel] | None:
@@ -202,7 +180,8 @@ def _axes_and_blocks(
     """Axes that are keys of [scene] or [wear], taken out of the tables, and the blocks of a study of missions."""
     kind = _scene_kind(tables, origin)
     if kind is None:
-        for name in tables["axes"].keys() - AxesSection.model_fields.keys():
+        # of other names, which may be keys of the scene, nothing is known
+        for name in [name for name in tables["axes"] if not close_name(name, [*AxesSection.model_fields])]:
             del tables["axes"][name]
         return (), ()
     own = [name for name in tables["axes"] if name in OWN_AXES]
@@ -211,81 +190,83 @@ def _axes_and_blocks(
     if "mission" in tables:
         blocks = read_blocks(tables["mission"], tables["axes"], kind, found)
         check_used_axes([*own, *(axis.name for axis in axes)], blocks, found)
-    name = "cycle" if kind_of(tables) is MODES else WORN_AXIS
+    name = "cycle" if "modal_amplitude" in tables["axes"] else WORN_AXIS
     return (*axes, *worn_axis(tables["scene"].get("worn", {}), name)), blocks
 
 
-def _check_part(tables: Tables, origin: Origin, blocks: tuple[MissionBlock, ...], before: Mistakes) -> Study:
-    """A study without axes that are keys of [scene] or [wear], of tables that are right. Raises UserError.
+def _check_sections(tables: Tables, origin: Origin, found: Mistakes) -> dict[str, Any]:
+    """The tables but [scene] and [wear], which differ along axes: those that are right."""
+    if any(each in FOLLOWED for each in listed(tables["axes"].get("frequency"))):
+        tables.setdefault("loading", {})
+    scene, sections = _scene_kind(tables, origin), {}
+    for name, kind in SECTIONS.items():
+        if name in tables and name not in found and name != "wear":
+            others = (*scene.model_fields, *WearSection.AXES) if scene and name == "axes" else ()
+            with found.collecting():
+                sections[name] = check_table(kind, tables[name], origin.source, name, others)
+    return sections
 
-    before: mistakes because of which tables are missing.
+
+def _check_part(tables: Tables, sections: Mapping[str, Any], origin: Origin, before: Mistakes) -> Study:
+    """A study without axes that are keys of [scene] or [wear]. Raises UserError.
+
+    sections: its other tables that are right. before: mistakes because of which tables are missing.
     """
-    found, tables = Mistakes(origin.source), dict(tables)
-    parts: dict[str, Any] = {"source": origin.source, "folder": origin.path.parent, "archived": origin.archived}
+    found, parts = Mistakes(origin.source), dict(sections)
     if "scene" not in before:
         with found.collecting():
             parts["scene"] = check_scene(tables["scene"], origin)
-    if "mission" in tables and (of_blocks := _block_studies(tables, blocks, origin, before, found)):
-        parts |= {"mission": blocks, "block_studies": of_blocks}
-    parts["follow"] = take_followed(tables, found)
-    filled = with_idle_values(tables)
-    scene = _scene_kind(tables, origin)
-    for name, kind in SECTIONS.items():
-        if name in filled and name not in before:
-            others = (*scene.model_fields, *WearSection.AXES) if scene and name == "axes" else ()
-            with found.collecting():
-                parts[name] = check_table(kind, filled[name], origin.source, name, others)
-    study = Study.model_construct(**parts)
-    wrong = [name for name in filled if name not in parts]
+    with found.collecting():
+        parts["wear"] = check_table(WearSection, tables["wear"], origin.source, "wear")
+    study = Study.model_construct(**parts, source=origin.source, folder=origin.path.parent, archived=origin.archived)
+    wrong = [name for name in (*tables, "mission") if name not in parts]
     for name in wrong:
         # a rule that asks for it is left out
         vars(study).pop(name, None)
-    if "outputs" in parts:
-        study = _with_usual_variables(study, tables)
     check_rules(study, found, complete=not wrong)
+    if sections.get("mission") and "axes" in parts:
+        study = _with_block_studies(study, tables["scene"], origin, found)
     found.raise_any()
     return study
 
 
-def _complete(study: Study) -> Study:
-    """A right study with scenes that have room for wear."""
-    outputs = {"outputs": study.outputs}
-    blocks = tuple(each.model_copy(update=outputs) for each in study.block_studies)
-    return with_room_for_wear(study.model_copy(update={"block_studies": blocks}))
-
-
-def _block_studies(
-    tables: Tables, blocks: Sequence[MissionBlock], origin: Origin, before: Mistakes, found: Mistakes
-) -> tuple[Study, ...]:
-    """For each block a study of this block alone; none where a parameter of a block is wrong."""
-    studies: list[Study] = []
-    for block in blocks:
-        own = {name: getattr(block, name) for name in OWN_AXES if isinstance(getattr(block, name), float)}
-        alone = {name: table for name, table in tables.items() if name != "mission"}
-        alone["scene"] = {**tables["scene"], **block.parameters}
-        alone["axes"] = {"frequency": IDLE_FREQUENCY, **tables["axes"], **own}
-        alone["slow_time"] = {}
-        alone["outputs"] = {key: value for key, value in tables["outputs"].items() if key == "scene"}
-        renamed = {f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}
-        with found.collecting(renamed):
-            study = _check_part(alone, origin, (), before)
+def _with_block_studies(study: Study, scene: Mapping[str, Any], origin: Origin, found: Mistakes) -> Study:
+    """The study with a study of each block alone. scene: table of the study."""
+    studies = []
+    for block in study.mission:
+        own = {name: (getattr(block, name),) for name in OWN_AXES if isinstance(getattr(block, name), float)}
+        update: dict[str, Any] = {"mission": (), "slow_time": SlowTimeSection()}
+        with found.collecting({f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}):
+            update["scene"] = check_scene({**scene, **block.parameters}, origin)
             if block.engine_order is not None:
-                frequency = engine_frequency(block, study.scene.parameters, origin.source)
-                study = study.model_copy(update={"axes": study.axes.model_copy(update={"frequency": (frequency,)})})
-            studies.append(study)
-    return tuple(studies) if len(studies) == len(blocks) else ()
+                own["frequency"] = (engine_frequency(block, update["scene"].parameters, origin.source),)
+        axes = {"frequency": study.axes.frequency or (_IDLE_FREQUENCY,), **own}
+        update["axes"] = study.axes.model_copy(update=axes)
+        studies.append(study.model_copy(update=update))
+    return study.model_copy(update={"block_studies": tuple(studies)})
 
 
-def _with_usual_variables(study: Study, tables: Tables) -> Study:
-    """[outputs] with variables in their order, the usual ones of such a study for the word that stands for them."""
-    names, kind = set(study.outputs.variables), kind_of(tables)
+def _complete(study: Study) -> Study:
+    """A right study with frequencies in numbers, variables by name, and scenes that have room for wear.
+
+    Ratios stand for frequencies until the natural frequencies of the scenes are known (`scene_set.at_ratios`).
+    """
+    axes, kind, names = study.axes, study.kind, set(study.outputs.variables)
+    frequency = axes.frequency_ratio or axes.frequency or (_IDLE_FREQUENCY,)
+    update: dict[str, object] = {}
+    if study.loading is not None:
+        low, high = study.loading.between
+        update["follow"] = FollowedFrequency(cast("Followed", frequency[0]), low, high)
+        frequency = (0.5 * low + 0.5 * high,)
     if DEFAULT in names:
-        names |= {*(kind.usual if tables.get("scatter") is None else kind.of_samples)}
-        names |= {*(FOLLOWED_FREQUENCY if study.follow is not None else ())}
-        scene = vars(study).get("scene")
-        names |= {"mesh"} & {*(scene.offers if scene else ())}
-    ordered = tuple(name for name in VARIABLES if name in names)
-    return study.model_copy(update={"outputs": study.outputs.model_copy(update={"variables": ordered})})
+        names |= {*(kind.usual if study.scatter is None else kind.of_samples)}
+        names |= {*(FOLLOWED_FREQUENCY if study.loading is not None else ())}
+        names |= {"mesh"} & {*study.scene.offers}
+    outputs = study.outputs.model_copy(update={"variables": tuple(name for name in VARIABLES if name in names)})
+    update |= {"axes": axes.model_copy(update={"frequency": frequency}), "outputs": outputs}
+    update |= {"slow_time": SlowTimeSection(cycles=0.0)} if kind is MODES else {}
+    update["block_studies"] = tuple(each.model_copy(update={"outputs": outputs}) for each in study.block_studies)
+    return with_room_for_wear(study.model_copy(update=update))
 
 
 def format_study(study: Study) -> str:
@@ -300,8 +281,9 @@ def format_study(study: Study) -> str:
     tables["scene"] = {"model": scene["model"], **kept, "worn": _worn_states(study)}
     if study.follow is not None:
         axes["frequency"] = study.follow.of
-    if axes["frequency_ratio"] is not None:
-        del axes["frequency"]
+    used = {*study.own_axes, "modal_amplitude", "frequency_ratio"}
+    used -= set() if axes["frequency_ratio"] is None else {"frequency"}
+    axes = tables["axes"] = {name: values for name, values in axes.items() if name in used}
     for axis in study.scene_axes:
         if axis.key == ("worn",):
             continue
@@ -310,12 +292,14 @@ def format_study(study: Study) -> str:
             given, place = only_table(given[name]), place.setdefault(name, {})
         del given[axis.key[-1]]
         place[axis.key[-1]] = list(axis.values)
-    for key in SOLVER_AXES:
-        if axes[key] is not None:
-            del tables["solver"][key]
-    if study.mission:
-        tables["mission"] = [block.as_table() for block in study.mission]
-    return format_toml(without_idle_values(tables, study.kind, study.idle_axes))
+    solver = {key: value[0] if key in SOLVER_AXES else value for key, value in tables["solver"].items()}
+    tables["solver"] = {key: value for key, value in solver.items() if key not in study.own_axes}
+    axes |= {key: list(getattr(study, key)) for key in SOLVER_AXES if key in study.own_axes}
+    for table in ("slow_time", "wear"):
+        for key in study.kind.unused.get(table, ()):
+            del tables[table][key]
+    tables["mission"] = [block.as_table() for block in study.mission]
+    return format_toml(tables)
 
 
 def _worn_states(study: Study) -> dict[str, object] | None:

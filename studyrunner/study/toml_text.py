@@ -70,11 +70,8 @@ def _key(key: str) -> str:
 def toml_value(value: object) -> str:
     """A value on one line, as TOML."""
     if isinstance(value, dict):
-        return (
-            "{"
-            + ", ".join(f"{_key(key)} = {toml_value(item)}" for key, item in value.items() if item is not None)
-            + "}"
-        )
+        items = (f"{_key(key)} = {toml_value(item)}" for key, item in value.items() if item is not None)
+        return "{" + ", ".join(items) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(toml_value(item) for item in value) + "]"
     return "inf" if value == math.inf else json.dumps(value, ensure_ascii=False)

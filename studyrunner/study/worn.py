@@ -119,9 +119,8 @@ def _depths_in(dataset: xr.Dataset, point: Mapping[str, object], cycle: Sequence
     places: dict[str, Any] = {}
     for name in axes:
         values = dataset[name].values.tolist()
-        places[name] = _place(
-            f"scene.worn.{name}", values, point.get(name, values[0] if len(values) == 1 else None), found
-        )
+        wanted = point.get(name, values[0] if len(values) == 1 else None)
+        places[name] = _place(f"scene.worn.{name}", values, wanted, found)
     counts = dataset["cycle"].values.tolist()
     places["cycle"] = [_place("scene.worn.cycle", counts, count, found) for count in cycle]
     found.raise_any()

@@ -75,7 +75,7 @@ def exact(kind: str, frequency: float) -> float:
         return abs(slider_orbit(MASS, DAMPING, MOUNT, FORCE, FRICTION, 2.0 * np.pi * frequency).harmonic(0))
     rate = np.sqrt(MOUNT / MASS)
     limit, damping = FRICTION / FORCE, DAMPING / np.sqrt(MOUNT * MASS)
-    pair = behind_spring(SPRING / MOUNT, damping, limit, 2.0 * np.pi * frequency / rate).pair
+    pair = behind_spring(SPRING / MOUNT, damping, limit, 2.0 * np.pi * frequency / rate)
     return float(abs(pair.response(pair.orbit_near(np.zeros(2), np.zeros(2)))).item()) * FORCE / MOUNT
 
 

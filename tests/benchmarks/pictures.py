@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, QuadMesh
+from matplotlib.collections import LineCollection
 from matplotlib.container import ErrorbarContainer
 
 import studies
@@ -51,11 +51,12 @@ def make_pictures(result: Result, folder: Path) -> dict[str, Any]:
     each PNG file by its name. Raises KeyError where the file lacks what a figure needs.
     """
     drawings = find_drawings(result, NAMES)
-    pictures = {}
-    for drawing in drawings:
-        png = write_picture(drawing, folder)
-        pictures[png.name] = hashlib.sha256(png.read_bytes()).hexdigest()
-    return {**read_numbers(result, drawings), "pictures": pictures}
+    written = [write_picture(drawing, folder) for drawing in drawings]
+    return {
+        "study": result.dataset.attrs["study"],
+        "figures": {each.name: read_figure(each) for each in drawings},
+        "pictures": {png.name: hashlib.sha256(png.read_bytes()).hexdigest() for png in written},
+    }
 
 
 def find_drawings(result: Result, names: Sequence[str]) -> list[Drawing]:
@@ -72,17 +73,8 @@ def write_picture(drawing: Drawing, folder: Path) -> Path:
     return path
 
 
-def read_numbers(result: Result, drawings: Sequence[Drawing]) -> dict[str, Any]:
-    """The study of the file and the numbers of figures that were drawn from it."""
-    return {"study": result.dataset.attrs["study"], "figures": {each.name: read_figure(each) for each in drawings}}
-
-
 def read_figure(drawing: Drawing) -> dict[str, Any]:
-    """What is seen: "caption", and "panels", each with what it has of these, in the units of its axes.
-
-    "title"; "x", "y", the labels of the axes; "lines", by their label the points, or the ranges of many points; "bars",
-    of each error bar its place, low and high end; "maps", the smallest and largest value of each coloured map.
-    """
+    """What is seen: "caption", and "panels" with their "lines", by label, and "bars": place, low and high end."""
     panels = [panel for panel in drawing.figure.axes if panel.get_label() != _COLOUR_BAR]
     return {"caption": drawing.caption, "panels": [_read_panel(panel) for panel in panels]}
 
@@ -90,10 +82,9 @@ def read_figure(drawing: Drawing) -> dict[str, Any]:
 def _read_panel(panel: Axes) -> dict[str, Any]:
     lines = {}
     for line in panel.get_lines():
-        if not str(line.get_label()).startswith("_"):
-            data = [np.asarray(values, dtype=float) for values in line.get_data()]
-            many = len(data[0]) > MOST_POINTS
-            lines[str(line.get_label())] = [_plain(_range(values) if many else values) for values in data]
+        x, y = (np.asarray(values, dtype=float) for values in line.get_data())
+        if not str(line.get_label()).startswith("_") and x.size <= MOST_POINTS:
+            lines[str(line.get_label())] = [_plain(x), _plain(y)]
     bars = [
         _plain([segment[0, 0], *segment[:, 1]])
         for container in panel.containers
@@ -102,18 +93,7 @@ def _read_panel(panel: Axes) -> dict[str, Any]:
         if isinstance(part, LineCollection)
         for segment in part.get_segments()
     ]
-    maps = [
-        _plain(_range(np.ma.filled(mesh.get_array(), np.nan)))
-        for mesh in panel.collections
-        if isinstance(mesh, QuadMesh)
-    ]
-    texts = {"title": panel.get_title(), "x": panel.get_xlabel(), "y": panel.get_ylabel()}
-    found = {**texts, "lines": lines, "bars": bars, "maps": maps}
-    return {key: value for key, value in found.items() if value}
-
-
-def _range(values: Any) -> list[float]:
-    return [float(np.nanmin(values)), float(np.nanmax(values))]
+    return {"lines": lines, "bars": bars}
 
 
 def _plain(values: Any) -> list[float | None]:

@@ -19,39 +19,19 @@ Draw = Callable[[np.random.Generator], "Scene"]
 
 
 @dataclass(frozen=True)
-class Scene:
-    """A structure with a contact pair as in `tests.contact_pair`, its harmonic load per unit of the excitation, N."""
+class Scene(ContactPair):
+    """A structure with a contact pair, for the exact motion and for the solver. excitation: N, of the harmonic load."""
 
-    mass: np.ndarray
-    damping: np.ndarray
-    stiffness: np.ndarray
-    load_static: np.ndarray
-    load_harmonic: np.ndarray
-    normal: int | None
-    tangent: int | None
-    normal_load: float
-    gap: float
-    friction: float
     excitation: float
-    omega: float
-
-    @property
-    def pair(self) -> ContactPair:
-        """The same for the exact motion."""
-        load = self.excitation * self.load_harmonic
-        matrices = self.mass, self.damping, self.stiffness, self.load_static, load
-        return ContactPair(*matrices, self.normal, self.tangent, self.normal_load, self.gap, self.friction, self.omega)
 
     @property
     def model(self) -> ReducedModel:
         """The same for the solver; its responses are those of the masses."""
         rows = np.eye(len(self.mass))[np.diag(self.mass) > 0.0]
-        linear = LinearModel(
-            self.mass, self.damping, self.stiffness, self.load_static, self.load_harmonic.astype(complex), rows
-        )
-        dofs = [-1 if index is None else index for index in (self.normal, self.tangent, None)]
+        load = np.asarray(self.load_harmonic, complex) / self.excitation
+        linear = LinearModel(self.mass, self.damping, self.stiffness, self.load_static, load, rows)
         contact = ContactInterface(
-            dofs=np.array([dofs], np.int64),
+            dofs=np.array([[-1 if index is None else index for index in (self.normal, self.tangent, None)]], np.int64),
             area=np.ones(1),
             gap=np.array([self.gap]),
             normal_load=np.array([self.normal_load]),
@@ -98,9 +78,8 @@ def find(scene: Scene, rtol: float, sweep: str = "up") -> Found:
     orders = start.resolution.orders
     displacement = (motion_h @ synthesis(orders, np.zeros(1)))[:, 0]
     velocity = (1j * scene.omega * np.array(orders) * to_complex(motion_h)).sum(axis=1).real
-    pair = scene.pair
-    orbit = pair.orbit_near(displacement, velocity)
-    exact, slip_work = pair.response(orbit), pair.slip_work(orbit)
+    orbit = scene.orbit_near(displacement, velocity)
+    exact, slip_work = scene.response(orbit), scene.slip_work(orbit)
     return Found(
         history.outcome,
         response=float(np.linalg.norm(history.response[0] - exact) / np.linalg.norm(exact)),
@@ -155,24 +134,10 @@ def slid(
     """
     normal = pressing > 0.0
     places = slice(0 if normal else 1, None)
-    mass_, damping_, stiffness_ = (
-        np.diag(both)[places, places] for both in ((0.0, mass), (0.0, damping), (pressing, stiffness))
-    )
-    static, harmonic = np.array([load, 0.0]) if normal else np.zeros(2), np.array([swing / force, 1.0])
-    return Scene(
-        mass_,
-        damping_,
-        stiffness_,
-        static[places],
-        harmonic[places],
-        0 if normal else None,
-        1 if normal else 0,
-        0.0 if normal else load,
-        0.0,
-        friction,
-        force,
-        omega,
-    )
+    parts = (np.diag(both)[places, places] for both in ((0.0, mass), (0.0, damping), (pressing, stiffness)))
+    static, harmonic = np.array([load if normal else 0.0, 0.0]), np.array([swing, force])
+    pair = (0, 1, 0.0) if normal else (None, 0, load)
+    return Scene(*parts, static[places], harmonic[places], *pair, 0.0, friction, omega, force)
 
 
 def stopping_slider(random: np.random.Generator) -> Scene:
@@ -199,27 +164,17 @@ def two_masses(random: np.random.Generator) -> Scene:
     damping = 2.0 * random.uniform(0.005, 0.04) / natural[0] * stiffness
     omega = random.choice(natural) * random.uniform(0.6, 1.3)
     load = random.uniform(0.05, 0.8) * force / 0.5
-    return Scene(mass, damping, stiffness, np.zeros(2), np.eye(2)[0], None, 1, load, 0.0, 0.5, force, omega)
+    return Scene(mass, damping, stiffness, np.zeros(2), force * np.eye(2)[0], None, 1, load, 0.0, 0.5, omega, force)
 
 
 def wall(ratio: float, gap: float, damping: float, stiffness: float, phase: float = 0.0) -> Scene:
     """Mass before an elastic wall, all in units of the mount. gap: in static deflections. damping: share of critical.
     phase: rad, of the excitation.
     """
-    return Scene(
-        np.diag([0.0, 1.0]),
-        np.diag([0.0, 2.0 * damping]),
-        np.array([[stiffness, -stiffness], [-stiffness, stiffness + 1.0]]),
-        np.zeros(2),
-        np.array([0.0, np.exp(1j * phase)]),
-        0,
-        None,
-        0.0,
-        gap,
-        0.0,
-        1.0,
-        ratio,
-    )
+    matrices = np.diag([0.0, 1.0]), np.diag([0.0, 2.0 * damping])
+    spring = np.array([[stiffness, -stiffness], [-stiffness, stiffness + 1.0]])
+    load = np.array([0.0, np.exp(1j * phase)])
+    return Scene(*matrices, spring, np.zeros(2), load, 0, None, 0.0, gap, 0.0, ratio, 1.0)
 
 
 def impact(random: np.random.Generator) -> Scene:
@@ -242,20 +197,10 @@ def behind_spring(
     """Jenkins' element on a mass, its mount of stiffness 1 N/m and the mass 1 kg, all forces and stiffnesses times
     `units`. damping: N s/m. limit: of friction, N.
     """
-    return Scene(
-        units * np.diag([0.0, 1.0]),
-        units * np.diag([0.0, damping]),
-        units * np.array([[tangential, -tangential], [-tangential, 1.0 + tangential]]),
-        np.zeros(2),
-        np.array([0.0, force]),
-        None,
-        0,
-        units * limit / 0.4,
-        0.0,
-        0.4,
-        units,
-        omega,
-    )
+    matrices = units * np.diag([0.0, 1.0]), units * np.diag([0.0, damping])
+    spring = units * np.array([[tangential, -tangential], [-tangential, 1.0 + tangential]])
+    load = units * np.array([0.0, force])
+    return Scene(*matrices, spring, np.zeros(2), load, None, 0, units * limit / 0.4, 0.0, 0.4, omega, units)
 
 
 def jenkins(random: np.random.Generator) -> Scene:
@@ -291,10 +236,10 @@ def inclined(random: np.random.Generator) -> Scene:
     damping[2:, 2:] = random.uniform(0.02, 0.1) / low[0] * mount + 0.02 * np.sqrt(k * m) * np.eye(2)
     load = np.array([0.0, 0.0, 0.0, _spread(random, 0.3, 20.0) * force])
     share = random.uniform(0.0, 1.0)
-    harmonic = np.array([0.0, 0.0, np.sqrt(1.0 - share**2), share * np.exp(2j * np.pi * random.random())])
+    harmonic = force * np.array([0.0, 0.0, np.sqrt(1.0 - share**2), share * np.exp(2j * np.pi * random.random())])
     omega = random.uniform(0.5 * low[0], 1.2 * high[1])
     mass = np.diag([0.0, 0.0, m, m])
-    return Scene(mass, damping, stiffness, load, harmonic, 0, 1, 0.0, 0.0, random.uniform(0.2, 0.6), force, omega)
+    return Scene(mass, damping, stiffness, load, harmonic, 0, 1, 0.0, 0.0, random.uniform(0.2, 0.6), omega, force)
 
 
 KINDS: dict[str, Draw] = {

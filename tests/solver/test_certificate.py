@@ -8,6 +8,7 @@ import pytest
 
 from solver.accuracy.certificate import VIOLATION_LIMITS, Certificate, certify
 from solver.harmonic_balance.dlft import Balance
+from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from tests.solver.models import OMEGA, branch_states, first_point, random_model, scene
@@ -24,8 +25,7 @@ def on_branch(name, friction, amplitude, omega, n_harmonics, sweep="up"):
     model, settings = scene(name, n_harmonics), SolverSettings(n_harmonics, 256)
     (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
     joint, state = build_case(model, friction, start.penalty_omega, settings).joint(omega, amplitude), start.state
-    balance = Balance(joint, state.start_history, state.wear_depth)
-    return joint, balance.evaluate(balance.predict(state.displacement_h, state.contact_force_h))
+    return joint, evaluated(joint, state)[1]
 
 
 def vibro_impact(omega, n_harmonics, sweep="up"):

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from solver.accuracy.certificate import certify
-from solver.harmonic_balance.dlft import Balance
 from solver.loading_history.start_states import follow_branch
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.outcome import COMPLETE as COMPLETE_OUTCOMES
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
+from solver.results.state_report import evaluated
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
 from tests.references import slider_amplitude
@@ -117,9 +117,7 @@ def judge_start(case, start):
     if start.state is None:
         return
     joint = build_case(case.model, case.friction, start.penalty_omega, case.settings).joint(case.omega, case.amplitude)
-    balance = Balance(joint, start.state.start_history, start.state.wear_depth)
-    evaluation = balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
-    assert not certify(joint, evaluation).failures(case.settings.tolerance)
+    assert not certify(joint, evaluated(joint, start.state)[1]).failures(case.settings.tolerance)
 
 
 def judge_history(case, start, history):

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from solver.contact.coulomb import SEPARATED
-from solver.harmonic_balance.dlft import Balance
 from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
 from solver.newton.run import Run
 from solver.outcome import Outcome
+from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.stability.floquet import find_instability, multipliers_of
 from solver.stability.monodromy import build_monodromy, switching_pairs
@@ -39,8 +39,7 @@ def state_at(model, friction, excitation, frequency, settings=None):
     start = start_of(model, friction, excitation, frequency, settings)
     case = build_case(model, friction, start.penalty_omega, settings, start.resolution)
     joint = case.joint(2.0 * np.pi * frequency, excitation)
-    balance = Balance(joint, start.state.start_history, start.state.wear_depth)
-    return case, joint, balance.evaluate(balance.predict(start.state.displacement_h, start.state.contact_force_h))
+    return case, joint, evaluated(joint, start.state)[1]
 
 
 @lru_cache
@@ -61,16 +60,7 @@ def exact_multipliers(scene, joint, at):
         motion[scene.tangent] = at.displacement_h[0, 1]
     displacement = (motion @ synthesis(orders, np.zeros(1)))[:, 0]
     velocity = (1j * scene.omega * np.array(orders) * to_complex(motion)).sum(axis=1).real
-    pair = scene.pair
-    orbit, system = pair.orbit_near(displacement, velocity), pair.system
-    y, name = orbit.segments[0].start, orbit.segments[0].phase
-    size = np.abs(y[: 2 * system.n]).max()
-    columns = []
-    for place in range(2 * system.n):
-        step = 1e-6 * size * np.eye(y.size)[place]
-        ends = [system.advance(system.phase_at(name, y + s), y + s, system.period)[1] for s in (step, -step)]
-        columns.append((ends[0] - ends[1])[: 2 * system.n] / (2e-6 * size))
-    return np.linalg.eigvals(np.array(columns).T)
+    return scene.orbit_near(displacement, velocity).multipliers()
 
 
 def marched(joint, at, n_samples):

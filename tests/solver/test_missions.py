@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp, trapezoid
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from solver import Block, MissionHistory, Outcome, Passage, SolverSettings, integrate_mission, march_wear
@@ -19,10 +19,10 @@ from solver.missions.course import MissionCourse
 from solver.missions.history import integrate_missions
 from solver.missions.passage import (
     FIRST_FREQUENCIES,
-    LARGEST_SWEEP_RATE,
     MOST_FREQUENCIES,
     Swept,
     SweptState,
+    delay_of,
     find_states,
     in_order,
     interval_errors,
@@ -80,7 +80,6 @@ def test_a_mission_is_a_wear_history_in_parts(missions, n_blocks, begin):
     end = history.response_end[-1, -1]
     assert abs(end - whole.response[-1]) < (history.response_error[-1, -1] + whole.response_error[-1]) * abs(end)
     np.testing.assert_array_equal(history.response_begin[0, 0], whole.response[0])
-    np.testing.assert_array_equal(history.excitation_frequency, [[160.0, 160.0]] * n_blocks)
 
 
 # --- exact volumes ---
@@ -175,22 +174,19 @@ def slipping(begin):
 def begun_again(block, depth):
     """A block at an even depth by its own way, and as at the depth 0 before."""
     mission, pairs = Mission((block,), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
-    first, own = (run_block(BlockCase(mission, 0, at * pairs, SETTINGS)) for at in (0.0, depth))
-    return own, run_block(BlockCase(mission, 0, depth * pairs, SETTINGS, begun=first.begun))
+    first, own = (run_block(BlockCase(mission, 0, at * pairs)) for at in (0.0, depth))
+    return own, run_block(BlockCase(mission, 0, depth * pairs, begun=first.begun))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("begin", ["ramp", "up"])
-def test_where_the_pair_slips_the_way_is_not_gone_again(begin):
-    own, again = begun_again(slipping(begin), 8e-6)
-    np.testing.assert_allclose(again.growth, own.growth, rtol=1e-6)
-    np.testing.assert_allclose(again.response, own.response, rtol=1e-6)
-    assert again.iterations < 20 < own.iterations
-    assert again.begun is not None
-
-
-@pytest.mark.slow
-def test_where_a_pair_sticks_the_way_leads_through_the_same_nodes_and_where_much_changes_it_is_another_one():
+def test_a_way_is_gone_again_only_where_the_state_depends_on_it():
+    """Not where the pair slips; where a pair sticks through the same nodes; where much changes by another way."""
+    for begin in ("ramp", "up"):
+        own, again = begun_again(slipping(begin), 8e-6)
+        np.testing.assert_allclose(again.growth, own.growth, rtol=1e-6)
+        np.testing.assert_allclose(again.response, own.response, rtol=1e-6)
+        assert again.iterations < 20 < own.iterations
+        assert again.begun is not None
     dovetail = Block(scene("dovetail_sector", mesh=1), 212.6, 0.5, FRICTION, 10.0, "up")
     own, again = begun_again(dovetail, 5e-9)
     np.testing.assert_allclose(again.response, own.response, rtol=5e-3)
@@ -201,11 +197,12 @@ def test_where_a_pair_sticks_the_way_leads_through_the_same_nodes_and_where_much
 
 
 @pytest.mark.slow
-def test_an_interrupted_mission_with_such_states_goes_on_to_the_last_bit():
-    block = Block(slider(), 160.0, 10.0, np.full(1, FRICTION), 500.0, "up")
-    mission, kept = Mission((block,), WEAR, (0, 8), SETTINGS), list[Packed]()
+@pytest.mark.parametrize("begin", ["up", "continue"])
+def test_an_interrupted_mission_with_such_states_goes_on_to_the_last_bit(begin):
+    blocks = tuple(replace(block, begin=begin) for block in two_blocks())
+    mission, kept = Mission(blocks, WEAR, (0, 6), SETTINGS), list[Packed]()
     whole = integrate_missions(mission, keep=kept.append)
-    for place in (0, len(kept) // 2 - 1, len(kept) // 2, len(kept) - 2):
+    for place in (0, len(kept) // 2, len(kept) - 2):
         assert equal(integrate_missions(mission, resume=kept[place]), whole)
 
 
@@ -292,7 +289,7 @@ def test_a_step_is_of_second_order_and_its_error_is_known(monkeypatch):
     def run(depth, with_slope):
         runs = []
         for place in (0, 1):
-            runs.append(exact_run(BlockCase(mission, place, depth, SETTINGS, with_slope=with_slope)))
+            runs.append(exact_run(BlockCase(mission, place, depth, with_slope=with_slope)))
             depth = depth + runs[-1].growth
         return tuple(runs)
 
@@ -376,28 +373,23 @@ def test_a_block_that_fails_at_once_is_computed_in_shorter_steps(monkeypatch):
 
 
 @pytest.mark.slow
-def test_missions_of_the_slider_agree_with_missions_one_by_one_and_go_on_to_the_last_bit():
+def test_missions_of_the_slider_agree_with_missions_one_by_one():
     """Amplitude and frequency change from block to block."""
-    checked = tuple(replace(block, friction_coefficient=FRICTION) for block in two_blocks(cycles=300.0))
-    mission, kept = Mission(checked, WEAR, (0, 3, 6), SETTINGS), list[Packed]()
-    many = integrate_missions(mission, keep=kept.append)
-    once = integrate_missions(replace(mission, largest_step=1))
+    many = integrate(two_blocks(cycles=300.0), [3, 6])
+    once = integrate(two_blocks(cycles=300.0), [3, 6], largest_step=1)
     assert many.outcome is once.outcome is Outcome.CONVERGED
     assert many.steps.tolist() == [1, 1, 2, 2]
     assert (np.abs(many.wear_depth - once.wear_depth) <= many.wear_depth_error + once.wear_depth_error).all()
+    assert (np.abs(many.block_volume - once.block_volume) <= many.block_volume_error * many.block_volume).all()
     assert many.error_estimate < 2.0 * SETTINGS.rtol
-    # missions whose responses are known
-    np.testing.assert_allclose(many.response_begin[0], once.response_begin[0], rtol=1e-3)
+    # of missions that both have computed
     np.testing.assert_allclose(many.response_end[[0, 2]], once.response_end[[0, 2]], rtol=0.03)
     for name in ("response_begin", "response_end", "response_peak_begin", "response_peak_end"):
         one, other = (np.linalg.norm(getattr(of, name), axis=2) for of in (many, once))
         assert (np.abs(one - other) <= many.response_error * one + once.response_error * other).all()
     assert (many.response_error < 0.1).all()
-    assert (np.abs(many.block_volume - once.block_volume) <= many.block_volume_error * many.block_volume).all()
-    np.testing.assert_array_equal(many.excitation_frequency, [[160.0, 160.0], [150.0, 150.0]])
     # less load, less friction: the vibration grows
     assert (np.diff(np.abs(once.response_end[:, :, 0]), axis=0)[1:] > 0.0).all()
-    assert equal(integrate_missions(mission, resume=kept[-3]), many)
 
 
 @pytest.mark.slow
@@ -458,12 +450,14 @@ def test_frequencies_of_a_passage_wear_one_after_the_other(order):
 def passing(passage, wear=WEAR, settings=SETTINGS):
     """A passage of the damped slider."""
     block = Block(scene("sdof_slider", damping=6.0), passage, 10.0, FRICTION)
-    return BlockCase(Mission((block,), wear, (0, 1), settings), 0, np.zeros(1), settings)
+    return BlockCase(Mission((block,), wear, (0, 1), settings), 0, np.zeros(1))
 
 
 @pytest.mark.slow
 def test_a_vibration_is_late_by_its_decay_time():
     """The free slider with 6 N s/m and 0.1 kg decays by exp(-30 t): at 7 Hz/s it is late by 7/30 Hz."""
+
+    undamped = Mission((replace(slipping("up"), frequency=Passage(180.0, 220.0, 7.0)),), WEAR, (0, 1), SETTINGS)
 
     def case(rate):
         # too little wear to change the pressures on the way
@@ -477,23 +471,8 @@ def test_a_vibration_is_late_by_its_decay_time():
     assert isinstance(states, list)
     most = max(float(each.density[0]) for each in states)
     assert fast.growth_error - slow.growth_error == pytest.approx(6.93 / 30.0 * most / fast.growth[0], rel=0.02)
-
-
-@pytest.mark.slow
-def test_a_passage_wears_as_a_fixed_grid_of_frequencies():
-    passage = Passage(185.0, 215.0, 5.0)
-    case = passing(passage)
-    mission = case.mission
-    history = integrate(mission.blocks, 1)
-    grid = np.linspace(185.0, 215.0, 33)
-    fixed = states_at(case, grid)
-    assert isinstance(fixed, list)
-    volume = trapezoid([float(of.density @ mission.area) for of in fixed], grid)
-    bar = float(interval_errors(fixed, mission.area).sum()) + history.error_estimate * history.worn_volume[-1]
-    assert history.worn_volume[-1] == pytest.approx(volume, abs=bar)
-    assert bar < 0.02 * volume
-    assert history.outcome is Outcome.CONVERGED
-    assert 0.0 < history.sweep_rate[0] < LARGEST_SWEEP_RATE
+    # nothing dies out without damping
+    assert delay_of(replace(case(7.0), mission=undamped), states) == (np.inf, np.inf)
 
 
 @pytest.mark.slow
@@ -515,22 +494,6 @@ def test_the_reference_of_a_passage_takes_its_resolutions_and_estimates_no_error
     np.testing.assert_allclose(reference.response, fine.response, rtol=1e-6)
 
 
-@pytest.mark.slow
-def test_stability_is_tested_in_the_first_mission_and_in_the_last(monkeypatch):
-    tested = []
-
-    def unstable(_case, _joint, _at, _budget, every=True):
-        tested.append(every)
-
-    for place in ("loading_history.frequency_sweep", "missions.block_run"):
-        monkeypatch.setattr(f"solver.{place}.find_instability", unstable)
-    blocks = (Block(scene("sdof_slider"), 161.0, 10.0, FRICTION, 500.0),)
-    history = integrate(blocks, 3, largest_step=1)
-    assert history.outcome is Outcome.CONVERGED
-    # a ramp and two states without one, and three of the reference solution
-    assert tested == [True, False, True, False, False, False]
-
-
 def swept_with(monkeypatch, density, depth, near=()):
     """A passage from 1 to 2 Hz with given wear, m/Hz, of the frequency, at a depth before, m."""
 
@@ -541,7 +504,7 @@ def swept_with(monkeypatch, density, depth, near=()):
     passage = Passage(1.0, 2.0, 1e-4)
     block = Block(scene("sdof_slider"), passage, 10.0, FRICTION, begin="up")
     mission, begun = Mission((block,), WEAR, (0, 1), SETTINGS), Begun(near) if near else None
-    swept = find_states(BlockCase(mission, 0, np.array([depth]), SETTINGS, begun=begun))
+    swept = find_states(BlockCase(mission, 0, np.array([depth]), begun=begun))
     assert isinstance(swept, Swept)
     return swept
 

@@ -68,20 +68,20 @@ def test_the_pair_moves_like_the_mass_on_a_slider(kind):
     masses = np.diag(scene.mass) > 0.0
     parts = (part[np.ix_(masses, masses)] for part in (scene.mass, scene.damping, scene.stiffness))
     normal = scene.normal_load or scene.load_static[scene.normal]
-    load, place = scene.excitation * scene.load_harmonic[masses], int(masses[:at].sum())
+    load, place = scene.load_harmonic[masses], int(masses[:at].sum())
     twin = coulomb_orbit(*parts, load, place, scene.friction * normal, scene.omega)
-    orbit = scene.pair.orbit_near(np.zeros(masses.size), np.zeros(masses.size))
+    orbit = scene.orbit_near(np.zeros(masses.size), np.zeros(masses.size))
     expected = [twin.harmonic(index) for index in range(len(load))]
-    assert scene.pair.response(orbit) == pytest.approx(np.array(expected), rel=1e-8)
+    assert scene.response(orbit) == pytest.approx(np.array(expected), rel=1e-8)
     slid = twin.path(place, [name for name in twin.system.phases if name != "stick"])
-    assert scene.pair.slip_work(orbit) == pytest.approx(normal * slid, rel=1e-8)
+    assert scene.slip_work(orbit) == pytest.approx(normal * slid, rel=1e-8)
 
 
 def test_the_pair_moves_like_the_mass_at_a_wall():
     scene = wall(0.9, 1.5, 0.05, 50.0)
-    orbit = scene.pair.orbit_near(np.zeros(2), np.zeros(2))
+    orbit = scene.orbit_near(np.zeros(2), np.zeros(2))
     twin = vibro_impact_orbit(1.0, 0.1, 1.0, 1.0, 50.0, 1.5, 0.9, sweep_start=0.85)
-    assert scene.pair.response(orbit) == pytest.approx(np.array([twin.harmonic(0)]), rel=1e-8)
+    assert scene.response(orbit) == pytest.approx(np.array([twin.harmonic(0)]), rel=1e-8)
 
 
 def test_the_shortest_contact_is_counted_around_the_period():

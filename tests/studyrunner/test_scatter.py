@@ -39,14 +39,6 @@ def test_defaults_and_what_is_written_back():
     }
 
 
-def test_order_of_the_keys_does_not_matter():
-    gap, speed = {"normal": {"std": 1e-6}, "of": "each pair"}, {"uniform": {"half_width": 1.0}}
-    one, other = read(gap=gap, rotation_speed=speed), read(rotation_speed=speed, gap=gap)
-    assert one == other
-    assert list(one.model_dump()) == list(other.model_dump())
-    assert list(one.inputs) == ["rotation_speed", "gap"]
-
-
 # --- the designs ---
 
 
@@ -78,11 +70,6 @@ def test_rows_of_saltelli_are_those_of_scipy():
     found = sobol_indices(func={"f_A": f_A[None], "f_B": f_B[None], "f_AB": f_AB[:, None]}, n=1024)
     np.testing.assert_allclose(found.first_order, np.array([1.0, 8.0, 16.0]) / 25.0, atol=0.03)
     np.testing.assert_allclose(found.total_order, np.array([1.0, 8.0, 16.0]) / 25.0, atol=0.03)
-
-
-def test_a_sobol_sequence_with_too_many_columns_is_refused():
-    with pytest.raises(WrongValueError, match='give "random"'):
-        unit_design("sobol", 1, 2, 30_000)
 
 
 # --- the drawn values ---
@@ -131,11 +118,6 @@ def test_each_surface_has_a_draw():
     assert (values[:, 0] == values[:, 2]).all()
 
 
-def test_a_draw_of_all_pairs_moves_each_from_its_own_value():
-    found = draw(gap={"normal": {"std": 1e-6}})["gap"]
-    np.testing.assert_array_equal(found.apply(OWN["gap"]), OWN["gap"] + found.apply(0.0)[:, None])
-
-
 def test_neighbouring_pairs_are_correlated_over_the_length():
     along = np.outer(np.repeat([0.0, 1.0, 3.0], 2), [1.0, 0.0, 0.0])
     pairs = ScatteredPairs(("left", "right") * 3, along)
@@ -172,13 +154,10 @@ def test_draws_that_physics_forbids_are_refused(name, distribution):
     assert caught.value.key == f"scatter.{name}"
 
 
-def test_every_value_of_an_axis_is_looked_at():
+def test_each_value_of_an_axis_is_looked_at_and_a_share_of_nothing_is_refused():
     section = read(friction_coefficient={"uniform": {"half_width": 0.2}})
     assert drawn(section, {"friction_coefficient": [[0.3], [0.4]]}, PAIRS)
     with pytest.raises(WrongValueError, match="less width"):
         drawn(section, {"friction_coefficient": [[0.3], [0.1]]}, PAIRS)
-
-
-def test_a_share_of_nothing_is_refused():
     with pytest.raises(WrongValueError, match="own value is 0"):
         drawn(read(gap={"normal": {"relative_std": 0.1}}), {"gap": np.zeros(5)}, PAIRS)

@@ -1,6 +1,5 @@
 """Studies with [scatter] from the file to the result."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +8,12 @@ import xarray as xr
 
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result.sample_coordinates import sample_coordinates
-from studyrunner.scene import drawn_contacts
-from studyrunner.scene.drawn_contacts import contact_changes, pair_values
+from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.statistics.study_statistics import worn_volume_statistics
 from studyrunner.study.realisation import draw_inputs, realise
 from studyrunner.study.study_file import format_study, read_study
-from tests.studyrunner.fakes import FACTS
 from tests.studyrunner.test_scene_axes import CHEAP, compute, same_values
 
 pytestmark = pytest.mark.usefixtures("folder")
@@ -121,35 +118,6 @@ def test_axes_and_samples_stand_side_by_side_and_the_result_is_the_study_again()
     xr.testing.assert_identical(again.drop_attrs(), first.drop_attrs())
 
 
-def test_friction_of_samples_builds_no_scene():
-    study = read_study("dovetail", ["scatter.samples=64", FRICTION, "scatter.gap={normal={std=1e-7}, of='each pair'}"])
-    assert len(find_scenes(study).studies) == 1
-    study = read_study("dovetail", ["scatter.samples=4", "scatter.rotation_speed={normal={std=10}}"])
-    assert len(find_scenes(study).studies) == 4
-
-
-def test_gaps_of_samples_with_scenes_of_their_own_are_drawn_once(monkeypatch):
-    """Not once for each scene, which would be quadratic in the number of samples."""
-    gaps = ["scatter.samples=16", "scatter.gap={normal={std=1e-7}, of='each pair'}"]
-    calls: list[object] = []
-
-    def count(study, facts):
-        calls.append(study)
-        return pair_values(study, facts)
-
-    monkeypatch.setattr(drawn_contacts, "pair_values", count)
-    changes = []
-    for more in ([], ["scatter.stiffness={normal={std=10}}"]):
-        study = read_study("sdof_slider", [*gaps, *more])
-        scenes = find_scenes(study)
-        facts = [replace(FACTS, gap=np.zeros(2)) for _ in scenes.studies]
-        changes.append(drawn_contacts.contact_changes(study, scenes, facts))
-    assert len(facts) == 16
-    assert len(calls) == 2
-    assert changes[0] != changes[1]  # columns of the design are in the order of the names, those of pairs last
-    assert len({one for change in changes for one in change}) == 32
-
-
 # --- numbers of [wear] ---
 
 
@@ -162,17 +130,6 @@ def test_factors_of_surfaces_scatter():
     assert len(build_tasks(study, 2).sweeps) == 1, "all samples start from one state"
     Path("again.toml").write_text(format_study(study), encoding="utf-8")
     assert format_study(read_study("again.toml")) == format_study(study)
-
-
-@pytest.mark.slow
-def test_a_factor_of_a_surface_is_a_factor_of_the_volume():
-    asked = "outputs.variables=['worn_volume', 'wear_depth']"
-    scatter = "scatter={samples = 2, surfaces = {support = {uniform = {half_width = 0.4}}}}"
-    samples = compute("sdof_slider", "w.nc", *CHEAP, asked, "wear.surfaces={support=0.5}", scatter)
-    assert samples.sample_surfaces_support.attrs["units"] == "1"
-    for number in (0, 1):
-        own = f"wear.surfaces={{support={float(samples.sample_surfaces_support[number])!r}}}"
-        same_values(samples.isel(sample=number), compute("sdof_slider", "a.nc", *CHEAP, own, asked))
 
 
 # --- closed forms: volume k_w c N times a constant, where nothing depends on wear ---

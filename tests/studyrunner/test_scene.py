@@ -14,7 +14,6 @@ from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.scene.scene import (
-    AUTOMATIC_HARMONICS_OF_A_WAVE,
     build_study_scene,
     describe_scene,
     largest_harmonics,
@@ -48,11 +47,6 @@ def holding(model, n_harmonics):
 def test_nodal_diameters_that_are_held_bound_the_harmonics(n_harmonics):
     wave = replace(sector(), n_sectors=47, nodal_diameter=4)
     assert largest_harmonics(holding(wave, n_harmonics)) == n_harmonics
-
-
-def test_a_wave_is_built_for_automatic_harmonics():
-    study = read_study("dovetail", WAVE)
-    assert describe_scene(build_study_scene(study)).largest_harmonics == AUTOMATIC_HARMONICS_OF_A_WAVE
 
 
 @pytest.fixture(scope="module")
@@ -104,15 +98,6 @@ def test_a_scene_file_gives_each_pair_its_friction_coefficient(rough_file):
     write_study_scene(study, Path("again.h5"))
     again = build_study_scene(read_study(rough_file, ["scene.model=again.h5"]))
     assert describe_scene(again).digest == describe_scene(build_study_scene(study)).digest
-
-
-def test_other_friction_coefficients_are_another_scene(rough_file):
-    model = build_study_scene(read_study(rough_file))
-    digests = {
-        describe_scene(replace(model, contact=replace(model.contact, friction_coefficient=own))).digest
-        for own in (None, np.array([0.2, 0.3, 0.4]), np.array([0.2, 0.3, 0.5]))
-    }
-    assert len(digests) == 3
 
 
 def test_the_friction_coefficient_is_given_once(rough_file, capsys):

@@ -159,13 +159,6 @@ def test_natural_frequencies_stand_along_the_axes_of_their_scenes():
         np.testing.assert_array_equal(whole.natural_frequency.sel(stiffness_2=stiffness), alone.natural_frequency)
 
 
-def test_flags_are_an_axis():
-    study = read_study("dovetail", ["axes.stress_stiffening=[true, false]", "axes.mesh={start=1, stop=3, num=3}"])
-    assert dict(study.dimensions)["stress_stiffening"] == (True, False)
-    assert dict(study.dimensions)["mesh"] == (1, 2, 3)
-    assert len(find_scenes(study).studies) == 6
-
-
 @pytest.mark.slow
 def test_friction_of_a_surface_of_a_deck_is_an_axis(capsys):
     shutil.copy(SECTOR, "sector.inp")

@@ -7,7 +7,8 @@ import h5py
 import pytest
 
 from studyrunner.cli import main
-from studyrunner.study.study_file import bundled_studies, format_study, read_study
+from studyrunner.study.sections import SOLVER_AXES
+from studyrunner.study.study_file import format_study, read_study
 from studyrunner.variables import USUAL
 
 SMALLEST = '[study]\nname = "s"\n[scene]\nmodel = "sdof_slider"\n[axes]\nfrequency = 100\n'
@@ -35,14 +36,8 @@ def test_every_default_is_filled_in(tmp_path):
         "scheme": ("adaptive",),
         "sweep": ("up",),
     }
-    assert study.solver.model_dump() == {
-        "harmonics": "auto",
-        "samples": "auto",
-        "tolerance": 1e-8,
-        "rtol": 1e-2,
-        "time_limit": None,
-        "shortcuts": True,
-    }
+    assert (study.harmonics, study.samples, study.tolerance, study.rtol) == (("auto",), ("auto",), (1e-8,), (1e-2,))
+    assert (study.solver.time_limit, study.solver.shortcuts) == (None, True)
     assert study.cycles_kept == tuple(1000.0 * position for position in range(101))
     assert study.friction_coefficient == 0.5
     assert "loop_force" not in study.outputs.variables
@@ -50,21 +45,9 @@ def test_every_default_is_filled_in(tmp_path):
     assert study.outputs.loops == ()
 
 
-@pytest.mark.parametrize(
-    ("name", "asked", "found"),
-    [
-        ("dovetail", "['default']", (*USUAL, "mesh")),
-        ("dovetail", "['natural_frequency', 'default']", (*USUAL, "mesh", "natural_frequency")),
-        ("sdof_slider", "['default', 'exact', 'worn_volume']", (*USUAL, "exact")),
-    ],
-)
-def test_one_word_stands_for_the_default_variables(name, asked, found):
-    assert read_study(name, [f"outputs.variables={asked}"]).outputs.variables == found
-
-
-@pytest.mark.parametrize("name", bundled_studies())
-def test_bundled_studies_are_called_like_their_files(name):
-    assert read_study(name).study.name == name
+def test_one_word_stands_for_the_default_variables():
+    study = read_study("dovetail", ["outputs.variables=['natural_frequency', 'default']"])
+    assert study.outputs.variables == (*USUAL, "mesh", "natural_frequency")
 
 
 @pytest.mark.parametrize(
@@ -83,36 +66,17 @@ def test_values_of_a_range_are_those_that_a_person_writes(tmp_path, given, writt
     assert " ".join(map(repr, study.axes.frequency)) == written
 
 
-def test_every_solver_key_can_be_an_axis_in_the_order_of_the_file():
-    overrides = ["axes.rtol=[1e-3, 1e-2]", "axes.tolerance=1e-9", "axes.samples=['auto', 64]", "axes.harmonics=auto"]
-    study = read_study("dovetail", overrides)
-    assert dict(list(study.dimensions.items())[6:]) == {
-        "harmonics": ("auto",),
-        "samples": ("auto", 64),
-        "tolerance": (1e-9,),
-        "rtol": (1e-3, 1e-2),
-    }
-
-
 @pytest.mark.parametrize(
     ("key", "values"),
-    [
-        ("harmonics", "[1, 3, 5]"),
-        ("harmonics", "['auto', 3]"),
-        ("harmonics", "{start = 1, stop = 5, num = 3}"),
-        ("samples", "[64, 128]"),
-        ("tolerance", "[1e-8, 1e-6]"),
-        ("rtol", "[1e-1, 1e-2, 1e-3]"),
-    ],
+    [("harmonics", "['auto', 3]"), ("harmonics", "{start = 1, stop = 5, num = 3}"), ("rtol", "[1e-1, 1e-2, 1e-3]")],
 )
-def test_several_values_of_a_solver_key_are_an_axis(key, values, tmp_path):
-    there = read_study("dovetail", [f"axes.{key}={values}"])
-    here = read_study("dovetail", [f"solver.{key}={values}"])
+def test_several_values_of_a_solver_key_are_an_axis(key, values):
+    there = read_study("dovetail", [f"axes.{key}={values}", "axes.tolerance=1e-9"])
+    here = read_study("dovetail", [f"solver.{key}={values}", "axes.tolerance=1e-9"])
     assert len(here.dimensions[key]) > 1
     assert here.dimensions == there.dimensions
+    assert list(here.dimensions)[6:] == sorted([key, "tolerance"], key=SOLVER_AXES.index)
     assert format_study(here) == format_study(there)
-    in_the_file = read_study(write(tmp_path, SMALLEST + f"[solver]\n{key} = {values}\n"))
-    assert in_the_file.dimensions[key] == there.dimensions[key]
 
 
 @pytest.mark.parametrize("harmonics", ["solver.harmonics=3", "axes.harmonics=[1, 3]", "axes.harmonics=['auto', 3]"])
@@ -124,28 +88,15 @@ def test_effective_study_reads_back_the_same(harmonics, tmp_path):
     assert format_study(again) == format_study(study)
 
 
-STUDY = """
-[study]
-name = "s"
-[scene]
-model = "sdof_slider"
-[axes]
-frequency = [150.0]
-[slow_time]
-cycles = 0
-[solver]
-harmonics = 5
-"""
-
 LONG = ("--set", "slow_time.cycles=1e6", "--set", "slow_time.outputs=200000")
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
+    (tmp_path / "s.toml").write_text(SMALLEST, encoding="utf-8")
     with h5py.File(tmp_path / "s.nc", "w") as earlier:
-        earlier.attrs["study"] = STUDY
+        earlier.attrs["study"] = SMALLEST
     return tmp_path
 
 
@@ -169,16 +120,10 @@ def line_of(arguments, capsys):
         (["."], (".", "folder")),
         (["s.toml", "--from", "deck.inp"], ("command line", "--from", "--new NAME")),
         (["s.toml", "--bogus"], ("command line", "--bogus", "--help")),
-        (["s.toml", "--set", "axes.step"], ("command line", "--set", "axes.step", "KEY=VALUE")),
         (["s.toml", "--set", "axes.step=[1,"], ("command line", "axes.step", "[1,", "TOML")),
-        (["s.toml", "--set", "axes.step=1\nb=2"], ("command line", "axes.step", "one TOML value")),
         (["s.toml", "--set", "study.name.first=a"], ("command line", "study.name.first", "name holds a value")),
-        (["s.toml", *LONG, "--set", "outputs.loops=[0]"], ("outputs.loops = [0]", "1.2 GB")),
-        (["s.toml", "-o", "."], ("command line", "-o", "folder")),
+        (["s.toml", *LONG, "--set", "outputs.loops=[0]"], ("outputs.loops = [0]", "1.3 GB")),
         (["s.toml", "-o", "nowhere/out.nc"], ("command line", "nowhere/out.nc", "folder that exists")),
-        (["s.toml", "-o", "/dev/null"], ("command line", "/dev/null", "ordinary file")),
-        (["s.toml", "-o", "x" * 300], ("command line", "-o", "can be written")),
-        (["s.toml", "-o", "s.toml/out.nc"], ("command line", "folder that exists", "s.toml is no folder")),
         (["s.toml", "-o", "\udcff.nc"], ("command line", r"\udcff.nc", "give a name in UTF-8")),
         (["s.toml", "-o", "s.toml"], ("command line", "s.toml", "read by the run")),
         (["s.toml", "--write-scene", "nowhere/out.h5"], ("command line", "--write-scene", "folder that exists")),

@@ -92,12 +92,6 @@ def test_what_is_wrong_is_said(changes, said, whole):
     assert said in str(error.value)
 
 
-def test_a_table_law_counts_depths_from_the_unworn_joint():
-    law = {"law": "table", "pressure": [0.0], "depth": [0.0], "factor": [[1.0]]}
-    with pytest.raises(UserError, match=r'wear.law = "table": give another law'):
-        read_study("sdof_slider", {**SLIDER, "scene.worn": {"depth": 1e-6}, "wear": law})
-
-
 def test_the_result_that_the_depths_are_from_is_not_replaced(whole):
     before = whole.read_bytes()
     with pytest.raises(UserError, match=r"this one is read by the run"):

@@ -1,0 +1,244 @@
+"""A nonlinear mode: its equations at an amplitude, and its way along the amplitude.
+
+The equations are a harmonic balance with three further unknowns (`solver.newton.bordering`): the frequency omega, the
+damping ratio zeta and the drive Q of the modal model (`modal_model`). The further equations are
+
+    Re q = Q,      Im q = 0,      x_1^H M x_1 = a^2.
+
+The first two say that the spring on the modal coordinate has no force, and fix the phase; the last one is the given
+amplitude a.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver.accuracy.error_estimate import NOTHING, Estimate
+from solver.contact.coulomb import STICK
+from solver.continuation.natural import NEAR_ITERATIONS
+from solver.harmonic_balance.dlft import Balance, Linearisation
+from solver.harmonic_balance.prolongation import transfer
+from solver.harmonic_balance.state import State, final_history, history_at_rest
+from solver.loading_history.path import FREE_STEP, choose_resolution, largest_change
+from solver.loading_history.path_of_states import Step
+from solver.march.steps import LARGEST_STEP_RATIO
+from solver.model import ComplexArray, FloatArray, ReducedModel
+from solver.modes.modal_model import LinearMode, modal_model
+from solver.newton.bordering import Bordered
+from solver.newton.run import Run
+from solver.outcome import Outcome
+from solver.packing import packable
+from solver.settings import DIFFERENCE, Resolution
+from solver.structure.condensation import relative_indices, whole_motion
+from solver.structure.fourier import to_complex
+from solver.structure.joint import Case, Joint
+
+LARGEST_CHANGE = 0.3
+"""Largest change of the frequency (relative) and of the damping ratio in one iteration. With 0.1 and with 1 the modes
+of dovetail and foot are equal."""
+
+
+@packable
+@dataclass(frozen=True, kw_only=True)
+class ModeState(State):
+    """A point of a nonlinear mode: a periodic state of the modal model, with the amplitude a, m sqrt(kg), as parameter.
+
+    - values (3,): frequency omega, rad/s, damping ratio zeta, and drive Q, m sqrt(kg).
+    - shape (n,): x_1 of all displacements, m.
+    """
+
+    values: FloatArray
+    shape: ComplexArray
+
+    @property
+    def omega(self) -> float:
+        """Natural frequency, rad/s."""
+        return float(self.values[0])
+
+    @property
+    def damping_ratio(self) -> float:
+        """Damping ratio zeta."""
+        return float(self.values[1])
+
+
+@dataclass(frozen=True)
+class NonlinearMode:
+    """A mode of a joint with some harmonics and samples, as a path along its amplitude.
+
+    Lengths of steps are logarithms of the ratio of two amplitudes.
+
+    - model: the model, without the spring on the modal coordinate.
+    - linear: the linear mode from which the nonlinear one begins.
+    - case: case of the modal model, with harmonics and samples; its damping is replaced.
+    """
+
+    model: ReducedModel
+    linear: LinearMode
+    case: Case
+
+    def case_of(self, values: FloatArray) -> Case:
+        """Case of the modal model at a frequency, rad/s, and a damping ratio, the first two values."""
+        model = modal_model(self.model, self.linear, 2.0 * float(values[1]) * float(values[0]))
+        return replace(self.case, model=model, _structures={})
+
+    def joint_of(self, values: FloatArray) -> Joint:
+        """Joint of the modal model at some values (3,)."""
+        return self.case_of(values).joint(float(values[0]), float(values[2]))
+
+    def find(
+        self,
+        amplitude: float,
+        start: FloatArray,
+        values: FloatArray,
+        history: FloatArray,
+        run: Run,
+        most: int | None = None,
+    ) -> ModeState | None:
+        """The mode at an amplitude a, m sqrt(kg); None where Newton's method fails.
+
+        start (n_rel, 2H+1), N, and values (3,): first predicted force, and first frequency, damping ratio and drive.
+        history (n_contact, 2): tangential history, m. run, most: as in `Run.solve`.
+        """
+        found = run.solve_bordered(_AtAmplitude(self, amplitude, history), start, values, most)
+        # zeta goes to infinity where friction stops a mass for good: with few harmonics there are further states
+        if found is None or abs(found.values[1]) > 1.0:
+            return None
+        after = final_history(found.balance, found.at)
+        return ModeState(found.at, after, amplitude, values=found.values, shape=found.extra)
+
+    @property
+    def steps(self) -> tuple[float, float, float]:
+        """As in Path: where a smaller ratio is needed the mode is lost; with a tenth of the step modes are equal."""
+        shortest = math.log1p(FREE_STEP)
+        return shortest, math.log(LARGEST_STEP_RATIO), shortest
+
+    @property
+    def node_tolerance(self) -> float:
+        """As in Path."""
+        return self.case.settings.tolerance
+
+    def ahead(self, parameter: float, length: float) -> float:
+        """As in Path."""
+        return parameter * math.exp(length)
+
+    def solve(self, states: tuple[ModeState, ...], target: float, run: Run) -> ModeState | None:
+        """As in Path: Newton's method starts on the line through both states, or from the last one in proportion."""
+        here = states[-1]
+        history, last = history_at_rest(self.joint_of(here.values), here), here.evaluation.predicted_h
+        growth = target / here.parameter
+        grown = np.concatenate([last[:, :1], growth * last[:, 1:]], axis=1)
+        starts = [(grown, here.values * np.array([1.0, 1.0, growth]))]
+        if len(states) > 1:
+            ratio = (target - here.parameter) / (here.parameter - states[-2].parameter)
+            change = last - states[-2].evaluation.predicted_h
+            starts.insert(0, (last + ratio * change, here.values + ratio * (here.values - states[-2].values)))
+        found = (self.find(target, *start, history, run, NEAR_ITERATIONS) for start in starts)
+        return next((state for state in found if state is not None), None)
+
+    def rescue(self, _: ModeState, __: float, ___: Run) -> Step[ModeState] | Outcome:
+        """As in Path: a mode that turns back is not followed."""
+        return Outcome.BRANCH_LOST
+
+    def change(self, before: ModeState, after: ModeState, wider: float) -> float:
+        """As in Path."""
+        sticks = all(bool((state.evaluation.status_t == STICK).all()) for state in (before, after))
+        return self.differs(before, after) / largest_change(self.case.settings.rtol, wider, sticks=sticks)
+
+    def rests(self, _: ModeState) -> bool:
+        """As in Path: a mode has a reference sweep from its first amplitude on."""
+        return False
+
+    def forgets(self, _: ModeState) -> bool:
+        """As in Path."""
+        return False
+
+    def differs(self, before: ModeState, after: ModeState) -> float:
+        """As in Path: of the vibrating predicted force per amplitude."""
+        one, other = (state.evaluation.predicted_h[:, 1:] / state.parameter for state in (before, after))
+        return float(np.linalg.norm(other - one)) / max(float(np.linalg.norm(one)), 1e-300)
+
+    def at(self, resolution: Resolution) -> NonlinearMode:
+        """As in Path."""
+        return replace(self, case=self.case.at(resolution))
+
+    def move(self, state: ModeState, other: NonlinearMode, run: Run) -> ModeState | None:
+        """As in Path."""
+        balance, start = transfer(self.case, other.joint_of(state.values), state.evaluation)
+        return other.find(state.parameter, start, state.values, balance.history, run.fresh())
+
+    def choose(self, state: ModeState, run: Run) -> tuple[NonlinearMode, ModeState, Estimate]:
+        """As in Path."""
+        chosen = choose_resolution(self.case_of(state.values), self.joint_of(state.values), state, run)
+        other = self.at(chosen.case.resolution)
+        moved = state if chosen.case.resolution == self.case.resolution else self.move(state, other, run)
+        # the error of the first response is judged in a sweep of the frequency only
+        return (self, state, NOTHING) if moved is None else (other, moved, NOTHING)
+
+    def suffices(self, _: ModeState, __: float, ___: ModeState) -> bool:
+        """As in Path: harmonics are chosen anew."""
+        return False
+
+    def describe(self, state: ModeState) -> str:
+        """As in Path."""
+        return f"at the modal amplitude {state.parameter:.4g} m sqrt(kg)"
+
+
+@dataclass(frozen=True)
+class _AtAmplitude:
+    """The equations at an amplitude, m sqrt(kg), with a tangential history (n_contact, 2), m. Errors over the
+    amplitude.
+    """
+
+    mode: NonlinearMode
+    amplitude: float
+    history: FloatArray
+
+    def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
+        """As in BorderedProblem; values: frequency, damping ratio and drive. extra: x_1 (n,), m."""
+        balance = Balance(self.mode.joint_of(values), self.history, np.zeros(len(self.history)))
+        at = balance.evaluate(predicted_h)
+        shape = _shape(balance.joint, at.displacement_h, float(values[2]))
+        coordinate, square = self._coordinate(shape), self._product(shape, shape)
+        errors = [coordinate.real - values[2] / self.amplitude, coordinate.imag, 0.5 * (square - 1.0)]
+        return Bordered(balance, at, values, np.array(errors), extra=shape)
+
+    def _coordinate(self, shape: ComplexArray) -> complex:
+        """Modal coordinate q of x_1 over the amplitude."""
+        mass = self.mode.model.harmonic_structure(1).mass
+        return complex(np.vdot(self.mode.linear.shape, mass @ shape)) / self.amplitude
+
+    def _product(self, one: ComplexArray, other: ComplexArray) -> float:
+        """Re one^H M other over the square of the amplitude."""
+        mass = self.mode.model.harmonic_structure(1).mass
+        return float(np.real(np.vdot(one, mass @ other))) / self.amplitude**2
+
+    def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
+        """As in BorderedProblem, by differences."""
+        slopes, errors = [], []
+        lengths = DIFFERENCE * np.array([here.values[0], 1.0, self.amplitude])
+        for step, length in zip(np.diag(lengths), lengths, strict=True):
+            ahead = self.evaluate(here.at.predicted_h, here.values + step)
+            slopes.append((ahead.at.residual - here.at.residual) / length)
+            errors.append((ahead.errors - here.errors) / length)
+        return slopes, np.stack(errors, axis=1)
+
+    def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
+        """As in BorderedProblem."""
+        turned = _shape(here.balance.joint, tangent.transmit(step)[0], 0.0)
+        coordinate = self._coordinate(turned)
+        return np.array([coordinate.real, coordinate.imag, self._product(here.extra, turned)])
+
+    def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
+        """Frequency and damping ratio change by a limited amount."""
+        largest = max(abs(change[0]) / here.values[0], abs(change[1]))
+        return float(min(1.0, LARGEST_CHANGE / max(largest, 1e-300)))
+
+
+def _shape(joint: Joint, displacement_h: FloatArray, drive: float) -> ComplexArray:
+    """x_1 (n,), m, of relative displacements and a drive, m sqrt(kg)."""
+    linear, (relative, _) = joint.model.harmonic_structure(1), relative_indices(joint.model.contact)
+    moved = to_complex(joint.to_relative(displacement_h))[:, 0]
+    return whole_motion(linear, 1j * joint.omega, relative, drive * linear.load_harmonic, moved)
