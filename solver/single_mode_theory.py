@@ -86,14 +86,8 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
         at_rows, own = excited[rows], omega[rows]
         coordinate = force[rows] / (own**2 - at_rows**2 + 2j * zeta[rows] * own * at_rows)
         parts.append((at_rows / (2.0 * np.pi), size[rows], coordinate[:, None] * shown[rows], zeta[rows]))
-    gap = inside[-1] > 0.0
-    nothing = (
-        np.full(1, np.nan),
-        np.full(1, np.nan),
-        np.full((1, shown.shape[1]), np.nan, complex),
-        np.full(1, np.nan),
-    )
-    curve = [parts[0], nothing, parts[1]] if gap else parts
+    nothing = tuple(np.full((1, *part.shape[1:]), np.nan, part.dtype) for part in parts[0])
+    curve = [parts[0], nothing, parts[1]] if inside[-1] > 0.0 else parts
     return ModalResponse(*(np.concatenate(each) for each in zip(*curve, strict=True)))
 
 

@@ -11,13 +11,13 @@ the print has the opposite sign in the normal test). With x' the state at the sa
 - stick, `|p_T - x'| < mu p_N`: `lambda_T = p_T - x'`, `x = x'`;
 - slip otherwise: `lambda_T = mu p_N n` along `n = (p_T - x') / |p_T - x'|`, `x = p_T - lambda_T`.
 
-So the friction force is the projection of a trial force on a disc of radius `mu p_N`, for elastic pairs and for masses
-on sliders. The derivative of the friction force of a slipping pair is
+So the friction force is the projection of a trial force on a disc of radius `mu p_N`, also for masses on sliders. Its
+derivative during slip is
 
     d lambda_T = mu n d p_N + (mu p_N / |p_T - x'|) (1 - n n^T) (d p_T - d x').
 
-The law takes the normal force at the sample. The harmonics of the normal force, Eqs. (11), (12), are computed from its
-means around each sample (`closed_fraction`).
+The law takes the normal force at the sample; its harmonics, Eqs. (11), (12), are those of its means around each sample
+(`closed_fraction`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from solver.model import BoolArray, FloatArray, IntArray
+from solver.model import FloatArray, IntArray
 
 SEPARATED = 0
 STICK = 1
@@ -127,102 +127,6 @@ def advance_monodromy(
         across = ratio * (unit_1 * monodromy[1, column] - unit_2 * monodromy[0, column])
         monodromy[0, column] = -unit_2 * across
         monodromy[1, column] = unit_1 * across
-
-
-@njit(cache=True)
-def advance_tangent(
-    dstate: FloatArray,
-    dforce: FloatArray,
-    basis: FloatArray,
-    first: IntArray,
-    status: int,
-    by: tuple[float, float, float, float, float],
-) -> None:
-    """Derivatives of one sample, in place: `dforce` (2, w) of the tangential force, `dstate` (2, w) of the state.
-
-    Eqs. (13)-(15), with the dependence on all earlier samples of the period. dstate: on entry that of the sample
-    before.
-
-    - basis (m,): derivative of a time sample by its harmonics.
-    - first (3,): first of the m columns of each component of the predicted force; -1 where there are none.
-    - status, by: of the sample; `by` from `contact_tangent`.
-    """
-    m, width = basis.size, dstate.shape[1]
-    pull_1, pull_2, across_11, across_12, across_22 = by
-    if status == STICK:
-        for column in range(width):
-            dforce[0, column] = -dstate[0, column]
-            dforce[1, column] = -dstate[1, column]
-    else:
-        for column in range(width):
-            dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
-            dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
-    for component, by_1, by_2 in ((0, pull_1, pull_2), (1, across_11, across_12), (2, across_12, across_22)):
-        place = first[component]
-        if place >= 0 and by_1 != 0.0:
-            _add(dforce[0, place : place + m], by_1, basis)
-        if place >= 0 and by_2 != 0.0:
-            _add(dforce[1, place : place + m], by_2, basis)
-    if status == STICK:
-        return
-    for component in range(2):
-        for column in range(width):
-            dstate[component, column] = -dforce[component, column]
-        place = first[1 + component]
-        if place >= 0:
-            _add(dstate[component, place : place + m], 1.0, basis)
-
-
-@njit(cache=True)
-def _add(row: FloatArray, times: float, basis: FloatArray) -> None:
-    """Add `times` the basis (m,) to a row (m,)."""
-    for k in range(basis.size):
-        row[k] += times * basis[k]
-
-
-@njit(cache=True)
-def sample_tangents(
-    predicted_t: FloatArray,
-    friction: FloatArray,
-    state_t: FloatArray,
-    status_t: IntArray,
-    has_normal: BoolArray,
-    stride: int,
-) -> tuple[FloatArray, FloatArray]:
-    """Derivatives of the state (normal, tangents) of each pair at every `stride`-th sample, n samples in all.
-
-    The normal state is predicted less contact force; the normal force is taken at the sample, without the mean around
-    it. Arrays as in `law.Marched`. Returns the derivatives by the predicted force at the sample (n, n_contact, 3, 3),
-    and by the tangential state at the sample before (n, n_contact, 2, 2), all dimensionless.
-    """
-    n_contact, n_samples = status_t.shape
-    own = np.zeros((n_samples // stride, n_contact, 3, 3))
-    carried = np.zeros((n_samples // stride, n_contact, 2, 2))
-    for pair in range(n_contact):
-        for place in range(n_samples // stride):
-            n = place * stride
-            status = status_t[pair, n]
-            trial_1 = predicted_t[pair, 1, n] - state_t[pair, 0, n]
-            trial_2 = predicted_t[pair, 2, n] - state_t[pair, 1, n]
-            pull_1, pull_2, across_11, _, across_22 = contact_tangent(
-                status, predicted_t[pair, 0, n], trial_1, trial_2, friction[pair]
-            )
-            across = carried[place, pair]
-            across[0, 0], across[1, 1] = across_11, across_22
-            if status == SLIP:
-                # entry 12 of `across_slip`, with the order of the products (round-off) of the preconditioner
-                limit = friction_limit(friction[pair], predicted_t[pair, 0, n])
-                unit_1, unit_2, ratio = slip_direction(trial_1, trial_2, limit)
-                across[0, 1] = across[1, 0] = -ratio * (unit_1 * unit_2)
-            if status == SEPARATED:
-                own[place, pair, 0, 0] = 1.0
-            for i in range(2):
-                own[place, pair, 1 + i, 1 + i] = 1.0
-                for j in range(2):
-                    own[place, pair, 1 + i, 1 + j] -= across[i, j]
-            if has_normal[pair]:
-                own[place, pair, 1, 0], own[place, pair, 2, 0] = -pull_1, -pull_2
-    return own, carried
 
 
 @njit(cache=True)

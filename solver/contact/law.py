@@ -1,7 +1,7 @@
 """The contact law of all pairs of a joint through one period, its exact derivative, and the motion that goes with it.
 
 Alternating frequency-time method: predicted force to samples, contact law, contact force back to harmonics. Two kinds
-of pairs stand behind the methods of `ContactLaw`. `solver.structure.penalty` chooses the kind, no other room asks:
+of pairs stand behind the methods of `ContactLaw`; `solver.structure.penalty` chooses the kind:
 
 - *elastic* pairs, at displacement level: Eqs. (9)-(15), motion `(p - lambda) / eps` (`period_march`);
 - *inertial* pairs, masses that sit directly on rigid ground: motion by Newton's law (`rigid_slider`). Their tangential
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_limit, mean_normal_force, mean_normal_tangent
-from solver.contact.period_march import MOST_PERIODS, integrate_slip_work, march_period
+from solver.contact.period_march import MOST_PERIODS, Directions, Period, march_period, new_period
 from solver.contact.rigid_slider import Masses, march_masses
 from solver.contact.tangent import march_tangent, mass_tangent
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
@@ -26,9 +26,6 @@ from solver.settings import ROUND_OFF
 if TYPE_CHECKING:
     from solver.structure.fourier import FourierBasis
     from solver.structure.penalty import Penalty
-
-Chosen = slice | BoolArray
-"""Pairs of one kind."""
 
 
 @dataclass(frozen=True)
@@ -69,15 +66,9 @@ class Marched:
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """The law of the pairs of a joint at one frequency: predicted force to contact force, motion and history.
+    """The law of the pairs of a joint at one frequency omega, rad/s: predicted force to contact force, motion, history.
 
-    - penalty: penalties and masses of the pairs.
-    - friction_coefficient (n_contact,): for each pair.
-    - contact: the pairs.
-    - basis: Fourier basis.
-    - omega: rad/s.
-
-    Harmonics are on the axis of length m = 2H+1.
+    friction_coefficient: (n_contact,). Harmonics are on the axis of length m = 2H+1.
     """
 
     penalty: Penalty
@@ -103,52 +94,39 @@ class ContactLaw:
 
         predicted_h (n_contact, 3, m): predicted force, N. history (n_contact, 2): tangential history, m.
         """
-        basis, masses = self.basis, self.penalty.inertial
+        basis, masses, penalty = self.basis, self.penalty.inertial, self.penalty
         predicted_t = predicted_h @ basis.synthesis
         if self.rate_dependent:
             predicted_t[masses, 1:] = (predicted_h[masses, 1:] * basis.step_mean) @ basis.synthesis
-        force_t, state_t, start, status_t, periods, error, slip_work = self._march_kinds(predicted_t, history)
-        force_h = force_t @ basis.analysis
+        period = new_period(predicted_t, self.friction_coefficient, history * penalty.tangential[:, None])
+        limit = friction_limit(self.friction_coefficient, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
+        # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
+        march_period(np.flatnonzero(~masses), period, 0.1 * ROUND_OFF * float(limit.max(initial=0.0)), MOST_PERIODS)
+        if self.rate_dependent:
+            march_masses(np.flatnonzero(masses), period, self._directions, self._masses)
+        force_h = period.force_t @ basis.analysis
         if self.rate_dependent:
             force_h[masses, 1:] /= basis.step_mean
         force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
-        change = float(error.max(initial=0.0))
-        return Marched(predicted_t, force_t, force_h, state_t, start, status_t, periods, change, slip_work)
-
-    def _march_kinds(self, predicted_t: FloatArray, history: FloatArray) -> list[np.ndarray]:
-        masses = self.penalty.inertial
-        if not self.rate_dependent:
-            return self._march_elastic(slice(None), predicted_t, history)
-        if masses.all():
-            return self._march_masses(slice(None), predicted_t)
-        found = []
-        elastic = self._march_elastic(~masses, predicted_t, history)
-        for one, other in zip(elastic, self._march_masses(masses, predicted_t), strict=True):
-            both = np.empty((masses.size, *one.shape[1:]), one.dtype)
-            both[~masses], both[masses] = one, other
-            found.append(both)
-        return found
-
-    def _march_elastic(self, pairs: Chosen, predicted_t: FloatArray, history: FloatArray) -> list[np.ndarray]:
-        friction, stiffness = self.friction_coefficient, self.penalty.tangential[pairs]
-        limit = friction_limit(friction, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
-        # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
-        periodicity = 0.1 * ROUND_OFF * float(limit.max(initial=0.0))
-        start = history[pairs] * stiffness[:, None]
-        force_t, state_t, status_t, periods, error = march_period(
-            predicted_t[pairs], friction[pairs], start, periodicity, MOST_PERIODS
+        return Marched(
+            predicted_t=predicted_t,
+            force_t=period.force_t,
+            force_h=force_h,
+            state_t=period.state_t,
+            start=period.start,
+            status_t=period.status_t,
+            periods=period.periods,
+            periodicity_error=float(period.change.max(initial=0.0)),
+            slip_work=np.where(masses, period.slip_work, period.slip_work / penalty.tangential),
         )
-        return [force_t, state_t, start, status_t, periods, error, integrate_slip_work(force_t, state_t) / stiffness]
 
-    def _march_masses(self, pairs: Chosen, predicted_t: FloatArray) -> list[np.ndarray]:
-        force_t, velocity_t, place_t, status_t, slip_work, error = march_masses(
-            predicted_t[pairs], self.friction_coefficient[pairs], self._masses(pairs), self.sample_step
-        )
-        once = np.ones(len(force_t), np.int64)
-        return [force_t, place_t, velocity_t[:, :, 0], status_t, once, error, slip_work]
+    @property
+    def _masses(self) -> Masses:
+        return Masses(self.penalty.mass, self.penalty.drag, self.sample_step)
 
-    def _masses(self, pairs: Chosen | IntArray) -> Masses:
-        return self.penalty.mass[pairs], self.penalty.drag[pairs], self.contact.line[pairs]
+    @property
+    def _directions(self) -> Directions:
+        return Directions(self.contact.line, self.contact.has_normal)
 
     def friction_work(self, at: Marched) -> FloatArray:
         """Work that friction dissipates in a period (n_contact,), J. Friction is at its limit during slip."""
@@ -167,19 +145,15 @@ class ContactLaw:
         stuck = at.stuck
         switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
         slides = switching & (contact.dofs[:, 1:] >= 0).any(axis=1)
-        march_tangent(
-            np.flatnonzero(slides & ~masses),
-            *(at.predicted_t, self.friction_coefficient, at.start, at.state_t, at.periods),
-            *(contact.line, contact.has_normal, (basis.synthesis, basis.analysis), (tangent, work_tangent)),
-        )
+        none = np.zeros(n_contact)
+        marched = at.predicted_t, self.friction_coefficient, at.start, at.force_t, at.state_t, at.status_t
+        period, out = Period(*marched, at.periods, none, none), (tangent, work_tangent)
+        series = basis.synthesis, basis.synthesis, basis.analysis
+        march_tangent(np.flatnonzero(slides & ~masses), period, self._directions, series, out)
         work_tangent /= self.penalty.tangential[:, None]
         if self.rate_dependent:
-            means = basis.synthesis * basis.step_mean[:, None], basis.analysis / basis.step_mean
-            mass_tangent(
-                np.flatnonzero(slides & masses),
-                *(at.predicted_t, self.friction_coefficient, self._masses(slice(None)), self.sample_step),
-                *(at.start, contact.has_normal, (basis.synthesis, *means), (tangent, work_tangent)),
-            )
+            series = basis.synthesis, basis.synthesis * basis.step_mean[:, None], basis.analysis / basis.step_mean
+            mass_tangent(np.flatnonzero(slides & masses), period, self._directions, self._masses, series, out)
         closing = np.flatnonzero(contact.has_normal & switching)
         mean_normal_tangent(closing, at.predicted_t, basis.synthesis, basis.analysis, tangent)
         passes = stuck[:, None] | (contact.dofs < 0)
@@ -209,8 +183,7 @@ class ContactLaw:
         1 / eps for elastic pairs; for inertial pairs exactly as in the steps of the march.
         """
         penalty, masses, orders = self.penalty, self.penalty.inertial, np.array(self.basis.orders, np.float64)
-        own = 1.0 / np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)
-        found = np.repeat(own[:, :, None].astype(complex), orders.size + 1, axis=2)
+        found: ComplexArray = np.repeat((1.0 + 0.0j) / penalty.stiffness[:, :, None], orders.size + 1, axis=2)
         if masses.any() and orders.size:
             angle = np.pi * orders / self.basis.n_samples
             mass, drag, mean = (part[masses, None] for part in (penalty.mass, penalty.drag, penalty.mean))
@@ -258,8 +231,9 @@ class ContactLaw:
             periodicity = ROUND_OFF * float(friction_limit(friction, last[:, 0].max(axis=1)).max())
             state = history[moving] * stiffness
             for part in parts:
-                between = first + part * (last - first)
-                state = march_period(between, friction, state, periodicity, MOST_PERIODS)[1][:, :, -1]
+                period = new_period(first + part * (last - first), friction, state)
+                march_period(np.arange(len(state)), period, periodicity, MOST_PERIODS)
+                state = period.state_t[:, :, -1]
             found[moving] = state / stiffness
         return found
 
@@ -273,7 +247,7 @@ class ContactLaw:
         changed = np.where(masses[:, None], mean, last)
         return np.where((other.inertial == masses)[:, None], history, changed)
 
-    # --- what masses on rigid ground have beside a periodic motion: ratcheting, and harmonics above the highest one ---
+    # --- masses on rigid ground: ratcheting, and harmonics above the highest one ---
 
     def drift(self, at: Marched) -> FloatArray:
         """Distance (n_contact, 2), m, by which the inertial pairs move on in a period; 0 for elastic pairs."""

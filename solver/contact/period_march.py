@@ -9,12 +9,14 @@ confirm this start.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
 from solver.contact.coulomb import STICK, advance_monodromy, contact_sample
-from solver.model import FloatArray, IntArray
+from solver.model import BoolArray, FloatArray, IntArray
 from solver.settings import ROUND_OFF
 
 MOST_PERIODS = 400
@@ -37,76 +39,93 @@ def slip_work_slopes(normal: float, speed: float) -> tuple[float, float]:
     return speed, normal
 
 
-@njit(cache=True)
-def march_period(
-    predicted_t: FloatArray,
-    friction: FloatArray,
-    start: FloatArray,
-    periodicity: float,
-    most_periods: int,
-) -> tuple[FloatArray, FloatArray, IntArray, IntArray, FloatArray]:
-    """March every pair through the period until its tangential state repeats, Eqs. (11)-(15).
+class Period(NamedTuple):
+    """A period of pairs; the marches fill all but the predicted force, friction coefficients and start.
 
-    - predicted_t (n_contact, 3, N): predicted force, N, normal first.
-    - start (n_contact, 2): tangential state at the start of the first period, N.
-    - periodicity: accepted difference of the state over a period, N.
-
-    Returns `force_t`, `state_t` of the last period, `status_t` and `periods` of `law.Marched`, and the change of the
-    state over the last period (n_contact,), N.
+    - friction (n_contact,): friction coefficients.
+    - change (n_contact,): change over the last period of the tangential state; of masses of the velocity, as a force
+      m v / dt, N.
+    - all others: as in `law.Marched`; `slip_work` of elastic pairs times the tangential penalty, N * N.
     """
+
+    predicted_t: FloatArray
+    friction: FloatArray
+    start: FloatArray
+    force_t: FloatArray
+    state_t: FloatArray
+    status_t: IntArray
+    periods: IntArray
+    change: FloatArray
+    slip_work: FloatArray
+
+
+class Directions(NamedTuple):
+    """Displacements of the pairs: `line` and `has_normal` (n_contact,) as in `model.ContactInterface`."""
+
+    line: IntArray
+    has_normal: BoolArray
+
+
+def new_period(predicted_t: FloatArray, friction: FloatArray, start: FloatArray) -> Period:
+    """Period of the predicted force (n_contact, 3, N), N, to be marched."""
     n_contact, _, n_samples = predicted_t.shape
-    force_t = np.zeros((n_contact, 3, n_samples))
-    state_t = np.zeros((n_contact, 2, n_samples + 1))
-    status_t = np.zeros((n_contact, n_samples), np.int64)
-    periods = np.zeros(n_contact, np.int64)
-    periodicity_error = np.zeros(n_contact)
+    return Period(
+        predicted_t,
+        friction,
+        start,
+        force_t=np.zeros(predicted_t.shape),
+        state_t=np.zeros((n_contact, 2, n_samples + 1)),
+        status_t=np.zeros((n_contact, n_samples), np.int64),
+        periods=np.ones(n_contact, np.int64),
+        change=np.zeros(n_contact),
+        slip_work=np.zeros(n_contact),
+    )
+
+
+@njit(cache=True)
+def march_period(pairs: IntArray, period: Period, periodicity: float, most_periods: int) -> None:
+    """March elastic pairs (n,) through the period until their tangential state repeats, Eqs. (11)-(15).
+
+    periodicity: accepted difference of the state over a period, N.
+    """
     monodromy = np.zeros((2, 2))
-    for pair in range(n_contact):
-        first = start[pair, 0]
-        second = start[pair, 1]
+    for pair in pairs:
+        first, second = period.start[pair, 0], period.start[pair, 1]
         before = np.inf
-        for period in range(most_periods):
-            state_t[pair, 0, 0] = first
-            state_t[pair, 1, 0] = second
-            moved = False
-            tracked = period >= PLAIN_PERIODS
+        predicted_t, force_t, state_t = period.predicted_t[pair], period.force_t[pair], period.state_t[pair]
+        friction = period.friction[pair]
+        for number in range(most_periods):
+            state_t[0, 0], state_t[1, 0] = first, second
+            moved, tracked = False, number >= PLAIN_PERIODS
             monodromy[:, :] = 0.0
             monodromy[0, 0] = monodromy[1, 1] = 1.0
-            for n in range(n_samples):
-                trial_1 = predicted_t[pair, 1, n] - first
-                trial_2 = predicted_t[pair, 2, n] - second
+            for n in range(period.status_t.shape[1]):
+                pressed, pull_1, pull_2 = predicted_t[0, n], predicted_t[1, n], predicted_t[2, n]
+                trial_1, trial_2 = pull_1 - first, pull_2 - second
                 normal, force_1, force_2, first, second, status = contact_sample(
-                    predicted_t[pair, 0, n],
-                    predicted_t[pair, 1, n],
-                    predicted_t[pair, 2, n],
-                    friction[pair],
-                    first,
-                    second,
+                    pressed, pull_1, pull_2, friction, first, second
                 )
-                force_t[pair, 0, n] = normal
-                force_t[pair, 1, n] = force_1
-                force_t[pair, 2, n] = force_2
-                state_t[pair, 0, n + 1] = first
-                state_t[pair, 1, n + 1] = second
-                status_t[pair, n] = status
+                force_t[0, n], force_t[1, n], force_t[2, n] = normal, force_1, force_2
+                state_t[0, n + 1], state_t[1, n + 1] = first, second
+                period.status_t[pair, n] = status
                 moved = moved or status != STICK
                 if tracked and status != STICK:
-                    advance_monodromy(monodromy, status, normal, trial_1, trial_2, friction[pair])
-            periods[pair] = period + 1
-            change_1, change_2 = first - state_t[pair, 0, 0], second - state_t[pair, 1, 0]
-            periodicity_error[pair] = np.hypot(change_1, change_2)
-            if not moved or (period > 0 and periodicity_error[pair] <= periodicity):
+                    advance_monodromy(monodromy, status, normal, trial_1, trial_2, friction)
+            period.periods[pair] = number + 1
+            change_1, change_2 = first - state_t[0, 0], second - state_t[1, 0]
+            change = np.hypot(change_1, change_2)
+            period.change[pair] = change
+            if not moved or (number > 0 and change <= periodicity):
                 break
             # a plain period never increases the change; a period from a start of Newton's method may
-            if tracked and periodicity_error[pair] < 0.5 * before:
-                before = periodicity_error[pair]
+            if tracked and change < 0.5 * before:
+                before = change
                 missing_1, missing_2, found = solve_periodicity(monodromy, change_1, change_2)
                 if found:
-                    first = state_t[pair, 0, 0] + missing_1
-                    second = state_t[pair, 1, 0] + missing_2
+                    first, second = state_t[0, 0] + missing_1, state_t[1, 0] + missing_2
             else:
                 before = np.inf
-    return force_t, state_t, status_t, periods, periodicity_error
+        period.slip_work[pair] = _slip_work(force_t[0], state_t)
 
 
 @njit(cache=True)
@@ -121,22 +140,18 @@ def solve_periodicity(monodromy: FloatArray, change_1: float, change_2: float) -
 
 
 @njit(cache=True)
-def integrate_slip_work(force_t: FloatArray, state_t: FloatArray) -> FloatArray:
-    """Slip work of a period times the tangential penalty (n_contact,), N * N.
+def _slip_work(normal_t: FloatArray, state_t: FloatArray) -> float:
+    """Slip work of a period times the tangential penalty, N * N.
 
     Eqs. (7), (21) with the sliding velocity (the print has the displacement): sum of normal force times increment of
     the tangential state.
     """
-    n_contact, _, n_samples = force_t.shape
-    integral = np.zeros(n_contact)
-    for pair in range(n_contact):
-        for n in range(n_samples):
-            before = n - 1 if n > 0 else n_samples - 1
-            slip = np.hypot(
-                state_t[pair, 0, n + 1] - state_t[pair, 0, n], state_t[pair, 1, n + 1] - state_t[pair, 1, n]
-            )
-            integral[pair] += increment_work(force_t[pair, 0, before], force_t[pair, 0, n], slip)
-    return integral
+    work = 0.0
+    for n in range(normal_t.size):
+        before = n - 1 if n > 0 else normal_t.size - 1
+        slip = np.hypot(state_t[0, n + 1] - state_t[0, n], state_t[1, n + 1] - state_t[1, n])
+        work += increment_work(normal_t[before], normal_t[n], slip)
+    return work
 
 
 @njit(cache=True)

@@ -1,17 +1,15 @@
 """Friction of a mass that sits directly on a slider, through one period. Floats and arrays only.
 
-A rigid Coulomb force jumps where the mass turns. So the harmonics of the force fall as 1/n, and the harmonics of the
-motion as 1/n^3: a balance of a few harmonics is wrong by some per cent. Above the highest harmonic H, however, the
-structure acts by its mass alone. So the motion of such a pair is marched through the period,
+A rigid Coulomb force jumps where the mass turns, so that its harmonics fall as 1/n only and a balance of a few
+harmonics is wrong by some per cent. Above the highest harmonic H, however, the structure acts by its mass alone. So
+the motion of such a pair is marched through the period,
 
     m v' + c v = p - lambda,                       lambda = projection on the friction disc, against the motion,   (*)
 
-where p is the predicted force of the pair. The harmonics of p up to H are the unknowns of the balance. Equation (*)
-defines their motion, `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`, without truncation. The harmonics of lambda
-above H act on the mass m in the march, as in the structure, up to a relative error of `k / (n w)^2 m`.
-So p corresponds to the paper's `F_r - Z_r u + eps u` with `eps -> (i n w)^2 m + i n w c`, and the march supplies the
-harmonics above H. The drag c removes the influence of the start of the period. The drag is part of p and of the
-march, and cancels up to H.
+where p is the predicted force of the pair, whose harmonics up to H are the unknowns of the balance. Equation (*) gives
+their motion, `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`: p is the paper's `F_r - Z_r u + eps u` with
+`eps -> (i n w)^2 m + i n w c`. The harmonics of lambda above H act on the mass m in the march, as in the structure, up
+to a relative error of `k / (n w)^2 m`. The drag c, in p and in the march alike, removes the influence of the start.
 
 In a step of length dt the force p (mean over the step) and the friction limit are constant. The instant in the step at
 which the mass turns or comes to rest is resolved, so that the residual is smooth and the error of second order in dt.
@@ -20,19 +18,25 @@ With two tangents there is no such instant, and the step is divided instead.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, across_slip, friction_force, friction_limit, slip_direction
-from solver.contact.period_march import MOST_PERIODS, slip_work_rate
+from solver.contact.period_march import MOST_PERIODS, Directions, Period, slip_work_rate
 from solver.model import FloatArray, IntArray
 
 PARTS = 8  # parts of a step of a pair with two tangents
 SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
 
 
-Masses = tuple[FloatArray, FloatArray, IntArray]
-"""Mass, kg, drag, N s/m, and line, as in `step_mass`, of each pair."""
+class Masses(NamedTuple):
+    """Mass, kg, and drag, N s/m, of each pair (n_contact,); time between two samples, s."""
+
+    mass: FloatArray
+    drag: FloatArray
+    step: float
 
 
 @njit(cache=True)
@@ -203,58 +207,42 @@ def step_mass(
 
 
 @njit(cache=True)
-def march_masses(
-    predicted_t: FloatArray, friction: FloatArray, masses: Masses, step: float
-) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
-    """March every pair through the period until its velocity repeats.
+def march_masses(pairs: IntArray, period: Period, directions: Directions, masses: Masses) -> None:
+    """March masses (n,) through the period until their velocity repeats.
 
-    predicted_t (n_contact, 3, N): predicted force, N, the tangential ones as means over the steps. step: dt, s.
-
-    Returns the contact force (n_contact, 3, N), N, as the predicted one; velocity, m/s, and displacement since the
-    start of the period, m, at the ends of the steps (n_contact, 2, N+1); status (n_contact, N); slip work (n_contact,),
-    J; and the change of the velocity over the last period as a force m v / dt (n_contact,), N.
+    The tangential predicted forces are means over the steps, and so are the contact forces. The state is the
+    displacement since the start of the period, m, the start receives the velocity there, m/s.
     """
-    mass, drag, line = masses
-    n_contact, _, n_samples = predicted_t.shape
-    force_t = np.zeros((n_contact, 3, n_samples))
-    velocity_t = np.zeros((n_contact, 2, n_samples + 1))
-    place_t = np.zeros((n_contact, 2, n_samples + 1))
-    status_t = np.zeros((n_contact, n_samples), np.int64)
-    slip_work = np.zeros(n_contact)
-    periodicity_error = np.zeros(n_contact)
-    out = np.empty(7)
-    tangent = np.empty((5, 5))
-    for pair in range(n_contact):
-        gain, loss = step_gains(mass[pair], drag[pair], step)
-        largest = np.abs(predicted_t[pair, 1:]).max()
+    out, tangent = np.empty(7), np.empty((5, 5))
+    step, n_samples = masses.step, period.status_t.shape[1]
+    for pair in pairs:
+        gain, loss = step_gains(masses.mass[pair], masses.drag[pair], step)
+        predicted_t, force_t, place_t = period.predicted_t[pair], period.force_t[pair], period.state_t[pair]
+        friction, line, start = period.friction[pair], directions.line[pair], period.start[pair]
+        largest = np.abs(predicted_t[1:]).max()
         velocity = np.zeros(2)
         # far more periods than needed: the drag halves the change in each period
         for _ in range(MOST_PERIODS):
-            velocity_t[pair, 0, 0], velocity_t[pair, 1, 0] = velocity[0], velocity[1]
-            slip_work[pair] = 0.0
+            start[:] = velocity
+            work = 0.0
             for n in range(n_samples):
-                normal = max(predicted_t[pair, 0, n], 0.0)
+                normal = max(predicted_t[0, n], 0.0)
                 rests = velocity[0] == 0.0 and velocity[1] == 0.0
-                limit = friction_limit(friction[pair], normal)
-                step_mass(predicted_t[pair, 1:, n], velocity, limit, gain, loss, line[pair], out, tangent)
-                force_t[pair, 0, n] = normal
-                force_t[pair, 1, n] = out[0]
-                force_t[pair, 2, n] = out[1]
-                velocity[0] = out[2]
-                velocity[1] = out[3]
-                velocity_t[pair, 0, n + 1] = out[2]
-                velocity_t[pair, 1, n + 1] = out[3]
-                place_t[pair, 0, n + 1] = place_t[pair, 0, n] + step * out[4]
-                place_t[pair, 1, n + 1] = place_t[pair, 1, n] + step * out[5]
-                slip_work[pair] += slip_work_rate(normal, out[6]) * step
-                if predicted_t[pair, 0, n] <= 0.0:
-                    status_t[pair, n] = SEPARATED
+                limit = friction_limit(friction, normal)
+                step_mass(predicted_t[1:, n], velocity, limit, gain, loss, line, out, tangent)
+                force_t[0, n], force_t[1, n], force_t[2, n] = normal, out[0], out[1]
+                for i in range(2):
+                    velocity[i] = out[2 + i]
+                    place_t[i, n + 1] = place_t[i, n] + step * out[4 + i]
+                work += slip_work_rate(normal, out[6]) * step
+                if predicted_t[0, n] <= 0.0:
+                    period.status_t[pair, n] = SEPARATED
                 elif rests and out[2] == 0.0 and out[3] == 0.0:
-                    status_t[pair, n] = STICK
+                    period.status_t[pair, n] = STICK
                 else:
-                    status_t[pair, n] = SLIP
-            change = np.hypot(velocity[0] - velocity_t[pair, 0, 0], velocity[1] - velocity_t[pair, 1, 0])
-            periodicity_error[pair] = change * mass[pair] / step
-            if change * mass[pair] <= SAME_VELOCITY * largest * step * n_samples:
+                    period.status_t[pair, n] = SLIP
+            period.slip_work[pair] = work
+            change = np.hypot(velocity[0] - start[0], velocity[1] - start[1]) * masses.mass[pair]
+            period.change[pair] = change / step
+            if change <= SAME_VELOCITY * largest * step * n_samples:
                 break
-    return force_t, velocity_t, place_t, status_t, slip_work, periodicity_error

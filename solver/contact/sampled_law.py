@@ -1,7 +1,7 @@
 """Derivative of the contact law at the samples of a period, for disturbances of a periodic state in time.
 
 Let `p = lambda + x`, with the state `x = eps u` of an elastic pair. Let A be the derivative of x with respect to p, and
-B the derivative with respect to x at the sample before (`coulomb.sample_tangents`). The law of the disturbance is
+B the derivative with respect to x at the sample before (`sample_tangents`). The law of the disturbance is
 
     (1 - A) eps du - A dlambda = B eps du'.
 
@@ -16,10 +16,33 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from solver.contact.coulomb import friction_limit, sample_tangents
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_limit
 from solver.contact.law import ContactLaw, Marched
 from solver.contact.rigid_slider import step_gains, step_mass
 from solver.model import FloatArray, IntArray
+
+
+def sample_tangents(law: ContactLaw, at: Marched, stride: int = 1) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of the state (normal, tangents) of each elastic pair at every `stride`-th sample, n samples in all.
+
+    The normal state is predicted less contact force; the normal force is taken at the sample, without the mean around
+    it. Returns the derivatives by the predicted force at the sample (n, n_contact, 3, 3), A, and by the tangential
+    state at the sample before (n, n_contact, 2, 2), B; dimensionless.
+    """
+    predicted, status = at.predicted_t[:, :, ::stride], at.status_t[:, ::stride]
+    limit = friction_limit(law.friction_coefficient[:, None], np.maximum(predicted[:, 0], 0.0))
+    trial = predicted[:, 1:] - at.state_t[:, :, :-1:stride]
+    size = np.hypot(trial[:, 0], trial[:, 1])
+    slips = (status == SLIP) & (limit > 0.0) & (size > 0.0)
+    inverse = np.divide(1.0, size, out=np.zeros_like(size), where=slips)
+    unit, ratio = trial * inverse[:, None], np.where(slips, limit * inverse, status == STICK)
+    carried = (np.eye(2)[:, :, None] - unit[:, :, None] * unit[:, None]) * ratio[:, None, None]
+    own = np.zeros((len(status), 3, 3, status.shape[1]))
+    own[:, 0, 0] = status == SEPARATED
+    own[:, 1:, 1:] = np.eye(2)[:, :, None] - carried
+    own[:, 1:, 0] = -(law.friction_coefficient * law.contact.has_normal)[:, None, None] * unit
+    by_sample = 3, 0, 1, 2
+    return np.ascontiguousarray(own.transpose(by_sample)), np.ascontiguousarray(carried.transpose(by_sample))
 
 
 @dataclass(frozen=True)
@@ -42,10 +65,8 @@ class SampledLaw:
 def sampled_law(law: ContactLaw, at: Marched, pairs: IntArray) -> SampledLaw:
     """Derivative of the contact law of the switching pairs (p,) of a state."""
     n, penalty = at.status_t.shape[1], law.penalty
-    own, carried = sample_tangents(
-        at.predicted_t, law.friction_coefficient, at.state_t, at.status_t, law.contact.has_normal, 1
-    )
-    eps = np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1)[pairs, None, :]
+    own, carried = sample_tangents(law, at)
+    eps = penalty.stiffness[pairs, None, :]
     there = law.contact.dofs[pairs] >= 0
     # a displacement that does not exist has no disturbance of the force
     passed = np.where(there[:, :, None] & there[:, None, :], own[:, pairs], -np.eye(3) * ~there[:, :, None])

@@ -10,61 +10,113 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solver.contact.coulomb import STICK, advance_tangent, contact_sample, contact_tangent, friction_limit
-from solver.contact.period_march import PLAIN_PERIODS, increment_slopes, slip_work_slopes, solve_periodicity
+from solver.contact.coulomb import STICK, contact_sample, contact_tangent, friction_limit
+from solver.contact.period_march import (
+    PLAIN_PERIODS,
+    Directions,
+    Period,
+    increment_slopes,
+    slip_work_slopes,
+    solve_periodicity,
+)
 from solver.contact.rigid_slider import Masses, step_gains, step_mass
-from solver.model import BoolArray, FloatArray, IntArray
+from solver.model import FloatArray, IntArray
+
+Series = tuple[FloatArray, FloatArray, FloatArray]
+"""From the harmonics to the samples of the normal force (m, N) and of the tangential forces (m, N), and from samples of
+tangential forces back to harmonics (N, m). With masses, the tangential forces are means over the steps."""
+
+Tangents = tuple[FloatArray, FloatArray]
+"""Receive the derivatives by the harmonics of the predicted force: of those of the friction force (n_contact, 3m, 3m),
+dimensionless, in the rows of the tangents that exist, and of the slip work as in `Period` (n_contact, 3m)."""
 
 
 @njit(cache=True)
-def march_tangent(
-    pairs: IntArray,
-    predicted_t: FloatArray,
-    friction: FloatArray,
-    start: FloatArray,
-    state_t: FloatArray,
-    periods: IntArray,
-    line: IntArray,
-    has_normal: BoolArray,
-    series: tuple[FloatArray, FloatArray],
-    out: tuple[FloatArray, FloatArray],
-) -> None:
-    """Derivatives of the results of `march_period` and `integrate_slip_work` of some pairs (n,), with the periodicity.
+def march_tangent(pairs: IntArray, period: Period, directions: Directions, series: Series, out: Tangents) -> None:
+    """Derivatives of the results of `march_period` of some pairs (n,), with the periodicity.
 
     Where the periodicity does not determine the start of the last period (the pair has come to stick), the derivative
     of the start follows from the periods before.
-
-    - predicted_t, friction, start: arguments of `march_period`; state_t, periods: its results.
-    - line, has_normal (n_contact,): as in `model.ContactInterface`.
-    - series (m, N), (N, m): synthesis and analysis of the Fourier basis.
-    - out: receives the derivatives of the harmonics of the friction force (n_contact, 3m, 3m), dimensionless, in the
-      rows of the tangents that exist, and of the slip work (N * N), (n_contact, 3m), N.
     """
     # rows of the transposes are contiguous, as the loops over columns need
-    basis_t, analysis_t = np.ascontiguousarray(series[0].T), np.ascontiguousarray(series[1].T)
+    basis_t, analysis_t = np.ascontiguousarray(series[0].T), np.ascontiguousarray(series[2].T)
     n_samples, m = basis_t.shape
     for pair in pairs:
-        columns, tangents, width = pair_columns(m, line[pair], has_normal[pair])
+        has_normal, friction = directions.has_normal[pair], period.friction[pair]
+        predicted_t, state_t = period.predicted_t[pair], period.state_t[pair]
+        columns, tangents, width = pair_columns(m, directions.line[pair], has_normal)
         dforce_t = np.empty((n_samples, tangents.size, width + 2))
         dforce, before, dstart = np.empty((2, width + 2)), np.empty((2, width + 2)), np.empty((2, width))
-        work = np.zeros(width + 2)
-        dstate = np.zeros((2, width + 2))
+        work, dstate = np.zeros(width + 2), np.zeros((2, width + 2))
         dstate[0, width] = dstate[1, width + 1] = 1.0
         for n in range(n_samples):
-            normal, force_1, force_2 = predicted_t[pair, 0, n], predicted_t[pair, 1, n], predicted_t[pair, 2, n]
-            first, second = state_t[pair, 0, n], state_t[pair, 1, n]
-            normal, _, _, _, _, status = contact_sample(normal, force_1, force_2, friction[pair], first, second)
-            by = contact_tangent(status, normal, force_1 - first, force_2 - second, friction[pair])
-            before[:, :] = dstate
+            pressed, pull_1, pull_2 = predicted_t[0, n], predicted_t[1, n], predicted_t[2, n]
+            first, second = state_t[0, n], state_t[1, n]
+            normal, _, _, _, _, status = contact_sample(pressed, pull_1, pull_2, friction, first, second)
+            by = contact_tangent(status, normal, pull_1 - first, pull_2 - second, friction)
+            if status != STICK:
+                before[:, :] = dstate
             if tangents.size == 2:
-                advance_tangent(dstate, dforce_t[n], basis_t[n], columns, status, by)
+                _advance(dstate, dforce_t[n], basis_t[n], columns, status, by)
             else:
-                advance_tangent(dstate, dforce, basis_t[n], columns, status, by)
+                _advance(dstate, dforce, basis_t[n], columns, status, by)
                 dforce_t[n, 0] = dforce[tangents[0]]
-            _add_slip_work(work, n, predicted_t[pair, 0], state_t[pair], before, dstate, basis_t, has_normal[pair])
-        plain = min(periods[pair] - 1, PLAIN_PERIODS)
-        _start_tangent(dstart, dstate, predicted_t[pair], friction[pair], start[pair], plain, basis_t, columns)
+            if status != STICK:
+                _add_slip_work(work, n, predicted_t[0], state_t, before, dstate, basis_t, has_normal)
+        plain = min(period.periods[pair] - 1, PLAIN_PERIODS)
+        _start_tangent(dstart, dstate, predicted_t, friction, period.start[pair], plain, basis_t, columns)
         _assemble(out[0][pair], out[1][pair], dforce_t, work, dstart, analysis_t, tangents, columns)
+
+
+@njit(cache=True)
+def _advance(
+    dstate: FloatArray,
+    dforce: FloatArray,
+    basis: FloatArray,
+    first: IntArray,
+    status: int,
+    by: tuple[float, float, float, float, float],
+) -> None:
+    """Derivatives of one sample, in place: `dforce` (2, w) of the tangential force, `dstate` (2, w) of the state.
+
+    Eqs. (13)-(15), with the dependence on all earlier samples of the period. dstate: on entry that of the sample
+    before.
+
+    - basis (m,): derivative of a time sample by its harmonics.
+    - first (3,): first of the m columns of each component of the predicted force; -1 where there are none.
+    - status, by: of the sample; `by` from `contact_tangent`.
+    """
+    m, width = basis.size, dstate.shape[1]
+    pull_1, pull_2, across_11, across_12, across_22 = by
+    if status == STICK:
+        for column in range(width):
+            dforce[0, column] = -dstate[0, column]
+            dforce[1, column] = -dstate[1, column]
+    else:
+        for column in range(width):
+            dforce[0, column] = -across_11 * dstate[0, column] - across_12 * dstate[1, column]
+            dforce[1, column] = -across_12 * dstate[0, column] - across_22 * dstate[1, column]
+    for component, by_1, by_2 in ((0, pull_1, pull_2), (1, across_11, across_12), (2, across_12, across_22)):
+        place = first[component]
+        if place >= 0 and by_1 != 0.0:
+            _add(dforce[0, place : place + m], by_1, basis)
+        if place >= 0 and by_2 != 0.0:
+            _add(dforce[1, place : place + m], by_2, basis)
+    if status == STICK:
+        return
+    for component in range(2):
+        for column in range(width):
+            dstate[component, column] = -dforce[component, column]
+        place = first[1 + component]
+        if place >= 0:
+            _add(dstate[component, place : place + m], 1.0, basis)
+
+
+@njit(cache=True)
+def _add(row: FloatArray, times: float, basis: FloatArray) -> None:
+    """Add `times` the basis (m,) to a row (m,)."""
+    for k in range(basis.size):
+        row[k] += times * basis[k]
 
 
 @njit(cache=True)
@@ -130,7 +182,7 @@ def _assemble(
 ) -> None:
     """Derivatives of a pair: of the harmonics of friction into `tangent` (3m, 3m), of the slip work into (3m,).
 
-    - dforce_t (N, n_tangents, width + 2 or more), work (width + 2,): derivatives with the start of the period held; the
+    - dforce_t (N, n_tangents, width + 2), work (width + 2,): derivatives with the start of the period held; the
       last two of width + 2 columns by the start.
     - dstart (2, width): derivative of the start.
     """
@@ -191,60 +243,40 @@ def _start_tangent(
             )
             if status != STICK:
                 by = contact_tangent(status, normal, trial_1, trial_2, friction)
-                advance_tangent(moved, dforce, basis_t[n], columns, status, by)
+                _advance(moved, dforce, basis_t[n], columns, status, by)
     dstart[:, :] = moved[:, :width]
 
 
 @njit(cache=True)
 def mass_tangent(
-    pairs: IntArray,
-    predicted_t: FloatArray,
-    friction: FloatArray,
-    masses: Masses,
-    step: float,
-    start: FloatArray,
-    has_normal: BoolArray,
-    series: tuple[FloatArray, FloatArray, FloatArray],
-    out: tuple[FloatArray, FloatArray],
+    pairs: IntArray, period: Period, directions: Directions, masses: Masses, series: Series, out: Tangents
 ) -> None:
-    """Exact derivative of the periodic motion of `march_masses` of some pairs (n,) by the harmonics of the predicted
-    force.
-
-    - predicted_t, friction, masses, step: arguments of `march_masses`.
-    - start (n_contact, 2): velocity at the start of the period, m/s.
-    - series (m, N), (m, N), (N, m): from the harmonics to the normal force at the samples and to the means of the
-      tangential forces over the steps, and from these means back to their harmonics.
-    - out: receives what that of `march_tangent` receives; the derivative of the slip work is in m.
-    """
+    """Derivatives of the results of `march_masses` of some pairs (n,), with the periodicity."""
     point_t, mean_t = np.ascontiguousarray(series[0].T), np.ascontiguousarray(series[1].T)
     analysis_t = np.ascontiguousarray(series[2].T)
     n_samples, m = point_t.shape
     ahead, local = np.empty(7), np.empty((5, 5))
     for pair in pairs:
-        line = masses[2][pair]
-        columns, tangents, width = pair_columns(m, line, has_normal[pair])
-        leave = np.empty((5, width + 2))
-        # in whole blocks of 8 columns: the round-off of the product does not depend on the number of columns
-        padded = width + 2 if line < 0 else (width + 2 + 7) // 8 * 8
-        dforce_t = np.zeros((n_samples, tangents.size, padded))
-        work = np.zeros(width + 2)
-        gain, loss = step_gains(masses[0][pair], masses[1][pair], step)
-        velocity = start[pair].copy()
+        has_normal, line, friction = directions.has_normal[pair], directions.line[pair], period.friction[pair]
+        columns, tangents, width = pair_columns(m, line, has_normal)
+        gain, loss = step_gains(masses.mass[pair], masses.drag[pair], masses.step)
+        dforce_t, leave = np.empty((n_samples, tangents.size, width + 2)), np.empty((5, width + 2))
+        work, velocity = np.zeros(width + 2), period.start[pair].copy()
         # columns: the harmonics of the predicted force, then the velocity at the start
         entry = np.zeros((2, width + 2))
         entry[0, width] = entry[1, width + 1] = 1.0
         for n in range(n_samples):
-            normal = max(predicted_t[pair, 0, n], 0.0)
-            limit = friction_limit(friction[pair], normal)
-            step_mass(predicted_t[pair, 1:, n], velocity, limit, gain, loss, line, ahead, local)
-            by_limit = friction[pair] if normal > 0.0 and has_normal[pair] else 0.0
+            normal = max(period.predicted_t[pair, 0, n], 0.0)
+            limit = friction_limit(friction, normal)
+            step_mass(period.predicted_t[pair, 1:, n], velocity, limit, gain, loss, line, ahead, local)
+            by_limit = friction if normal > 0.0 and has_normal else 0.0
             _leave(leave, local, entry, tangents, columns, mean_t[n], by_limit * point_t[n])
             for place, tangent in enumerate(tangents):
-                dforce_t[n, place, : width + 2] = leave[tangent]
+                dforce_t[n, place] = leave[tangent]
             by_normal, by_speed = slip_work_slopes(normal, ahead[6])
-            work += by_speed * step * leave[4]
-            if normal > 0.0 and has_normal[pair]:
-                work[:m] += by_normal * step * point_t[n]
+            work += by_speed * masses.step * leave[4]
+            if normal > 0.0 and has_normal:
+                work[:m] += by_normal * masses.step * point_t[n]
             velocity[:] = ahead[2:4]
             entry[:, :] = leave[2:4]
         dstart = np.empty((2, width))

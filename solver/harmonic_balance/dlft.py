@@ -204,18 +204,8 @@ class Linearisation:
 
         kept: number of harmonics, 2H'+1; by default all.
         """
-        m, k = self.joint.basis.synthesis.shape[0], kept or self.joint.basis.synthesis.shape[0]
-        rows = self.joint.rows_of(pairs)
-        pair, component = np.divmod(self.joint.component_index[rows], 3)
-        pair = np.searchsorted(pairs, pair)
-        # blocks of the pairs, spread over the existing rows and columns: (row, harmonic, column, harmonic)
-        spread = np.zeros((2, rows.size, k, rows.size, k))
-        row, column = np.nonzero(pair[:, None] == pair[None, :])
-        for place, part in enumerate((self.motion_tangent, self.force_tangent)):
-            blocks = part[pairs].reshape(pairs.size, 3, m, 3, m)[:, :, :k, :, :k]
-            spread[place][row, :, column] = blocks[pair[row], component[row], :, component[column]]
-        motion, matrix = spread.reshape(2, rows.size, k, rows.size * k)
-        structure = self.joint.structure
+        motion, matrix = self.matrices(pairs, kept)
+        rows, k, structure = self.joint.rows_of(pairs), motion.shape[1], self.joint.structure
         matrix[:, 0] += structure.static_stiffness[np.ix_(rows, rows)] @ motion[:, 0]
         if k > 1:
             amplitude = (motion[:, 1::2] - 1j * motion[:, 2::2]).transpose(1, 0, 2)
@@ -224,6 +214,20 @@ class Linearisation:
             matrix[:, 1::2] += moved.real
             matrix[:, 2::2] -= moved.imag
         return np.asarray(matrix.reshape(rows.size * k, rows.size * k))
+
+    def matrices(self, pairs: IntArray, kept: int | None = None) -> FloatArray:
+        """`du/dp`, m/N, and `dlambda/dp` (2, n, k, n k) of the n displacements of some pairs; order as in `dense`."""
+        m = self.joint.basis.synthesis.shape[0]
+        k, rows = kept or m, self.joint.rows_of(pairs)
+        pair, component = np.divmod(self.joint.component_index[rows], 3)
+        pair = np.searchsorted(pairs, pair)
+        # blocks of the pairs, spread over the existing rows and columns: (row, harmonic, column, harmonic)
+        spread = np.zeros((2, rows.size, k, rows.size, k))
+        row, column = np.nonzero(pair[:, None] == pair[None, :])
+        for place, part in enumerate((self.motion_tangent, self.force_tangent)):
+            blocks = part[pairs].reshape(pairs.size, 3, m, 3, m)[:, :, :k, :, :k]
+            spread[place][row, :, column] = blocks[pair[row], component[row], :, component[column]]
+        return spread.reshape(2, rows.size, k, rows.size * k)
 
 
 @njit(cache=True)

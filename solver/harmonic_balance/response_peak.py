@@ -2,10 +2,8 @@
 
 The time samples give the harmonics of the friction force on a mass above the highest harmonic of the balance
 (`ContactLaw.tail`). The structure answers them by its receptance, `u_n = -lambda_n / Z_n` (tail closure, PHYSICS,
-section 5). At the turn of the mass all these harmonics have one sign. So the truncation error of the peak falls with
-the square of the highest harmonic, and the error of the first harmonic with a higher power. Other pairs have no tail:
-their forces have corners only. The higher harmonics of a bouncing pair belong to an impact that more harmonics would
-change.
+section 5). At the turn of the mass all these harmonics have one sign, so that the truncation error of the peak falls
+only with the square of the highest harmonic. Other pairs have no tail: their forces have corners only.
 """
 
 from __future__ import annotations

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import left_out, nothing_happens
-from solver.accuracy.refinement import NODE_UNKNOWNS, Refined, refine
+from solver.accuracy.refinement import KEPT_FRACTION, NODE_UNKNOWNS, Refined, refine
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
@@ -211,7 +210,7 @@ class LoadingPath:
         if not (0.0 < error < np.inf and before > 0.0):
             return False
         foreseen = error * now / before
-        enough = fewest or foreseen >= ACCURACY.kept_fraction**2 * settings.rtol
+        enough = fewest or foreseen >= KEPT_FRACTION**2 * settings.rtol
         # where the error is above rtol already, there are no more harmonics
         return enough and (foreseen <= settings.rtol or error > settings.rtol)
 

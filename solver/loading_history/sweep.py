@@ -25,7 +25,7 @@ import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.harmonic_levels import fewer
-from solver.accuracy.options import ACCURACY
+from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path_of_states import Nodes, Path, S, Step
 from solver.march.steps import LARGEST_STEP_RATIO, Lengths, take_step
@@ -234,7 +234,7 @@ class Sweep(Generic[S]):
         if self.with_reference:
             self._lead_reference(before, step)
         checked, error = self.state.checked, self.state.error
-        changed = self.path.differs(checked, step.state) > ACCURACY.vibration_recheck
+        changed = self.path.differs(checked, step.state) > VIBRATION_RECHECK
         if changed and not self.path.suffices(checked, error, step.state):
             self._choose_resolution()
         saved = 0 if self.saved is None else self.saved.iterations

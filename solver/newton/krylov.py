@@ -7,6 +7,7 @@ operator: `solve_gmres` then stops at stagnation, with the least-squares solutio
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -52,9 +53,9 @@ def solve_gmres(
         def enough(hessenberg: FloatArray, first: float = first, null: FloatArray = null) -> bool:
             # the residual is the part of `first` along the left null vector of the Hessenberg matrix
             k = hessenberg.shape[1]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                null[k] = -(null[:k] @ hessenberg[:k, -1]) / hessenberg[k, -1]
-            norms.append(first / float(np.linalg.norm(null[: k + 1])))
+            along, below = float(null[:k] @ hessenberg[:k, -1]), float(hessenberg[k, -1])
+            null[k] = -along / below if below else along * math.inf
+            norms.append(first / math.sqrt(null[: k + 1] @ null[: k + 1]))
             return norms[-1] <= wanted or _stagnates(norms)
 
         basis, hessenberg = _arnoldi(product, residual, restart, enough)

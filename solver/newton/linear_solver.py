@@ -136,12 +136,13 @@ class JacobianSolver:
         """Solution (n_rel, m) in the rows of the active pairs, with the kept factorisation while products are few."""
 
         def cleared(values: FloatArray) -> FloatArray:
+            # the steps of these rows do not act on the rows of the active pairs
             values[tangent.passive_rows] = 0.0
             return values
 
         def iterate(factor: Factor, products: int, cycles: float) -> tuple[FloatArray, bool]:
             def inverse(vector: FloatArray) -> FloatArray:
-                return cleared(factor.solve(vector.reshape(right.shape)))
+                return factor.solve(vector.reshape(right.shape))
 
             # preconditioned from the right: the residual of GMRES is the true one
             solution, found = solve_gmres(

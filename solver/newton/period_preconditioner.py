@@ -1,22 +1,18 @@
 """An approximate inverse of the balance's Jacobian by a march through the period, for joints that slip and open.
 
-The state `x` of a pair moves the pair by `x / eps`. Normal component of x: predicted force minus contact force.
-Tangential components: lambda_x of Eqs. (11)-(15). The Jacobian maps a step `dp` to `dp + (Z_r / eps - 1) dx`. If Z_r
-were one real stiffness Z in all harmonics, this equation would hold sample by sample,
+The state x of a pair (normal: predicted less contact force; tangential: that of Eqs. (11)-(15)) moves the pair by
+`x / eps`, and the Jacobian maps a step `dp` to `dp + (Z_r / eps - 1) dx`. With one real stiffness Z in all harmonics
+this holds sample by sample,
 
     dp(t) + (Z / eps - 1) dx(t) = r(t),      dx(t) = A(t) dp(t) + B(t) dx(t - 1),
 
-with A and B the derivatives of the contact law at a sample with respect to dp and to the history; both have one block
-for each pair. So
+with the derivatives A and B of the contact law at a sample (`sampled_law`), in blocks of the pairs. So
 
     dx(t) = B(t) dx(t - 1) + [1 + A(t) (Z / eps - 1)]^-1 A(t) [r(t) - (Z / eps - 1) B(t) dx(t - 1)]
 
-is a march with one small system at each sample, whatever the number of harmonics that the pairs couple. A is zero where
-a pair sticks. So the system has only the rows of pairs that slip or are open at the sample, and the state of all other
-pairs does not change. `dp = r - (Z / eps - 1) dx` follows in all harmonics at once.
-
-The stiffness of an elastic joint hardly changes with the harmonic, except near resonances of the structure. Their
-effect, and that of the truncation of the series, are left to GMRES.
+is a march with one small system at each sample, in the rows of pairs that slip or are open (A is zero where a pair
+sticks), and `dp = r - (Z / eps - 1) dx` follows in all harmonics at once. The stiffness of an elastic joint hardly
+changes with the harmonic. Resonances of the structure and the truncation of the series are left to GMRES.
 
 CPU s of an adaptive history of the dovetail to 1e5 cycles with the march, and with a factorisation of the most
 important directions in its place: 16 pairs 3.0 and 3.5, 48 pairs 4.8 and 10.5; 336 pairs to 2e4 cycles 35 and 59.
@@ -31,7 +27,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solver.contact.coulomb import sample_tangents
+from solver.contact.sampled_law import sample_tangents
 from solver.harmonic_balance.dlft import Linearisation
 from solver.model import FloatArray, IntArray
 from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure
@@ -76,11 +72,9 @@ class PeriodFactor:
 
     @property
     def sign(self) -> float:
-        """Sign of the determinant of the matrix that this factor inverts.
+        """Sign of the determinant of the march, a product over the samples.
 
-        The determinant of the march through one period is the product of those of all samples. The start from a
-        previous period does not change this product. The truncation of the harmonics may change the sign: the
-        eigenvalues of the Jacobian times this factor decide (`JacobianSolver.determinant_sign`).
+        The truncation of the harmonics may change the sign of the Jacobian: see `JacobianSolver.determinant_sign`.
         """
         ends = zip(self.inverse_first[:-1], self.inverse_first[1:], np.diff(self.first), strict=True)
         systems = (self.inverse[begin:end].reshape(n_rows, n_rows) for begin, end, n_rows in ends if n_rows)
@@ -110,9 +104,7 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     while n_samples % 2 == 0 and n_samples // 2 > 2 * highest:
         n_samples //= 2
     stride = joint.basis.n_samples // n_samples
-    own, carried = sample_tangents(
-        at.predicted_t, joint.friction_coefficient, at.state_t, at.status_t, joint.contact.has_normal, stride
-    )
+    own, carried = sample_tangents(joint.law, at, stride)
     pairs = np.flatnonzero(own.any(axis=(0, 2, 3)))
     own, carried = np.ascontiguousarray(own[:, pairs]), np.ascontiguousarray(carried[:, pairs])
     components = (3 * pairs[:, None] + np.arange(3)).ravel()

@@ -7,10 +7,9 @@ multiplier lies outside the unit circle grows:
 - a real multiplier beyond -1 leads to a vibration that repeats after two periods (period doubling);
 - a complex pair leads to a vibration with a second frequency (Neimark-Sacker bifurcation).
 
-For a small joint all multipliers are computed, for a large joint the largest ones, by Arnoldi's method. In a state in
-which no pair slips, opens or closes, disturbances follow the linear structure, whose exponents are eigenvalues of a
-matrix. A small joint that opens and closes is solved with `OPENING_HARMONICS` before: with fewer harmonics the impacts
-differ.
+`find_multipliers` chooses the method: the linear structure where no pair slips, opens or closes; Hill's method (`hill`)
+for a small joint that opens and closes, with at least `OPENING_HARMONICS`; else integration in time, with all
+multipliers of a small joint and the largest ones of a large joint.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from scipy.linalg import eigvals
 from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import State
-from solver.model import BoolArray, ComplexArray, LinearModel, Matrix
+from solver.model import BoolArray, ComplexArray, FloatArray, LinearModel
 from solver.newton.krylov import MOST_PRODUCTS, ritz_values
 from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, SMALL_JOINT
 from solver.newton.run import Run
@@ -81,13 +80,18 @@ class Multipliers:
     values: ComplexArray
     error: float
 
+    @property
+    def grow(self) -> bool:
+        """Whether the largest multiplier lies outside the unit circle by more than its error."""
+        return bool(self.values.size) and bool(abs(self.values[0]) - 1.0 > max(self.error, SMALLEST_GROWTH))
+
     def stability(self, odd: bool) -> Stability:
         """Kind of stability. odd: whether Hill's determinant shows an odd number of real multipliers beyond +1."""
         if odd:
             return "fold"
         if not self.values.size:
             return "unknown"
-        if not _grows(self.values, self.error):
+        if not self.grow:
             return "stable"
         if self.values[0].imag != 0.0:
             return "Neimark-Sacker"
@@ -106,91 +110,72 @@ class Instability:
     sentence: str
 
 
-def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run) -> Multipliers:
-    """Multipliers of a state at a fixed wear depth; none where they are not known, see `find_instability`.
+def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, growing_only: bool = False) -> Multipliers:
+    """Multipliers of a state at a fixed wear depth; none where they are not known:
 
-    Those of a small joint that opens and closes by Hill's method. Of all other joints the number of time steps is
-    doubled until the first multiplier has settled, or lies on one side of 1 by more than its error.
+    - in a travelling wave in which a pair slips or opens: disturbances move in other nodal diameters;
+    - for a joint with more than `MOST_ROWS` displacements of switching pairs;
+    - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch.
+
+    The number of time steps is doubled until the first multiplier has settled, or lies on one side of 1 by more than
+    its error. growing_only: without a second number of time steps where nothing grows, and of a state with
+    more harmonics on any branch. Raises OutOfTimeError.
     """
-    unknown = Multipliers(np.empty(0, np.complex128), np.inf)
     switching, stuck = switching_pairs(at)
     if not switching.any():
         linear = joint.model.harmonic_structure(1)
         return Multipliers(_sorted(np.exp(_exponents(linear, _moving(joint, stuck)) * 2.0 * np.pi / joint.omega)), 0.0)
-    sharp = None if _off_limits(joint, switching) else _sharper(case, joint, at, run)
-    if sharp is None or _first(sharp[1], at) > OTHER_BRANCH:
-        return unknown
-    joint, at = sharp
-    bounces = _is_small(joint, at) and _opens_and_closes(at)
-    if bounces and hill_size(joint) <= EXPENSIVE_UNKNOWNS and not joint.law.rate_dependent:
-        return Multipliers(_sorted(hill_multipliers(joint, at)), 0.0)
-    n_samples = _samples(joint, at) // 2
-    values, error = _integrated(joint, at, n_samples), np.inf
-    while values.size and error > case.settings.rtol and n_samples < 8 * SMALL_SAMPLES:
-        if abs(abs(values[0]) - 1.0) > 2.0 * error:
+    travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
+    bounces = _bounces(joint, at)
+    if not travels and 3 * np.count_nonzero(switching) <= MOST_ROWS:
+        sharp = _sharper(case, joint, at, run) if bounces else (joint, at)
+        # beside folds a solve may change the branch
+        if sharp is not None and (growing_only or _first(sharp[1], at) <= OTHER_BRANCH):
+            if bounces and hill_size(sharp[0]) <= EXPENSIVE_UNKNOWNS and not joint.law.rate_dependent:
+                values = _sorted(hill_multipliers(*sharp))
+                # none where the series is too short to give an exponent
+                if values.size:
+                    return Multipliers(values, 0.0)
+            return _settled(*sharp, growing_only, case.settings.rtol)
+    return Multipliers(np.empty(0, np.complex128), np.inf)
+
+
+def _settled(joint: Joint, at: Evaluation, growing_only: bool, rtol: float) -> Multipliers:
+    """Multipliers by integration in time with as many samples as they need."""
+    small = _is_small(joint, at)
+    n_samples = _samples(joint, at, small) // (1 if growing_only else 2)
+    found = Multipliers(_integrated(joint, at, n_samples, small), np.inf)
+    while found.values.size and found.error > rtol and n_samples < 8 * SMALL_SAMPLES:
+        largest = abs(found.values[0])
+        if abs(largest - 1.0) > 2.0 * found.error or (growing_only and largest <= 1.0 + SMALLEST_GROWTH):
             break
-        n_samples, coarse = 2 * n_samples, values
-        values = _integrated(joint, at, n_samples)
-        error = float(abs(values[0] - coarse[0])) if values.size else np.inf
-    return Multipliers(values, error)
+        n_samples, coarse = 2 * n_samples, found.values[0]
+        values = _integrated(joint, at, n_samples, small)
+        found = Multipliers(values, float(abs(values[0] - coarse)) if values.size else np.inf)
+    return found
 
 
 def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: bool = True) -> Instability | None:
     """Instability of a state at a fixed wear depth; None where the state is stable, or where stability is not known.
 
-    Stability is not tested in these cases:
+    case, joint, at: case, joint and evaluation of the state. run: tolerance and limits.
+    every: False leaves out joints that switch, but for small ones that open and close. This is for states between the
+    first and the last of a wear history, where only impacts change the motion of a joint suddenly.
 
-    - a travelling wave in which a pair slips or opens: disturbances move in other nodal diameters;
-    - a joint with more than `MOST_ROWS` displacements of switching pairs;
-    - a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found.
-
-    Parameters
-    ----------
-    case, joint, at
-        Case, joint and evaluation of the state.
-    run
-        Tolerance and limits.
-    every
-        False leaves out large joints and joints that do not open and close, where a pair slips. This is for states
-        between the first and the last of a wear history, where only impacts change the motion of a joint suddenly.
-
-    Raises
-    ------
-    OutOfTimeError
-        The time is over.
+    Raises OutOfTimeError where the time is over.
     """
-    switching, stuck = switching_pairs(at)
-    if not switching.any():
-        exponents = _growing_exponents(joint.model.harmonic_structure(1), _moving(joint, stuck))
-        values = _sorted(np.exp(exponents * 2.0 * np.pi / joint.omega))
-        return _described(values[0], joint, by_structure=True) if _grows(values, 0.0) else None
-    bounces = _is_small(joint, at) and _opens_and_closes(at)
-    if _off_limits(joint, switching) or not (every or bounces):
+    switches = bool(switching_pairs(at)[0].any())
+    if (not switches and _is_passive(joint.model.harmonic_structure(1))) or (
+        switches and not every and not _bounces(joint, at)
+    ):
         return None
-    sharp = _sharper(case, joint, at, run)
-    if sharp is None and not _is_driven(joint):
+    found = find_multipliers(case, joint, at, run, growing_only=True)
+    if not found.grow:
         return None
-    joint, at = sharp or (joint, at)
-    n_samples = _samples(joint, at)
-    coarse = _integrated(joint, at, n_samples)
-    if not _grows(coarse, 0.0):
-        return None
-    values = _integrated(joint, at, 2 * n_samples)
-    # the change with the number of samples is the error of the multiplier
-    error = abs(abs(values[0]) - abs(coarse[0])) if values.size else 0.0
-    return _described(values[0], joint) if _grows(values, 2.0 * error) else None
-
-
-def _grows(values: ComplexArray, error: float) -> bool:
-    """Whether the largest of sorted multipliers lies outside the unit circle by more than its error."""
-    return bool(values.size) and bool(abs(values[0]) - 1.0 > max(error, SMALLEST_GROWTH))
-
-
-def _described(largest: complex, joint: Joint, by_structure: bool = False) -> Instability:
-    """An instability with its largest multiplier. by_structure: whether the linear structure alone is unstable."""
-    doubles = not by_structure and largest.imag == 0.0 and largest.real < 0.0
+    largest = found.values[0]
+    doubles = switches and largest.imag == 0.0 and largest.real < 0.0
     said = f"a small disturbance grows by the factor {abs(largest):.3g} in each period of the excitation"
-    if by_structure:
+    if not switches:
         said = f"{said}, in the linear structure alone"
     elif largest.imag != 0.0:
         turn = abs(np.angle(largest)) * joint.omega / (2.0 * np.pi) ** 2
@@ -200,21 +185,20 @@ def _described(largest: complex, joint: Joint, by_structure: bool = False) -> In
     return Instability(Outcome.PERIOD_DOUBLED if doubles else Outcome.UNSTABLE, said)
 
 
-def _off_limits(joint: Joint, switching: BoolArray) -> bool:
-    """Whether the disturbances of a joint with these switching pairs (n_contact,) are not integrated."""
-    travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
-    return travels or 3 * int(np.count_nonzero(switching)) > MOST_ROWS
-
-
 def _is_small(joint: Joint, at: Evaluation) -> bool:
     """Whether all multipliers are computed."""
     return int(_moving(joint, switching_pairs(at)[1]).sum()) <= SMALL_JOINT
 
 
+def _bounces(joint: Joint, at: Evaluation) -> bool:
+    """Whether a joint is small, and a pair is open in a part of the period."""
+    opens = at.status_t == SEPARATED
+    return bool((opens.any(axis=1) & ~opens.all(axis=1)).any()) and _is_small(joint, at)
+
+
 def _sharper(case: Case, joint: Joint, at: Evaluation, run: Run) -> tuple[Joint, Evaluation] | None:
-    """The state with enough harmonics for a small joint that opens and closes; None where no such state is found."""
-    bounces = _is_small(joint, at) and _opens_and_closes(at)
-    if not bounces or case.resolution.highest >= OPENING_HARMONICS:
+    """The state with at least `OPENING_HARMONICS`; None where no such state is found."""
+    if case.resolution.highest >= OPENING_HARMONICS:
         return joint, at
     samples = max(case.resolution.samples, samples_for(OPENING_HARMONICS))
     sharp = case.at(Resolution(all_orders(OPENING_HARMONICS), samples))
@@ -223,14 +207,8 @@ def _sharper(case: Case, joint: Joint, at: Evaluation, run: Run) -> tuple[Joint,
     return None if moved is None else (finer, moved.evaluation)
 
 
-def _opens_and_closes(at: Evaluation) -> bool:
-    """Whether a pair is open in a part of the period."""
-    opens = at.status_t == SEPARATED
-    return bool((opens.any(axis=1) & ~opens.all(axis=1)).any())
-
-
 def _first(finer: Evaluation, at: Evaluation) -> float:
-    """Relative difference of means and first harmonics of two states: beside folds a solve may change the branch."""
+    """Relative difference of means and first harmonics of two states."""
     one, other = (state.displacement_h[..., :3] for state in (finer, at))
     return float(np.linalg.norm(one - other)) / max(float(np.linalg.norm(other)), 1e-300)
 
@@ -240,21 +218,18 @@ def _sorted(values: ComplexArray) -> ComplexArray:
     return values[np.lexsort((-values.imag, -np.abs(values).round(12)))]
 
 
-def _samples(joint: Joint, at: Evaluation) -> int:
+def _samples(joint: Joint, at: Evaluation, small: bool) -> int:
     """Samples of a period for the time integration: enough for vibrations that grow in the structure alone."""
     switching, stuck = switching_pairs(at)
-    linear, limits = joint.model.linear[0], (stuck, stuck | switching)
-    rates = [np.abs(_growing_exponents(linear, _moving(joint, pairs)).imag) for pairs in limits]
-    fastest = max(float(of.max(initial=0.0)) for of in rates) / joint.omega
-    least = SMALL_SAMPLES if _is_small(joint, at) else SMALL_SAMPLES // 4
+    growing = (_growing(joint.model.linear[0], _moving(joint, pairs).tobytes()) for pairs in (stuck, stuck | switching))
+    fastest = max(float(np.abs(of.imag).max(initial=0.0)) for of in growing) / joint.omega
     wanted = 2 ** int(np.ceil(np.log2(max(SAMPLES_A_VIBRATION * fastest, 1.0))))
-    return int(np.clip(wanted, least, 8 * SMALL_SAMPLES))
+    return int(np.clip(wanted, SMALL_SAMPLES if small else SMALL_SAMPLES // 4, 8 * SMALL_SAMPLES))
 
 
-def _integrated(joint: Joint, at: Evaluation, n_samples: int) -> ComplexArray:
+def _integrated(joint: Joint, at: Evaluation, n_samples: int, every: bool) -> ComplexArray:
     """Sorted multipliers of a state by time integration with a number of samples."""
-    monodromy = build_monodromy(joint, joint.model.linear[0], at, n_samples)
-    return _sorted(multipliers_of(monodromy, _is_small(joint, at)))
+    return _sorted(multipliers_of(build_monodromy(joint, joint.model.linear[0], at, n_samples), every))
 
 
 def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
@@ -264,14 +239,17 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
     # a fixed start: the result must not depend on earlier computations
     start = np.random.default_rng(0).normal(size=monodromy.size)
 
-    def product(vector: np.ndarray) -> np.ndarray:
+    def product(vector: FloatArray) -> FloatArray:
         return monodromy.apply(vector[:, None])[:, 0]
 
-    def settled(values: ComplexArray, residuals: np.ndarray) -> bool:
+    def settled(values: ComplexArray, residuals: FloatArray) -> bool:
         return bool(residuals[np.argmax(np.abs(values))] < SMALLEST_GROWTH)
 
     values, residuals = ritz_values(product, start, MOST_PRODUCTS, settled)
     return values[residuals < SMALLEST_GROWTH]
+
+
+# --- the linear structure ---
 
 
 def _moving(joint: Joint, fixed: BoolArray) -> BoolArray:
@@ -288,39 +266,24 @@ def _is_driven(joint: Joint) -> bool:
     True where a motion grows while all pairs stick, or where a vibration grows while no pair does. A motion without
     vibration that grows without the pairs does not count: a free blade leaves its spinning disk.
     """
-    linear = joint.model.harmonic_structure(1)
-    stuck = _growing_exponents(linear, _moving(joint, np.ones(joint.contact.n_contact, bool)))
-    free = _growing_exponents(linear, np.ones(len(linear.mass), bool))
+    linear, every = joint.model.harmonic_structure(1), np.ones(joint.contact.n_contact, bool)
+    stuck, free = (_growing(linear, _moving(joint, pairs).tobytes()) for pairs in (every, ~every))
     return stuck.size > 0 or bool((np.abs(free.imag) > free.real).any())
-
-
-def _growing_exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:
-    """Exponents sigma, 1/s, of the growing motions exp(sigma t) of a linear structure.
-
-    moves (n,): False for displacements that do not move. The result is empty where mass, damping and stiffness are all
-    positive semidefinite: such a structure only loses energy.
-    """
-    if _is_passive(linear):
-        return np.empty(0, complex)
-    return _growing(linear, moves.tobytes())
 
 
 @lru_cache(maxsize=4)
 def _is_passive(linear: LinearModel) -> bool:
-    return all(_is_semidefinite(part) for part in (linear.mass, linear.damping, linear.stiffness))
-
-
-def _is_semidefinite(matrix: Matrix) -> bool:
-    size = float(np.abs(np.diag(matrix)).max(initial=0.0))
-    try:
-        np.linalg.cholesky(matrix + ROUND_OFF * size * np.eye(len(matrix)))
-    except np.linalg.LinAlgError:
-        return size == 0.0 and not matrix.any()
-    return True
+    """Whether mass, damping and stiffness are all positive semidefinite: such a structure only loses energy."""
+    parts = linear.mass, linear.damping, linear.stiffness
+    least = (float(np.linalg.eigvalsh(part)[0]) / max(float(np.abs(np.diag(part)).max()), 1e-300) for part in parts)
+    return all(value >= -ROUND_OFF for value in least)
 
 
 @lru_cache(maxsize=4)
 def _growing(linear: LinearModel, moves: bytes) -> ComplexArray:
+    """Exponents sigma, 1/s, of the growing motions; moves: the bytes of those of `_exponents`, kept for next states."""
+    if _is_passive(linear):
+        return np.empty(0, complex)
     found = _exponents(linear, np.frombuffer(moves, bool))
     # round-off of a fast vibration is no growth
     growing: ComplexArray = found[found.real > found.size * _EPS * np.abs(found).max(initial=0.0)]
@@ -328,7 +291,7 @@ def _growing(linear: LinearModel, moves: bytes) -> ComplexArray:
 
 
 def _exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:
-    """Exponents sigma, 1/s, of all motions exp(sigma t) of a linear structure; moves: as in `_growing_exponents`."""
+    """Exponents sigma, 1/s, of all motions exp(sigma t) of a linear structure; moves (n,): displacements that move."""
     parts = [part[np.ix_(moves, moves)] for part in (linear.mass, linear.damping, linear.stiffness)]
     sizes, motions = np.linalg.eigh(parts[0])
     n = len(sizes)

@@ -4,17 +4,14 @@ Let the harmonic amplitudes vary slowly as exp(sigma t). A disturbance of a stat
 
     [Z_r(i n w + sigma) du/dp + dlambda/dp] p' = 0,
 
-Hill's equation in the unknown p of the balance. Its determinant is real for real sigma and is that of the Jacobian,
-Eq. (16), at sigma = 0. For sigma towards infinity the structure is so stiff that the determinant has the sign of that
-of du/dp, which is not negative: a pair takes between none (stuck: its columns are those of the identity) and all (open)
-of the predicted force away. The same sign belongs to the joint that is stuck all over (identity) and to the one that is
-open all over (Z_n / eps: the square of a modulus for each complex harmonic, a positive definite static stiffness).
-So a negative determinant at sigma = 0 means an odd number of real, positive growth rates: Floquet multipliers on the
-real axis beyond +1. A branch changes the sign at each fold, and the part between two folds is unstable.
+Hill's equation in the unknown p of the balance. Its determinant is real for real sigma, that of the Jacobian, Eq. (16),
+at sigma = 0, and positive for sigma towards infinity, where the structure is stiff and the sign is that of du/dp. So a
+negative determinant at sigma = 0 means an odd number of real, positive growth rates: Floquet multipliers on the real
+axis beyond +1. A branch changes the sign at each fold, and the part between two folds is unstable.
 
-The test costs next to nothing beside a Newton iteration and is made at each state of a branch. The test sees neither an
-even number of such multipliers nor multipliers elsewhere outside the unit circle: `floquet` computes the multipliers of
-reported states. Disturbances of friction are taken as slow, with the closure over one period.
+The test is made at each state of a branch. It sees neither an even number of such multipliers nor multipliers elsewhere
+outside the unit circle: `floquet` computes the multipliers of reported states. Disturbances of friction are taken as
+slow, with the closure over one period.
 """
 
 from __future__ import annotations
@@ -25,7 +22,7 @@ import numpy as np
 from scipy.linalg import eigvals
 
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.model import ComplexArray, FloatArray
+from solver.model import ComplexArray
 from solver.newton.run import Run
 from solver.structure.condensation import relative_indices
 from solver.structure.fourier import build_basis, derivative
@@ -74,7 +71,7 @@ def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
         for part, power in ((linear.mass, 2), (linear.damping, 1), (linear.stiffness, 0))
     )
     rate = derivative(np.eye(m), np.array(fine.basis.orders, np.float64)).T
-    force, motion = (_dense(fine, part) for part in (tangent.force_tangent, tangent.motion_tangent))
+    motion, force = tangent.matrices(np.arange(joint.contact.n_contact)).reshape(2, n_rel * m, n_rel * m)
     select = np.kron(np.eye(n)[relative_indices(joint.contact)[0]], np.eye(m))
     eye, left = np.eye(n * m), np.zeros((2 * n * m + n_rel * m, 2 * n * m + n_rel * m))
     right, one = left.copy(), np.eye(m)
@@ -86,17 +83,6 @@ def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     left[p, x], left[p, p] = select, -size * motion
     right[v, v] = np.kron(mass, one)
     return _chosen(eigvals(left, right), 2 * int(np.linalg.matrix_rank(mass)))
-
-
-def _dense(joint: Joint, blocks: FloatArray) -> FloatArray:
-    """Matrix (n_rel m, n_rel m) of the blocks (n_contact, 3m, 3m) of the pairs."""
-    n_contact, m = joint.contact.n_contact, len(joint.basis.synthesis)
-    spread = np.zeros((3 * n_contact, m, 3 * n_contact, m))
-    for pair, block in enumerate(blocks):
-        own = slice(3 * pair, 3 * pair + 3)
-        spread[own, :, own] = block.reshape(3, m, 3, m)
-    rows = joint.component_index
-    return spread[rows][:, :, rows].reshape(rows.size * m, rows.size * m)
 
 
 def _chosen(exponents: ComplexArray, number: int) -> ComplexArray:

@@ -6,8 +6,8 @@ others (i),
 
     x_i' = -A_ii^-1 (A' x)_i,      (Z_r u - F_r)' = (A' x)_r + A_ri x_i'.
 
-A difference of two condensations would have to be short: behind a joint that sticks the structure has its resonance
-close to the one that is followed, and there A_ii is nearly singular.
+A difference of two condensations is not accurate: behind a joint that sticks A_ii is nearly singular close to the
+resonance that is followed.
 """
 
 from __future__ import annotations

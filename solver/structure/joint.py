@@ -19,17 +19,12 @@ from solver.structure.penalty import Penalty, build_penalty
 
 @dataclass(frozen=True)
 class Joint:
-    """All data that are constant while a periodic state is sought, with H harmonics.
+    """All data that are constant while a periodic state is sought.
 
-    - model: the model before condensation.
-    - omega: rad/s.
-    - excitation_amplitude: N.
+    - model: before condensation. structure: the condensed one.
+    - omega, excitation_amplitude: rad/s, N.
     - friction_coefficient (n_contact,): for each pair.
-    - structure: the condensed structure.
-    - contact: the contact pairs.
-    - basis: Fourier basis.
     - component_index (n_rel,): `3 pair + component` of each relative displacement.
-    - penalty: penalties and masses of the pairs.
     """
 
     model: ReducedModel
@@ -57,8 +52,7 @@ class Joint:
     @property
     def relative_penalty(self) -> FloatArray:
         """Penalty (n_rel,), N/m, of each relative displacement."""
-        penalty = self.penalty
-        return np.stack([penalty.normal, penalty.tangential, penalty.tangential], axis=1).ravel()[self.component_index]
+        return self.penalty.stiffness.ravel()[self.component_index]
 
     def rows_of(self, pairs: IntArray | int) -> IntArray:
         """Indices of the relative displacements of one or more pairs, ascending."""
@@ -108,12 +102,8 @@ class Hold:
 class Case:
     """Data that all states of one computation share. `joint` gives the joint at a frequency and amplitude.
 
-    - model: the model.
     - friction_coefficient (n_contact,): for each pair.
     - penalty_omega: angular frequency for which the penalty is built, rad/s.
-    - penalty: penalties and masses of the pairs.
-    - settings: settings of the solver.
-    - resolution: harmonics and samples in use.
     - hold: spring on a joint that slides as a whole, see `solver.wear.jump`; None without a spring.
     """
 

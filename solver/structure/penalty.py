@@ -1,9 +1,8 @@
 """The penalty eps of each pair, Eq. (9), and the formulation of the pair (elastic or inertial), from the scene alone.
 
-For a growing number of harmonics the balance is exact with any penalty. With a finite number its error comes from the
-harmonics of the *predicted* force that are left out. With the stiffness `Z_n` of the structure these harmonics are
-`(1 - E_n / Z_n) lambda_n`, where the penalty E_n acts on the displacement. So E_n has to be near Z_n above the highest
-harmonic:
+With a finite number of harmonics the error of the balance comes from the harmonics of the *predicted* force that are
+left out: `(1 - E_n / Z_n) lambda_n` with the stiffness Z_n of the structure and the penalty E_n on the displacement. So
+E_n has to be near Z_n above the highest harmonic:
 
 - A pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level, with
   E_n = eps near this stiffness, Eq. (10).
@@ -58,6 +57,11 @@ class Penalty:
     mass: FloatArray
     drag: FloatArray
     mean: FloatArray
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Penalty (n_contact, 3), N/m, of the three displacements of elastic pairs."""
+        return np.stack([self.normal, self.tangential, self.tangential], axis=1)
 
     def static(self) -> Penalty:
         """The penalty for a static state, which has no velocity: each pair is taken at displacement level."""

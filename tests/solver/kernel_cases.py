@@ -6,8 +6,8 @@ import numba
 import numpy as np
 
 from solver.contact.coulomb import mean_normal_force, mean_normal_tangent
-from solver.contact.period_march import integrate_slip_work, march_period
-from solver.contact.rigid_slider import march_masses
+from solver.contact.period_march import Directions, Period, march_period, new_period
+from solver.contact.rigid_slider import Masses, march_masses
 from solver.contact.tangent import march_tangent, mass_tangent
 from solver.model import BoolArray, FloatArray, IntArray
 from solver.structure.fourier import FourierBasis, build_basis
@@ -68,6 +68,10 @@ class MassCase:
         values[:, 1:] = (predicted_h[:, 1:] * self.step_share) @ self.basis.synthesis
         return values
 
+    @property
+    def kinds(self) -> tuple[Directions, Masses]:
+        return Directions(self.line, self.has_normal), Masses(self.mass, self.drag, self.step)
+
 
 def mass_case(n_contact: int, seed: int, basis: FourierBasis = MASS_BASIS, opens: bool = True) -> MassCase:
     """Masses that stick, turn at once, slip and (with `opens`) open; the last one has a constant normal force."""
@@ -91,61 +95,33 @@ def mass_case(n_contact: int, seed: int, basis: FourierBasis = MASS_BASIS, opens
     return MassCase(predicted_h, mass, 0.1 * mass * omega, line, has_normal, basis, omega, share)
 
 
-def run_masses(
-    case: MassCase, predicted_h: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatArray]:
-    masses = case.mass, case.drag, case.line
-    return march_masses(case.predicted_t(predicted_h), friction_of(predicted_h), masses, case.step)
+def run_masses(case: MassCase, predicted_h: FloatArray) -> Period:
+    n_contact = len(predicted_h)
+    period = new_period(case.predicted_t(predicted_h), np.full(n_contact, FRICTION), np.zeros((n_contact, 2)))
+    march_masses(np.arange(n_contact), period, *case.kinds)
+    return period
 
 
-def masses_tangent(case: MassCase, start: FloatArray) -> tuple[FloatArray, FloatArray]:
-    basis, share = case.basis, case.step_share
-    given = case.predicted_t(case.predicted_h), friction_of(case.predicted_h), (case.mass, case.drag, case.line)
-    series = basis.synthesis, basis.synthesis * share[:, None], basis.analysis / share
-    out = no_tangents(len(start))
-    mass_tangent(np.arange(len(start)), *given, case.step, start, case.has_normal, series, out)
-    return out
-
-
-def no_tangents(n_contact: int) -> tuple[FloatArray, FloatArray]:
-    """Arrays for the derivatives of forces and slip work."""
-    return np.zeros((n_contact, 21, 21)), np.zeros((n_contact, 21))
-
-
-def friction_of(predicted: FloatArray) -> FloatArray:
-    """Friction coefficient (n_contact,) of the pairs of a predicted force (n_contact, ...)."""
-    return np.full(len(predicted), FRICTION)
+def run_pairs(predicted_t: FloatArray, start: FloatArray, periodicity: float, most_periods: int) -> Period:
+    period = new_period(predicted_t, np.full(len(start), FRICTION), start)
+    march_period(np.arange(len(start)), period, periodicity, most_periods)
+    return period
 
 
 def kernel_results() -> dict[str, FloatArray]:
-    case = kernel_case(3, BASIS.n_samples, seed=20)
-    friction = friction_of(case.predicted_t)
-    force_t, state_t, status_t, periods, error = march_period(case.predicted_t, friction, case.start, 1e-9, 6)
-    marched = case.predicted_t, friction, case.start, state_t, periods
-    series, (force_tangent, wear_tangent) = (BASIS.synthesis, BASIS.analysis), no_tangents(3)
-    march_tangent(np.arange(3), *marched, np.full(3, -1), case.has_normal, series, (force_tangent, wear_tangent))
-    mean_normal_tangent(np.arange(2), case.predicted_t, *series, force_tangent)
-    masses = mass_case(6, seed=21)
-    mass_force_t, velocity_t, place_t, mass_status_t, slip_work, _ = run_masses(masses, masses.predicted_h)
-    mass_force_tangent, mass_wear_tangent = masses_tangent(masses, velocity_t[:, :, 0])
-    results = {
-        "force": force_t,
-        "state": state_t,
-        "status": status_t,
-        "periods": periods,
-        "error": error,
-        "wear": integrate_slip_work(force_t, state_t),
-        "mean_normal": mean_normal_force(case.predicted_t),
-        "force_tangent": force_tangent,
-        "wear_tangent": wear_tangent,
-        "mass_force": mass_force_t,
-        "mass_velocity": velocity_t,
-        "mass_place": place_t,
-        "mass_status": mass_status_t,
-        "mass_slip_work": slip_work,
-        "mass_force_tangent": mass_force_tangent,
-        "mass_wear_tangent": mass_wear_tangent,
-    }
+    """Results of all kernels, by name."""
+    case, masses = kernel_case(3, BASIS.n_samples, seed=20), mass_case(6, seed=21)
+    periods = run_pairs(case.predicted_t, case.start, 1e-9, 6), run_masses(masses, masses.predicted_h)
+    out, mass_out = ((np.zeros((n, 21, 21)), np.zeros((n, 21))) for n in (3, 6))
+    series = BASIS.synthesis, BASIS.synthesis, BASIS.analysis
+    march_tangent(np.arange(3), periods[0], Directions(np.full(3, -1), case.has_normal), series, out)
+    mean_normal_tangent(np.arange(2), case.predicted_t, BASIS.synthesis, BASIS.analysis, out[0])
+    basis, share = masses.basis, masses.step_share
+    series = basis.synthesis, basis.synthesis * share[:, None], basis.analysis / share
+    mass_tangent(np.arange(6), periods[1], *masses.kinds, series, mass_out)
+    results = {f"{name} {kind}": value for kind in (0, 1) for name, value in periods[kind]._asdict().items()}
+    tangents = dict(zip(("force", "work", "mass force", "mass work"), (*out, *mass_out), strict=True))
+    results |= tangents | {"mean_normal": mean_normal_force(case.predicted_t)}
     return {name: np.asarray(values, float) for name, values in results.items()}
 
 

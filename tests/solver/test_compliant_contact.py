@@ -1,12 +1,9 @@
 """Springs in series with the pairs: condensed compliance, closed forms, other unknowns, the rigid limit."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import studies
-from solver import build_model, frequency_response, march_wear, with_contact_stiffness
+from solver import frequency_response, march_wear, with_contact_stiffness
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, TANGENTIAL_RATIO
 from solver.structure.condensation import build_structure, relative_indices
 from studies import build_scene
@@ -57,12 +54,6 @@ def test_a_spring_that_presses_gives_way_to_rough_surfaces(worn):
         assert 1e-4 * found.mean_pressure[0, 0] == pytest.approx((10.0 - 1e5 * worn) / share, rel=1e-9)
 
 
-def test_the_pages_have_the_ratio_of_the_code():
-    assert pytest.approx(14.0 / 17.0, rel=1e-15) == TANGENTIAL_RATIO
-    page = (Path(studies.__file__).parent / "ROUGH_JOINTS.md").read_text(encoding="utf-8")
-    assert f"14/17 = {TANGENTIAL_RATIO:.4f} times" in page
-
-
 @pytest.mark.slow
 def test_a_wall_and_its_contact_are_two_springs_in_series():
     """The same bilinear spring: a wall of 100 N/m, and one of 200 N/m behind a contact of 200 N/m."""
@@ -93,66 +84,6 @@ def test_wear_relaxes_the_spring_that_presses_and_the_contact_in_series():
     history = march_wear(build_scene("sdof_slider", **springs), 160.0, 10.0, 0.5, 1.1e-14, cycles)
     assert expected[-1] > 0.3 * 10.0 / 5e10
     assert history.wear_depth[:, 0] == pytest.approx(expected, rel=5e-3)
-
-
-def _with_bodies_as_unknowns(model, contact_stiffness):
-    """The same joint in [u | v | inner displacements]: springs between contact and bodies, the mass on the bodies."""
-    linear, contact = model.linear[0], model.contact
-    relative, components = relative_indices(contact)
-    n_rel, n = relative.size, len(linear.mass)
-    springs = contact_stiffness * np.where(components % 3, TANGENTIAL_RATIO, 1.0) * contact.area[components // 3]
-    bodies = n_rel + np.arange(n)
-    mass, damping, stiffness = (np.zeros((n_rel + n, n_rel + n)) for _ in range(3))
-    for whole, part in ((mass, linear.mass), (damping, linear.damping), (stiffness, linear.stiffness)):
-        whole[np.ix_(bodies, bodies)] = part
-    own, there = np.arange(n_rel), n_rel + relative
-    stiffness[own, own] += springs
-    stiffness[there, there] += springs
-    stiffness[own, there] -= springs
-    stiffness[there, own] -= springs
-    dofs = np.full(contact.dofs.shape, -1)
-    dofs.ravel()[components] = own
-    none = np.zeros(n_rel)
-    return build_model(
-        mass,
-        damping,
-        stiffness,
-        dofs,
-        contact.area,
-        load_harmonic=np.concatenate([none, linear.load_harmonic]),
-        load_static=np.concatenate([none, linear.load_static]),
-        response=np.hstack([np.zeros((len(linear.response), n_rel)), linear.response]),
-        normal_load=contact.normal_load,
-    )
-
-
-@pytest.mark.slow
-def test_a_joint_is_the_same_whichever_displacements_are_its_unknowns():
-    rigid = random_model(3, ("3d", "3d", "one_tangent"), 3)
-    soft, bodies = with_contact_stiffness(rigid, SOFT), _with_bodies_as_unknowns(rigid, SOFT)
-    frequency = OMEGA / (2.0 * np.pi)
-    soft_response, expected = (frequency_response(model, frequency, 60.0, 0.3) for model in (soft, bodies))
-    stiff_response = frequency_response(rigid, frequency, 60.0, 0.3).response
-    assert soft_response.response == pytest.approx(expected.response, rel=1e-6)
-    assert np.abs(stiff_response / expected.response - 1.0).max() > 0.05
-    cycles = [0.0, 2000.0]
-    soft_wear, expected_wear = (
-        march_wear(model, frequency, 60.0, 0.3, 1e-12, cycles, scheme="implicit", step=1000.0)
-        for model in (soft, bodies)
-    )
-    assert expected_wear.wear_depth[-1].max() > 0.0
-    assert soft_wear.wear_depth == pytest.approx(expected_wear.wear_depth, rel=1e-5)
-
-
-def test_a_rigid_contact_is_the_limit():
-    rigid = build_scene("sdof_slider")
-    stiff = build_scene("sdof_slider", contact_stiffness=LARGEST_CONTACT_STIFFNESS)
-    found, expected = (
-        march_wear(model, 160.0, 10.0, 0.5, 1.1e-11, [0.0, 2000.0], scheme="implicit", step=1000.0)
-        for model in (stiff, rigid)
-    )
-    assert found.wear_depth == pytest.approx(expected.wear_depth, rel=1e-8)
-    assert found.response == pytest.approx(expected.response, rel=1e-8)
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0, np.nan, np.inf, 1e23])

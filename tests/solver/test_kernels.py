@@ -12,16 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, contact_sample, mean_normal_force
-from solver.contact.period_march import integrate_slip_work, march_period
 from solver.structure.fourier import build_basis
 from tests.solver import contact_twin
-from tests.solver.kernel_cases import BASIS, FRICTION, friction_of, kernel_case, kernel_results
-
-
-def marched(case):
-    """Predicted force, friction coefficients and start state, as `march_period` takes them."""
-    return case.predicted_t, friction_of(case.start), case.start
-
+from tests.solver.kernel_cases import BASIS, FRICTION, kernel_case, kernel_results, run_pairs
 
 number = st.integers(-(10**8), 10**8).map(lambda count: 1e-6 * count)  # N; no squares that underflow
 friction_coefficients = st.one_of(st.just(0.0), st.floats(0.01, 2.0))
@@ -51,18 +44,23 @@ def test_every_sample_obeys_signorini_and_coulomb(normal, tangents, states, fric
         assert moved @ force == pytest.approx(np.linalg.norm(moved) * np.linalg.norm(force), rel=1e-9, abs=1e-9)
 
 
+def assert_that_of_the_twin(case, found, pair, start, periods, tolerance):
+    force, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, start, periods)
+    assert found.force_t[pair] == pytest.approx(force, abs=tolerance)
+    assert found.state_t[pair] == pytest.approx(slip, abs=tolerance)
+    assert np.array_equal(found.status_t[pair], contact_twin.status(case.predicted_t[pair], FRICTION, slip[:, :-1]))
+    return slip
+
+
 @pytest.mark.parametrize("most_periods", [1, 2, 5])
 def test_displacement_level_is_that_of_the_plain_twin(most_periods):
     case = kernel_case(4, 24, seed=1)
-    force_t, state_t, status_t, periods, error = march_period(*marched(case), 0.0, most_periods)
+    found = run_pairs(case.predicted_t, case.start, 0.0, most_periods)
     for pair in range(4):
-        force, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, case.start[pair], periods[pair])
-        assert force_t[pair] == pytest.approx(force, abs=1e-11)
-        assert state_t[pair] == pytest.approx(slip, abs=1e-11)
-        assert np.array_equal(status_t[pair], contact_twin.status(case.predicted_t[pair], FRICTION, slip[:, :-1]))
-        assert error[pair] == pytest.approx(np.linalg.norm(slip[:, -1] - slip[:, 0]), abs=1e-11)
-    assert periods.max() <= most_periods
-    assert {SEPARATED, STICK, SLIP} <= set(status_t.ravel())
+        slip = assert_that_of_the_twin(case, found, pair, case.start[pair], found.periods[pair], 1e-11)
+        assert found.change[pair] == pytest.approx(np.linalg.norm(slip[:, -1] - slip[:, 0]), abs=1e-11)
+    assert found.periods.max() <= most_periods
+    assert {SEPARATED, STICK, SLIP} <= set(found.status_t.ravel())
 
 
 def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient():
@@ -72,12 +70,12 @@ def test_wear_of_a_rectangular_loop_is_its_area_over_the_friction_coefficient():
     predicted = np.zeros((1, 3, n))
     predicted[0, 0] = pressure
     predicted[0, 1] = amplitude * np.cos(2 * np.pi * np.arange(n) / n)
-    force_t, state_t, _, _, error = march_period(predicted, friction_of(predicted), np.full((1, 2), 3.0), 1e-12, 8)
-    assert error[0] == pytest.approx(0, abs=1e-12)
+    found = run_pairs(predicted, np.full((1, 2), 3.0), 1e-12, 8)
+    assert found.change[0] == pytest.approx(0, abs=1e-12)
     expected = 4 * pressure * (amplitude - FRICTION * pressure)
-    assert integrate_slip_work(force_t, state_t)[0] == pytest.approx(expected, rel=1e-12, abs=0.0)
+    assert found.slip_work[0] == pytest.approx(expected, rel=1e-12, abs=0.0)
     # the loop of lambda_T over X_T is a rectangle: mu times the wear integral is the work
-    work = 0.5 * (force_t[0, 1] + np.roll(force_t[0, 1], 1)) @ np.diff(state_t[0, 0])
+    work = 0.5 * (found.force_t[0, 1] + np.roll(found.force_t[0, 1], 1)) @ np.diff(found.state_t[0, 0])
     assert work <= FRICTION * expected * (1 + 1e-12)
 
 
@@ -112,24 +110,18 @@ def slowly_closing(seed, n_contact=6):
 @pytest.mark.parametrize("seed", [31, 33])
 def test_a_closure_found_by_newtons_method_is_where_plain_passes_lead(seed):
     case = slowly_closing(seed)
-    force_t, state_t, status_t, periods, error = march_period(*marched(case), 1e-9, 400)
-    assert (error <= 1e-9).all()
+    found = run_pairs(case.predicted_t, case.start, 1e-9, 400)
+    assert (found.change <= 1e-9).all()
     slowest = 0
-    for pair in range(force_t.shape[0]):
-        plain = 1
-        start = case.start[pair]
-        while True:
-            force, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, start, 1)
-            plain += 1
-            if np.linalg.norm(slip[:, -1] - start) < 1e-12:
-                break
-            start = slip[:, -1]
+    for pair in range(len(case.start)):
+        start, plain, left = case.start[pair], 1, 1.0
+        while left >= 1e-12:
+            _, slip = contact_twin.pair_period(case.predicted_t[pair], FRICTION, start, 1)
+            left, start, plain = np.linalg.norm(slip[:, -1] - start), slip[:, -1], plain + 1
         slowest = max(slowest, plain)
-        assert force_t[pair] == pytest.approx(force, abs=1e-6)
-        assert state_t[pair] == pytest.approx(slip, abs=1e-6)
-        assert np.array_equal(status_t[pair], contact_twin.status(case.predicted_t[pair], FRICTION, slip[:, :-1]))
+        assert_that_of_the_twin(case, found, pair, start, 1, 1e-6)
     assert slowest > 40
-    assert periods.max() < 20
+    assert found.periods.max() < 20
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""What holds for every scene: contact law, dissipation, wear that only grows, and symmetries; hypothesis draws them.
+"""What holds for every scene: contact law, wear that only grows, and symmetries; hypothesis draws them.
 
 The scenes are those of `tests.random_scenes`, drawn by seed; laws that need a state are judged wherever one is found.
 Symmetries are checked on the state itself: it is turned, scaled or permuted and must still be a state, which does not
@@ -13,7 +13,6 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from solver.accuracy.certificate import SMALL_WORK, VIOLATION_LIMITS
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.dlft import Balance
 from solver.newton.run import Run
@@ -71,19 +70,6 @@ def largest_force(evaluation):
     return max(float(np.abs(evaluation.force_t).max()), float(np.abs(evaluation.predicted_t).max()))
 
 
-def elastic_work(joint, evaluation):
-    """Contact forces times what they flex the pairs by, J."""
-    force = joint.to_relative(evaluation.force_h)
-    flexed = joint.to_relative(joint.law.motion(evaluation.force_h))
-    return float((np.linalg.norm(force[:, 1:], axis=1) * np.linalg.norm(flexed[:, 1:], axis=1)).sum())
-
-
-def series_work(force, moved):
-    """Work of a period, J, of series of forces and displacements (n_rel, 2H+1)."""
-    turned = moved[:, 2::2] * force[:, 1::2] - moved[:, 1::2] * force[:, 2::2]
-    return np.pi * float((turned * np.arange(1, SETTINGS.harmonics + 1)).sum())
-
-
 def residual_of(model, scene, evaluation, *, load=1.0, length=1.0):
     """Scaled residual of a state in another model: forces `load` times, motion `length` times as large."""
     omega = 2.0 * np.pi * scene.frequency_hz
@@ -127,28 +113,9 @@ def test_coulomb(seed):
     along = (steps * at.force_t[:, 1:]).sum(axis=1)
     whole = np.hypot(steps[:, 0], steps[:, 1]) * tangential
     assert (along[slips] >= whole[slips] - 1e-9 * size**2).all()
-
-
-@profile
-@given(seeds)
-def test_friction_and_wear_only_take(seed):
-    _, joint, at = state(seed)
     assert (at.slip_work >= 0.0).all()
-    # the work that the contact takes from the series of the motion, and that of the damping
-    moved = joint.to_relative(at.displacement_h)
-    work, damping = (
-        series_work(force, moved) for force in (joint.to_relative(at.force_h), joint.structure.apply(moved))
-    )
-    least = VIOLATION_LIMITS["energy_error"] * float(at.slip_work.sum()) + SMALL_WORK * elastic_work(joint, at)
-    opens = at.status_t == 0
-    if (opens.any(axis=1) & ~opens.all(axis=1)).any():
-        # few harmonics leave a pair that comes and goes wrong by a little of what flows: beyond the bound of all others
-        # in 4 of 400 scenes, by at most 0.7 % (seed 182)
-        least = max(least, 0.01 * abs(damping))
-    assert work >= -least
     # stuck pairs wear exactly nothing
-    stuck = (at.status_t == 1).all(axis=1)
-    assert not at.slip_work[stuck].any()
+    assert not at.slip_work[(at.status_t == 1).all(axis=1)].any()
 
 
 @profile
@@ -219,13 +186,6 @@ def test_the_tangents_may_be_turned(seed, angle):
     other = balance.evaluate(balance.predict(displacement_h, force_h))
     assert other.scaled_residual() <= 2.0 * SETTINGS.tolerance
     # a pair that static load alone has brought to its limit slips by round-off
-    round_off = 1e-9 * elastic_work(joint, at)
+    flexed = np.linalg.norm(joint.law.motion(at.force_h)) * np.linalg.norm(at.force_h)
+    round_off = 1e-9 * float(flexed)
     assert np.abs(other.slip_work - at.slip_work).max() <= 1e-6 * at.slip_work.max() + round_off
-
-
-def test_what_is_drawn_sticks_slips_opens_and_wears():
-    seen = [found(seed) for seed in range(40)]
-    statuses = {int(s) for result in seen if result is not None for s in np.unique(result[2].evaluation.status_t)}
-    assert statuses == {0, 1, 2}
-    slipping = [result for result in seen if result is not None and result[2].evaluation.slip_work.max() > 0.0]
-    assert len(slipping) >= 20

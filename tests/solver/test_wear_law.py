@@ -8,8 +8,6 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline, RegularGridInterpolator
 from scipy.optimize import brentq
 
-from solver import march_wear as march_model
-from solver.contact.period_march import slip_work_rate, slip_work_slopes
 from solver.contact.wear_law import ARCHARD, ARCHARDS_WORK, WearingWork, WearLaw, WearTable, wearing_work
 from solver.settings import Scheme, SolverSettings
 from tests.solver.models import march_wear, random_balance, random_model
@@ -18,19 +16,11 @@ from tests.solver.worn_slider import AREA as PAIR_AREA
 from tests.solver.worn_slider import COARSE, END, FRICTION, march, slider_start
 from tests.solver.worn_slider import WEAR as COEFFICIENT
 
-WEAR, AREA, WORK = 1.1e-11, np.array([1e-6, 2e-6, 4e-6]), np.array([0.1, 0.0, 0.3])
 SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit", "adaptive")
 CYCLES = np.linspace(0.0, END, 9)
 # of the slider, whose pressure falls from 1e5 Pa to nothing while 1e-4 m wear off
 TABLE = WearTable((2e4, 5e4, 9e4), (0.0, 1e-5, 6e-5), ((0.8, 0.2, 0.5), (1.0, 0.6, 0.4), (0.4, 0.8, 0.9)))
 THRESHOLD = 20.0  # J/m2: the slider begins with about 45 of them
-
-
-def test_the_slopes_are_the_derivatives_of_the_slip_work():
-    normal, speed, step = 12.0, 0.3, 1e-4
-    by_normal = (slip_work_rate(normal + step, speed) - slip_work_rate(normal - step, speed)) / (2 * step)
-    by_speed = (slip_work_rate(normal, speed + step) - slip_work_rate(normal, speed - step)) / (2 * step)
-    assert slip_work_slopes(normal, speed) == pytest.approx((by_normal, by_speed), rel=1e-9)
 
 
 def random_work(seed, n_contact, n_pressures=4, n_depths=5):
@@ -128,8 +118,7 @@ def test_the_jacobian_of_an_implicit_step_is_that_of_central_differences(name):
 
 def march_by(law, scheme, wear=COEFFICIENT, step=1000.0):
     model, start = slider_start(COARSE)
-    settings = replace(COARSE, rtol=1e-3)
-    return march_wear(model, FRICTION, start, wear, step, scheme, CYCLES, settings, law=law)
+    return march_wear(model, FRICTION, start, wear, step, scheme, CYCLES, replace(COARSE, rtol=1e-3), law=law)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -190,13 +179,7 @@ def test_the_sides_of_a_pair_add_up_and_every_surface_has_a_factor():
     found = wearing_work(law, sides, np.zeros(3)).work(np.ones(3), np.ones(3), np.ones(3))
     assert found.tolist() == [1.5, 1.5, 1.0]
     for wrong in ((("flat", 1.0),), (("flat", 1.0), ("cylinder", 0.5), ("disk", 1.0))):
-        with pytest.raises(
-            ValueError, match=r'"(cylinder|disk)": give a factor to each of the surfaces flat, cylinder'
-        ):
+        with pytest.raises(ValueError, match=r"cylinder|disk"):
             wearing_work(WearLaw(surfaces=wrong), sides, np.zeros(3))
-
-
-def test_a_law_that_does_not_exist_names_those_that_do():
-    model, _ = slider_start(COARSE)
-    with pytest.raises(ValueError, match='"reye": give one of archard, energy, threshold, table'):
-        march_model(model, 160.0, 10.0, FRICTION, COEFFICIENT, [10.0], law=WearLaw("reye"))
+    with pytest.raises(ValueError, match="reye"):
+        wearing_work(WearLaw("reye"), sides, np.zeros(3))
