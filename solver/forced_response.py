@@ -63,28 +63,16 @@ def frequency_response(
 
     Where a point fails, its `outcome` and `message` say why. The other points are computed all the same.
 
-    Parameters
-    ----------
-    model
-        The model, from `build_model`, `studies.build_scene` or `studies.read_scene`.
-    frequency
-        (n_frequency,) or one number, Hz, in any order. The state at a frequency does not depend on the others.
-    excitation_amplitude
-        Amplitude, N. It multiplies the unit harmonic load of the model.
-    friction_coefficient
-        One number for all pairs, or (n_contact,) for each pair. None for a model with its own, e.g. from a scene file.
-    sweep
-        Way to a state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
-    settings
-        The defaults of `SolverSettings` if not given.
-    wear_depth
-        (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
+    model: from `build_model`, `studies.build_scene` or `studies.read_scene`.
+    frequency: (n_frequency,) or one number, Hz, in any order. The state at a frequency does not depend on the others.
+    excitation_amplitude: N, multiplies the unit harmonic load of the model.
+    friction_coefficient: one number for all pairs, or (n_contact,) for each pair. None for a model with its own.
+    sweep: way to a state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
+    settings: the defaults of `SolverSettings` if not given.
+    wear_depth: (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
 
-    Raises
-    ------
-    ValueError
-        A number is out of its range; the model lacks nodal diameters that the harmonics need; friction coefficients
-        are given twice, not at all, or not to each pair.
+    Raises ValueError where a number is out of its range, where the model lacks nodal diameters that the harmonics need,
+    and where friction coefficients are given twice, not at all, or not to each pair.
     """
     settings = SolverSettings() if settings is None else settings
     wanted = check_numbers("frequency", frequency, above=0.0)

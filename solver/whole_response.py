@@ -102,21 +102,13 @@ def response_curve(
     history of the pairs are those of the first state: a slow sweep of a machine, which leaves a history of its own at
     each frequency, and which jumps at folds, is `frequency_response`.
 
-    Parameters
-    ----------
-    model, friction_coefficient, settings, wear_depth
-        As in `frequency_response`. Best give harmonics in the settings: the first state may need fewer than others.
-    frequency, excitation_amplitude
-        One number for one of them, Hz or N, and two for the other one: first and last value.
-    most_points
-        Largest number of points.
-    errors
-        False leaves out `response_error`, which takes most of the time.
+    model, friction_coefficient, settings, wear_depth: as in `frequency_response`. Best give harmonics in the settings:
+    the first state may need fewer than others.
+    frequency, excitation_amplitude: one number for one of them, Hz or N, and two for the other one: first and last
+    value.
+    most_points: largest number of points. errors: False leaves out `response_error`, which takes most of the time.
 
-    Raises
-    ------
-    ValueError
-        As in `frequency_response`; not one number and two numbers; two equal numbers.
+    Raises ValueError as `frequency_response`, and where there are not one number and two different ones.
     """
     settings = SolverSettings() if settings is None else settings
     omegas = 2.0 * np.pi * check_numbers("frequency", frequency, above=0.0)

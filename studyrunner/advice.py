@@ -45,35 +45,31 @@ def advise(outcome: str, used: Used) -> str:
 
     Empty where the sentence of the outcome says all, where nothing is left to try, and for words not known here.
     """
-    if outcome == "resonance_lost":
-        # a ramp holds the frequency
-        other = "down" if used.sweep == "up" else "up"
-        return _try("another range in loading.between", *([] if other in used.sweeps else [f'sweep = "{other}"']))
-    if outcome in ("start_failed", "branch_lost", "unstable"):
-        # more harmonics make no state stable
-        finer = () if outcome == "unstable" else _given(used)
-        return _try(*finer, *_other_sweeps(used))
-    if outcome == "march_failed":
-        return _try(*_given(used), *_other_steps(used))
-    if outcome == "step_too_long":
-        return _try(*_other_steps(used))
-    if outcome == "sensitive":
-        if used.scheme not in _OF_ADAPTIVE_STEPS:
-            return _try(*_other_steps(used))
-        return _try("a smaller rtol") + (
-            " If both still differ then, the joint itself is that sensitive: use [scatter]."
-        )
-    if outcome == "inaccurate":
-        return _try(*_given(used))
-    if outcome == "certificate_failed":
-        return _try(*_given(used), "a smaller tolerance")
     if outcome == "time_limit":
         return "--retry-failed continues with a larger solver.time_limit."
-    if outcome == "no_final_state":
-        other = "another scheme with " if used.scheme == "final" else ""
-        target = "" if used.until else " or slow_time.until"
-        return _try(f"{other}an end in slow_time.cycles{target}")
-    return ""
+    finer, steps, sweeps = _given(used), _other_steps(used), _other_sweeps(used)
+    # a ramp holds the frequency
+    other = "down" if used.sweep == "up" else "up"
+    turned = () if other in used.sweeps else (f'sweep = "{other}"',)
+    end = "another scheme with an end in " if used.scheme == "final" else "an end in "
+    adaptive = used.scheme in _OF_ADAPTIVE_STEPS
+    remedies = {
+        "resonance_lost": ("another range in loading.between", *turned),
+        "start_failed": (*finer, *sweeps),
+        "branch_lost": (*finer, *sweeps),
+        # more harmonics make no state stable
+        "unstable": sweeps,
+        "march_failed": (*finer, *steps),
+        "step_too_long": steps,
+        "sensitive": ("a smaller rtol",) if adaptive else steps,
+        "inaccurate": finer,
+        "certificate_failed": (*finer, "a smaller tolerance"),
+        "no_final_state": (f"{end}slow_time.cycles{'' if used.until else ' or slow_time.until'}",),
+    }.get(outcome, ())
+    text = f"Try {' or '.join(remedies)}." if remedies else ""
+    if outcome == "sensitive" and adaptive:
+        text += " If both still differ then, the joint itself is that sensitive: use [scatter]."
+    return text
 
 
 def advise_error(error: float, wear_rate_error: Sequence[float], used: Used) -> str:
@@ -112,10 +108,6 @@ def _other_steps(used: Used) -> tuple[str, ...]:
     by_depth = used.by_depth and used.scheme == "explicit"
     shorter = "a smaller slow_time.largest_depth" if by_depth else "a smaller step"
     return (shorter,) if "adaptive" in used.schemes else ('scheme = "adaptive"', shorter)
-
-
-def _try(*remedies: str) -> str:
-    return f"Try {' or '.join(remedies)}." if remedies else ""
 
 
 def _rounded_down(value: float) -> str:

@@ -19,7 +19,7 @@ from studyrunner.result.arrays import SmallArray, coordinates, scene_arrays
 from studyrunner.result.creation_date import describe_date
 from studyrunner.result.existing_result import Label, Target
 from studyrunner.result.paths import older_folder, progress_file, remove_leftovers
-from studyrunner.result.provenance import PACKAGES, compare_with_archived, describe_run
+from studyrunner.result.provenance import compare_with_archived, describe_run
 from studyrunner.result.sample_coordinates import sample_coordinates, worn_coordinate
 from studyrunner.result.software import describe_software
 from studyrunner.scene.check_command import remarks_of_study
@@ -141,7 +141,7 @@ def _serve(
     display: ProgressDisplay,
 ) -> RunSummary:
     # the software is described when the run begins: a checkout may have changed at the end of the run
-    origin = {**describe_software(PACKAGES[0]), **describe_date(options.date)}
+    origin = {**describe_software(), **describe_date(options.date)}
 
     def write() -> RunSummary:
         return _write(study, scenes, completion, target, origin)

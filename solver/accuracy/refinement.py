@@ -27,14 +27,31 @@ from solver.accuracy.harmonic_levels import (
     room_for,
     shifted,
 )
-from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import nothing_happens, shortest_contact
-from solver.accuracy.resolved_state import ResolvedState
+from solver.accuracy.resolved_state import FAINT_SHARE, ResolvedState
 from solver.harmonic_balance.state import State
 from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, FORCING, SMALL_JOINT
 from solver.newton.run import Run
 from solver.settings import FINE_SAMPLES, Resolution
 from solver.structure.joint import Case, Joint
+
+TWO_LEVELS_SAFETY = 1.5
+"""Error over the difference to the state two levels of harmonics up, 2 to 1.2 where the error falls as 1/H to 1/H^3,
+and over the difference to twice the samples, 2 to 1.3 for an error as the time step or its square."""
+
+ONE_LEVEL_SAFETY = 2.5
+"""Error over the difference to the state one level up: 3.4 to 1.5 for an error as 1/H to 1/H^3."""
+
+TRIPLE_SAMPLES_SAFETY = 2.0
+"""Error over the difference to three times the samples: 1.5 to 1.1, but the errors of single events scatter."""
+
+KEPT_FRACTION = 0.5
+"""Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once. A state
+with less than this fraction of the kept error is tried with fewer harmonics and samples."""
+
+VIBRATION_RECHECK = 0.3
+"""Relative change of the vibration after which errors are estimated and harmonics chosen again. Error of the motion of
+the dovetail on the far side of the resonance: 5 % with 1.0, 0.5 % with 0.3."""
 
 MOST_MIXED_HARMONICS = 79
 """Highest harmonic of "auto" with even harmonics: motions with impacts gain nothing from more."""
@@ -160,7 +177,7 @@ class _Search:
                 return level
         if settings.samples == "auto":
             return finest
-        missing = here.difference(finest).times(ACCURACY.two_levels_safety)
+        missing = here.difference(finest).times(TWO_LEVELS_SAFETY)
         return Refined(here.case, here.point, missing, not settings.automatic or missing.largest <= settings.rtol)
 
     def _samples_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
@@ -177,7 +194,7 @@ class _Search:
         finer = self._compared(here, Resolution(orders, 3 * samples + 2 if few else 2 * samples))
         if finer is None:
             return UNKNOWN, None
-        safety = ACCURACY.triple_samples_safety if few else ACCURACY.two_levels_safety
+        safety = TRIPLE_SAMPLES_SAFETY if few else TWO_LEVELS_SAFETY
         return here.difference(finer).times(safety), finer
 
     def _harmonics_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
@@ -204,7 +221,7 @@ class _Search:
         if other is None:
             return UNKNOWN, None
         single = richer is not None and found == 1
-        safety = ACCURACY.one_level_safety if single else ACCURACY.two_levels_safety
+        safety = ONE_LEVEL_SAFETY if single else TWO_LEVELS_SAFETY
         return here.difference(other).times(safety), richer
 
     def _levels_up(self, here: ResolvedState, levels: int) -> tuple[ResolvedState | None, int]:
@@ -267,13 +284,13 @@ class _Search:
 
         The error is kept below a fraction of rtol, so that the next state does not need more harmonics at once.
         """
-        enough = ACCURACY.kept_fraction * here.case.settings.rtol
-        while estimate.largest <= ACCURACY.kept_fraction * enough:
+        enough = KEPT_FRACTION * here.case.settings.rtol
+        while estimate.largest <= KEPT_FRACTION * enough:
             lower = fewer(here.case.resolution, here.case.settings)
             level = here.solve_at(lower, self.run) if lower != here.case.resolution else None
             if level is None:
                 break
-            larger = level.difference(here).times(ACCURACY.two_levels_safety) + estimate
+            larger = level.difference(here).times(TWO_LEVELS_SAFETY) + estimate
             if larger.largest > enough or not level.holds():
                 break
             here, estimate = level, larger
@@ -291,8 +308,8 @@ def _levels_to_compare(here: ResolvedState) -> tuple[int, int]:
     cheap = 2 + sum(here.unknowns(each) <= FAR_UNKNOWNS and model.holds(each.highest) for each in levels)
     if cheap == 2:
         return 2, 2
-    contact = shortest_contact(at.status_t, at.force_t[:, 0], ACCURACY.negligible * here.case.settings.rtol)
-    highest = reach(model, here.case.penalty_omega, resolution.highest)
+    contact = shortest_contact(at.status_t, at.force_t[:, 0], FAINT_SHARE * here.case.settings.rtol)
+    highest = reach(model, here.joint.omega, resolution.highest)
     seeing, far, reaching = (levels_to(resolution, wanted) for wanted in (0.5 / contact, 1.0 / contact, highest))
     return min(seeing, cheap), min(max(far, reaching), cheap)
 

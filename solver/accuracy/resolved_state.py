@@ -10,7 +10,6 @@ import numpy as np
 from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.harmonic_levels import n_unknowns
-from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import half_wave_symmetric, lacks_even
 from solver.continuation.homotopy import add_harmonics, start_with_tail
 from solver.continuation.ratcheting import ratchets, shake_down
@@ -23,6 +22,10 @@ from solver.newton.run import Run
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, all_orders
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
+
+FAINT_SHARE = 0.1
+"""Fraction of rtol: part of the slip work that may be creep, and normal force over the largest one below which a
+contact need not be resolved."""
 
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
@@ -77,7 +80,7 @@ class ResolvedState:
 
     def at_rest(self, run: Run) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
-        fraction = ACCURACY.negligible * self.case.settings.rtol
+        fraction = FAINT_SHARE * self.case.settings.rtol
         if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
         return replace(self, point=shake_down(self.joint, self.point, fraction, run))

@@ -1,17 +1,16 @@
 """The static state of a joint: contact, friction and equilibrium under a load that rises from zero.
 
 The state depends on the history of the load. So the load is raised in equal steps, and each step starts from the
-tangential state of the step before. Newton's method finds most steps at once. Where the first iterations do not show
-which pairs slip, in which direction, and which are open, they cycle among sets of pairs; without gaps a shorter step
-has the same sets. The step is then made in time, as a joint with viscous pairs makes it:
+tangential state of the step before. Newton's method finds most steps at once. Where it cycles among sets of pairs that
+slip and open, the step is made in time, as a joint with viscous pairs makes it:
 
     c (u - u_before) + Z_r u + lambda = F_r
 
 in steps of implicit Euler, with c in proportion to the penalty of each pair. A large c binds each pair to its last
-position: the pairs hardly act on each other, and the state is unique for any friction. From step to step c falls,
-until Newton's method finds the state with c = 0: its slip is that since the last viscous step. Also a joint that has
-to jump moves on (a snap under much friction, a body that falls through a gap), and a joint without any static state
-moves without end, in a direction that shows why.
+position, and the state is unique for any friction. From step to step c falls, until Newton's method finds the state
+with c = 0: its slip is that since the last viscous step. Also a joint that has to jump moves on (a snap under much
+friction, a body that falls through a gap), and a joint without any static state moves without end, in a direction that
+shows why.
 """
 
 from __future__ import annotations

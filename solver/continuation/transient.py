@@ -17,8 +17,7 @@ the history of the step before. The static harmonic has s = 1/D.
 A short step resolves the transient of the structure; a long step damps all decaying motions. Growing motions leave an
 unstable state as long as 1/D exceeds their rate, which the determinant of the step shows (`stability.hill`). So D
 starts at one period, the stability of each periodic state is tested, and D is bounded by this rate once a state was
-unstable. A pair of a dovetail that begins to slip at both ends of its motion loses its hold of the mean position. The
-mean position then moves on to a stable state within some hundred periods, and the vibration changes by 2e-4.
+unstable.
 """
 
 from __future__ import annotations

@@ -14,7 +14,8 @@ from solver.accuracy.refinement import Refined, refine, state_difference
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.state import State
 from solver.loading_history.path import FREE_STEP, LoadingPath
-from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Step, Sweep, SweepState
+from solver.loading_history.path_of_states import Step
+from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep, SweepState
 from solver.loading_history.sweep_start import Direction, Origin, cell_of, find_origin
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run

@@ -11,23 +11,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.harmonic_levels import shifted
-from solver.accuracy.options import ACCURACY
-from solver.accuracy.period_events import nothing_happens
-from solver.accuracy.refinement import NODE_UNKNOWNS, Refined, refine
-from solver.accuracy.resolved_state import ResolvedState
+from solver.accuracy.error_estimate import Estimate
+from solver.accuracy.period_events import left_out, nothing_happens
+from solver.accuracy.refinement import KEPT_FRACTION, NODE_UNKNOWNS, Refined, refine
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.prolongation import carried_history, transfer
+from solver.harmonic_balance.prolongation import carried_history
 from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
-from solver.loading_history.sweep import Step
+from solver.loading_history.path_of_states import Step
 from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
 from solver.outcome import Outcome
-from solver.settings import FINE_SAMPLES, Resolution, allowed, first_resolution
+from solver.settings import Resolution, first_resolution
 from solver.stability.hill import is_stable
 from solver.structure.joint import Case, Joint
 
@@ -193,34 +191,29 @@ class LoadingPath:
         balance = Balance(joint, carried_history(self.case, joint, at), state.evaluation.wear_depth)
         return _stable(balance, state.evaluation.predicted_h, state.parameter, run.fresh())
 
-    def choose(self, state: State, run: Run) -> tuple[LoadingPath, State, bool, float]:
+    def choose(self, state: State, run: Run) -> tuple[LoadingPath, State, Estimate]:
         """As in Path."""
         found = choose_resolution(self.case, self.joint_at(state.parameter), state, run)
-        return replace(self, case=found.case), found.point, found.accurate, found.estimate.response
+        return replace(self, case=found.case), found.point, found.estimate
 
-    def suffices(self, state: State, at_limit: bool, run: Run) -> bool:
-        """As in Path, by one linear solve at most.
+    def suffices(self, checked: State, error: float, state: State) -> bool:
+        """As in Path.
 
         Where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice. Otherwise
-        one Newton iteration two levels of harmonics up, with twice the samples, shows the error. False where this error
-        is above rtol, or so far below that fewer harmonics may suffice.
+        the error grows and falls with the part of the contact force in harmonics that are left out.
         """
-        if self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any():
-            return True
-        case, joint, settings = self.case, self.joint_at(state.parameter), self.case.settings
-        resolution, fewest = case.resolution, case.resolution == first_resolution(settings)
-        if self.rests(state):
-            looked = Resolution(resolution.orders, max(FINE_SAMPLES, 2 * resolution.samples))
-            # an event that only more samples show is left to `refine`
-            return fewest and nothing_happens(_moved(case, joint, state, looked, run, 0).point.evaluation)
-        above = shifted(resolution, 2)
-        above = allowed(Resolution(above.orders, 2 * above.samples), settings)
-        if not case.model.holds(above.highest):
+        settings, resolution = self.case.settings, self.case.resolution
+        slides = self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any()
+        fewest = resolution == first_resolution(settings)
+        if slides or self.rests(state):
+            return slides or fewest
+        before, now = (left_out(resolution.orders, at.evaluation) for at in (checked, state))
+        if not (0.0 < error < np.inf and before > 0.0):
             return False
-        better = _moved(case, joint, state, above, run, 1)
-        error = ResolvedState(case, joint, state).difference(better).times(ACCURACY.two_levels_safety).largest
-        least = 0.0 if fewest else ACCURACY.kept_fraction**2 * settings.rtol
-        return bool(error >= least and (at_limit or error <= settings.rtol))
+        foreseen = error * now / before
+        enough = fewest or foreseen >= KEPT_FRACTION**2 * settings.rtol
+        # where the error is above rtol already, there are no more harmonics
+        return enough and (foreseen <= settings.rtol or error > settings.rtol)
 
     def describe(self, state: State) -> str:
         """As in Path, with the number of pairs that slip or open."""
@@ -248,15 +241,3 @@ def _stable(balance: Balance, begin: FloatArray, target: float, run: Run) -> Sta
     """Stable state of a balance near a predicted force (n_rel, m), N; None where none is found."""
     found = run.state(balance, begin, target, NEAR_ITERATIONS)
     return found if found is not None and is_stable(balance, found.evaluation, run) else None
-
-
-def _moved(case: Case, joint: Joint, point: State, resolution: Resolution, run: Run, iterations: int) -> ResolvedState:
-    """A state with other harmonics and samples, improved by a number of Newton iterations."""
-    other = case.at(resolution)
-    other_joint = other.joint(joint.omega, joint.excitation_amplitude)
-    balance, start = transfer(case, other_joint, point.evaluation)
-    at = balance.evaluate(start)
-    for _ in range(iterations):
-        at = balance.evaluate(at.predicted_h + run.fresh().step(balance, at, -at.residual))
-        run.budget.iterations += 1
-    return ResolvedState(other, other_joint, replace(point, evaluation=at))

@@ -20,7 +20,8 @@ from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State
 from solver.loading_history.frequency_sweep import FrequencySweep, why_lost
 from solver.loading_history.path import FREE_STEP
-from solver.loading_history.sweep import NODE_ITERATIONS, Step, Sweep
+from solver.loading_history.path_of_states import Step
+from solver.loading_history.sweep import NODE_ITERATIONS, Sweep
 from solver.loading_history.sweep_start import CELLS_PER_OCTAVE, cell_of
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome

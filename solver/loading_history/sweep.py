@@ -6,12 +6,12 @@ only on the change of the vibration from node to node. A state between two nodes
 leaves the sweep unchanged. So the state of a point does not depend on the other points of the study.
 
 The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
-slip, up to one step too early. A reference sweep has a node in the middle of every third step, and harmonics
-one level lower where these are automatic. So the difference of both sweeps is at least half the error of the finer one,
-and as a rule the error of the coarser one: with common nodes both might keep the same history too early. There is no
-difference, and no reference, as long as nothing slips or opens, and where each pair slips or opens within the period:
-such a state follows from its parameter alone. Where the sweep jumps over a fold, its reference begins anew behind the
-jump: the place of a jump is no measure of the error by steps.
+slip, up to one step too early. A reference sweep has a node in the middle of every third step, and harmonics one level
+lower where these are automatic. The difference of both sweeps is at least half the error of the finer one, and as a
+rule the error of the coarser one; with common nodes both might keep the same history too early. There is no reference
+as long as nothing slips or opens, and where each pair slips or opens within the period: such a state follows from its
+parameter alone. Where the sweep jumps over a fold, its reference begins anew behind the jump: the place of a jump is no
+measure of the error by steps.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic
 
 import numpy as np
 
+from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.harmonic_levels import fewer
-from solver.accuracy.options import ACCURACY
+from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.harmonic_balance.state import Failure
+from solver.loading_history.path_of_states import Nodes, Path, S, Step
 from solver.march.steps import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
-from solver.settings import Resolution
-from solver.structure.joint import Case
 
 AIMED_CHANGE = 0.75
 """Expected change of the vibration in the next step over the largest change. Few steps are refused."""
@@ -47,94 +47,8 @@ ITERATIONS_PER_SAVE = 100
 sweep is equal to the last bit: 1 s of 48 pairs, 17 s of 336."""
 
 STEPS_OF_REFERENCE = 3
-"""Steps of a sweep in one step of its reference."""
-
-KEPT_NODES = 3
-"""Last nodes that a sweep keeps: the next one is predicted on the parabola through them."""
-
-
-class OnPath(Protocol):
-    """A state at a value of the parameter of its path."""
-
-    @property
-    def parameter(self) -> float:
-        """Value of the parameter."""
-
-
-S = TypeVar("S", bound=OnPath)
-
-
-@dataclass(frozen=True)
-class Step(Generic[S]):
-    """End of a step: the state reached, and values of the parameter at the folds that the step has jumped over."""
-
-    state: S
-    folds: tuple[float, ...] = ()
-
-
-class Path(Protocol[S]):
-    """The joint along a parameter, with the harmonics and samples of its case."""
-
-    @property
-    def case(self) -> Case:
-        """Model and settings."""
-
-    @property
-    def steps(self) -> tuple[float, float, float]:
-        """Shortest and longest step, and the one at which a state that is not found is left to `rescue`."""
-
-    @property
-    def node_tolerance(self) -> float:
-        """Tolerance of the scaled residual of a node; reported states are solved to that of the settings."""
-
-    def ahead(self, parameter: float, length: float) -> float:
-        """The parameter a step farther; length: below 0 for a step down."""
-
-    def solve(self, states: tuple[S, ...], target: float, run: Run) -> S | None:
-        """Stable state at a target near the last of some states, which leaves its history to it; None if not found."""
-
-    def rescue(self, start: S, target: float, run: Run) -> Step[S] | Outcome:
-        """State at a target that `solve` does not find, or why there is none."""
-
-    def change(self, before: S, after: S, wider: float) -> float:
-        """Change over a step, over the largest change allowed times `wider`."""
-
-    def rests(self, state: S) -> bool:
-        """Whether no pair slips or opens within the period."""
-
-    def forgets(self, state: S) -> bool:
-        """Whether each pair slips or opens within the period, so that the state follows from its parameter alone."""
-
-    def differs(self, before: S, after: S) -> float:
-        """Relative change of the vibration between two states."""
-
-    def at(self, resolution: Resolution) -> Path[S]:
-        """The path with other harmonics and samples."""
-
-    def move(self, state: S, other: Any, run: Run) -> S | None:
-        """The state with the harmonics and samples of another path; None where not found."""
-
-    def choose(self, state: S, run: Run) -> tuple[Path[S], S, bool, float]:
-        """Path and state with the harmonics that the state needs, whether they suffice, relative error."""
-
-    def suffices(self, state: S, at_limit: bool, run: Run) -> bool:
-        """Whether the state has about the harmonics that it needs. at_limit: whether more are not allowed."""
-
-    def describe(self, state: S) -> str:
-        """Where the path is, in words."""
-
-
-@packable
-@dataclass(frozen=True)
-class Nodes:
-    """The last nodes of a sweep, with equal harmonics, the current one last; none where there is no state."""
-
-    resolution: Resolution
-    states: tuple[Any, ...] = ()
-
-    def then(self, state: Any) -> Nodes:
-        """With one node more."""
-        return replace(self, states=(*self.states, state)[-KEPT_NODES:])
+"""Steps of a sweep in one step of its reference. With two, the difference of both may be a quarter of the error
+(dovetail of 16 pairs, 213.25 Hz, nine harmonics)."""
 
 
 @packable
@@ -144,7 +58,7 @@ class SweepState:
 
     nodes: the last nodes; those before its end where the sweep is lost.
     length: of the next step. rate: change in the last one, over the largest change allowed, per length.
-    checked: the node at which the harmonics were chosen. at_limit: whether it needs more than a sweep may have.
+    checked, error: the node at which the harmonics were chosen, and its largest estimated error.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
     lost, failure: whether the sweep has ended, and the reason why there is no state.
     iterations: Newton iterations so far.
@@ -155,7 +69,7 @@ class SweepState:
     length: float = 0.0
     rate: float = 0.0
     checked: Any = None
-    at_limit: bool = False
+    error: float = 0.0
     branch: int = 0
     fold: float = math.nan
     lost: bool = False
@@ -319,11 +233,10 @@ class Sweep(Generic[S]):
         )
         if self.with_reference:
             self._lead_reference(before, step)
-        if self.path.differs(self.state.checked, step.state) > ACCURACY.vibration_recheck:
-            if self.path.suffices(step.state, self.state.at_limit, self.run):
-                self.state = replace(self.state, checked=step.state)
-            else:
-                self._choose_resolution()
+        checked, error = self.state.checked, self.state.error
+        changed = self.path.differs(checked, step.state) > VIBRATION_RECHECK
+        if changed and not self.path.suffices(checked, error, step.state):
+            self._choose_resolution()
         saved = 0 if self.saved is None else self.saved.iterations
         if self.run.budget.iterations >= saved + ITERATIONS_PER_SAVE:
             self._save()
@@ -374,17 +287,16 @@ class Sweep(Generic[S]):
 
         Returns the estimated relative error of the response, 0 for fixed settings.
         """
-        nodes, error = self.state.nodes, 0.0
+        nodes, error = self.state.nodes, NOTHING
         here = nodes.states[-1]
         if self.path.case.settings.automatic:
-            path, here, accurate, error = self.path.choose(here, self.run)
-            self.state = replace(self.state, at_limit=not accurate)
+            path, here, error = self.path.choose(here, self.run)
             if path.case.resolution == nodes.resolution:
                 self.state = replace(self.state, nodes=replace(nodes, states=(*nodes.states[:-1], here)))
             else:
                 self._take(path, here)
-        self.state = replace(self.state, checked=here)
-        return error
+        self.state = replace(self.state, checked=here, error=error.largest)
+        return error.response
 
     def _take(self, path: Path[S], state: S) -> None:
         """Take the current node with other harmonics and samples; those of the reference sweep follow."""
@@ -392,6 +304,7 @@ class Sweep(Generic[S]):
         self.state = replace(self.state, nodes=Nodes(path.case.resolution, (state,)))
         if before is not None and not self._begin_reference(before[0], before[1][-1]):
             self._begin_reference(path, state)
+            self.state = replace(self.state, skipped=())
 
     def _save(self) -> None:
         """Save the current node, and drop all that a resumed sweep would not have."""

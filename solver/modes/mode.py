@@ -16,13 +16,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.contact.coulomb import STICK
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.state import State, final_history, history_at_rest
 from solver.loading_history.path import FREE_STEP, choose_resolution, largest_change
-from solver.loading_history.sweep import Step
+from solver.loading_history.path_of_states import Step
 from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, modal_model
@@ -168,15 +169,15 @@ class NonlinearMode:
         balance, start = transfer(self.case, other.joint_of(state.values), state.evaluation)
         return other.find(state.parameter, start, state.values, balance.history, run.fresh())
 
-    def choose(self, state: ModeState, run: Run) -> tuple[NonlinearMode, ModeState, bool, float]:
+    def choose(self, state: ModeState, run: Run) -> tuple[NonlinearMode, ModeState, Estimate]:
         """As in Path."""
         chosen = choose_resolution(self.case_of(state.values), self.joint_of(state.values), state, run)
         other = self.at(chosen.case.resolution)
         moved = state if chosen.case.resolution == self.case.resolution else self.move(state, other, run)
         # the error of the first response is judged in a sweep of the frequency only
-        return (self, state, False, 0.0) if moved is None else (other, moved, chosen.accurate, 0.0)
+        return (self, state, NOTHING) if moved is None else (other, moved, NOTHING)
 
-    def suffices(self, _: ModeState, __: bool, ___: Run) -> bool:
+    def suffices(self, _: ModeState, __: float, ___: ModeState) -> bool:
         """As in Path: harmonics are chosen anew."""
         return False
 

@@ -61,46 +61,23 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     SystemExit
         After --help.
     """
-    parser = _Parser(
-        prog="study-report",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    look: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
+    parser = _Parser("study-report", description=_DESCRIPTION, epilog=_EPILOG, **look)
     parser.add_argument("result", metavar="OUT.nc", type=Path, help="result file of run-study")
-    parser.add_argument(
-        "-o", dest="folder", metavar="FOLDER", type=Path, help="where to write (default: OUT-report, here)"
-    )
-    parser.add_argument(
-        "--vtu", action="store_true", help="also the root as VTU files over the cycles, for ParaView (extra meshio)"
-    )
-    parser.add_argument(
-        "--point",
-        metavar="AXIS=VALUE,...",
-        type=_read_point,
-        default={},
-        help="the point that root, maps, loops and --vtu show (default: the most worn one)",
-    )
-    parser.add_argument(
-        "--no-compute", action="store_true", help="draw what the file holds, without the response of the worn joint"
-    )
-    parser.add_argument(
-        "--loops",
-        metavar="PAIR,...",
-        type=_read_pairs,
-        default=(),
-        help="compute fretting loops of these pairs",
-    )
-    parser.add_argument(
-        "--natural-frequencies", action="store_true", help="compute natural frequencies over the nodal diameter"
-    )
-    parser.add_argument(
-        "--measured",
-        metavar="PROFILE.csv",
-        type=Path,
-        help="measured scar of a cylinder or sphere on a flat; first line x_mm,depth_um (also m, um)",
-    )
+    where = "where to write (default: OUT-report, here)"
+    parser.add_argument("-o", dest="folder", metavar="FOLDER", type=Path, help=where)
+    which = "the point that root, maps, loops and --vtu show (default: the most worn one)"
+    parser.add_argument("--point", metavar="AXIS=VALUE,...", type=_read_point, default={}, help=which)
+    pairs = "compute fretting loops of these pairs"
+    parser.add_argument("--loops", metavar="PAIR,...", type=_read_pairs, default=(), help=pairs)
+    scar = "measured scar of a cylinder or sphere on a flat; first line x_mm,depth_um (also m, um)"
+    parser.add_argument("--measured", metavar="PROFILE.csv", type=Path, help=scar)
+    for name, what in (
+        ("--natural-frequencies", "compute those of the sector over the nodal diameter, joint stuck"),
+        ("--no-compute", "draw what the file holds, without the response of a worn joint"),
+        ("--vtu", "also the root over the cycles, for ParaView (extra meshio)"),
+    ):
+        parser.add_argument(name, action="store_true", help=what)
     return parser.parse_args(list(arguments))
 
 
@@ -156,7 +133,7 @@ def _report(options: argparse.Namespace) -> int:
     with Console(stderr=True).status(f"reading {escape(str(options.result))}") as status:
         from studyrunner.report.contents import draw_report
         from studyrunner.report.page.page import write_page
-        from studyrunner.report.root.vtu import find_writer
+        from studyrunner.report.root.vtu import SERIES, find_writer
         from studyrunner.result.opening import check_numbers, reading_errors
         from studyrunner.result.view import open_for_report
         from studyrunner.system.progress import count, format_seconds
@@ -167,17 +144,17 @@ def _report(options: argparse.Namespace) -> int:
             write_series = find_writer(result) if options.vtu else None
             folder = options.folder or Path(f"{options.result.stem}-report")
             _make_folder(folder)
-            page = folder / "index.html"
             status.stop()
             result = _compute(result, folder, options)
             status.start()
+            page = folder / "index.html"
             summary = write_page(result, _say(draw_report(result), status), page)
-            series = write_series(folder) if write_series else None
+            n_files = write_series(folder) if write_series else 0
     shown = f"{count(summary.n_drawings, 'figure')}, {count(summary.n_tables, 'table')}, {summary.n_missing} left out"
     seconds = format_seconds(time.monotonic() - began)
     print(f"{page}: {shown}, {summary.n_bytes / 1e6:.1f} MB, {seconds}; open it in a browser")
-    if series is not None:
-        print(f"{series.path}: time series of {count(series.n_files, 'VTU file')}; open it in ParaView")
+    if options.vtu:
+        print(f"{folder / SERIES}: time series of {count(n_files, 'VTU file')}; open it in ParaView")
     return WRITTEN
 
 
@@ -190,6 +167,7 @@ def _compute(result: Result, folder: Path, options: argparse.Namespace) -> Resul
     again = compute_worn_joint(**given, **asked) if any(asked.values()) else {}
     why = ""
     if not options.no_compute and has_worn_response(result):
+        print("study-report: computing the response of the worn joint (--no-compute leaves it out)", file=sys.stderr)
         try:
             again |= compute_worn_joint(**given, response=True)
         except UserError as error:

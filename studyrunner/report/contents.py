@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
-from studyrunner.report.drawing import Item, Missing, style
+from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Drawn, Item, Missing, Table, style
 from studyrunner.report.figures import (
-    history,
+    contact,
     loops,
     missions,
-    modes,
     outcome,
-    pairs,
     precision,
     response,
     scatter,
     sector,
     trends,
-    volume,
+    wear,
 )
 from studyrunner.report.root import figures as root
 from studyrunner.result.scene_pairs import OF_PAIRS, of_shown_scene
@@ -29,102 +27,138 @@ from studyrunner.result.view import Result
 WEAR, MISSIONS, MODES = "wear histories", "missions", "modes"
 """Kinds of results."""
 
+POINT, COURSE = "frequency, scheme and what else varies", "the axis that figures are drawn over"
+"""What a title names of the shown point."""
+
 
 @dataclass(frozen=True)
 class Entry:
     """A line of the table: one figure or table of the report.
 
-    name: of its files. shows: in words. draw: makes it; None where there is nothing to see. needs: variables without
-    which a sentence says what to ask for. kinds: of the results that have it. scene: where scenes of a study differ in
-    these variables, that of the shown point is drawn. always: also where no point has a result.
+    name: of its files. title: {slow} stands for cycles or missions, {over} for the axis that figures are drawn over;
+    (table) is left out of the heading. draw: makes it. kinds: of the results that have it. needs: variables without
+    which a sentence says what to ask for. scene: where scenes of a study differ in these variables, that of the shown
+    point is drawn. at: what the title names of the shown point, `POINT` or `COURSE`. always: also where no point has a
+    result.
     """
 
     name: str
-    shows: str
-    draw: Callable[[Result], Item | None]
-    needs: tuple[str, ...]
-    kinds: tuple[str, ...]
+    title: str
+    draw: Callable[[Result], Drawn]
+    kinds: tuple[str, ...] = (WEAR, MISSIONS)
+    needs: tuple[str, ...] = ()
     scene: tuple[str, ...] = ()
+    at: str = ""
     always: bool = False
 
     def make(self, result: Result) -> Item | None:
         """The figure, a sentence in its place, or None."""
+        over = (result.course_axis or "").replace("_", " ")
+        title = self.title.format(slow=result.counted, over=over).removesuffix(" (table)")
         if lacks := result.lacks(*self.needs):
-            return Missing(self.name, self.shows[0].upper() + self.shows[1:], lacks)
-        return self.draw(of_shown_scene(result, self.scene) if self.scene else result)
+            return Missing(self.name, title, lacks)
+        shown = of_shown_scene(result, self.scene) if self.scene else result
+        drawn = self._drawn(shown, WIDTH)
+        if drawn is None:
+            return None
+        if isinstance(drawn, str):
+            return Missing(self.name, title, drawn)
+        named = {
+            POINT: ("frequency", "scheme", *shown.varying, *shown.fixed),
+            COURSE: (result.course_axis or "frequency",),
+        }
+        where = shown.describe(shown.shown_point(), named.get(self.at, ()))
+        title = f"{title}: {where}" if where else title
+        if isinstance(drawn, Table):
+            return replace(drawn, name=self.name, title=title)
+        return Drawing(self.name, title, drawn[1], drawn[0], lambda: cast("Any", self._drawn(shown, COLUMN_WIDTH))[0])
+
+    def _drawn(self, result: Result, width: float) -> Drawn:
+        # the style is that of the whole process: it is not left on while the caller has the word
+        with style(width):
+            return self.draw(result)
 
 
-def _of(*kinds: str, rows: tuple[tuple[Any, ...], ...], **options: Any) -> tuple[Entry, ...]:
-    """Entries of these kinds of results. rows: name, what it shows, function, and what it needs."""
-    return tuple(Entry(name, shows, draw, tuple(needs), kinds, **options) for name, shows, draw, *needs in rows)
-
-
-_BLOCKS = (
-    ("blocks", "blocks of a mission with their wear (table)", missions.list_blocks),
-    ("block_shares", "wear by block over the missions", missions.draw_shares),
-    ("block_responses", "vibration of each block over the missions", missions.draw_responses),
-)
-_MODES = (
-    ("natural_frequency", "natural frequency of a mode over its amplitude",
-     partial(modes.draw_mode, name="natural_frequency"), "natural_frequency"),
-    ("damping_ratio", "damping ratio of a mode over its amplitude",
-     partial(modes.draw_mode, name="damping_ratio"), "damping_ratio"),
-)  # fmt: skip
-_SAMPLES = (
-    ("worn_volume_bands", "worn volume of the samples over cycles, with bands", scatter.draw_bands),
-    ("worn_volume_bands_course", "the same over frequency at the last count", scatter.draw_bands_over_course),
-    ("exceedance", "probability of more wear", scatter.draw_exceedance),
-    ("deciding_inputs", "what each input decides, with its interval", scatter.draw_deciding_inputs),
-    ("deciding_input", "samples over the input that decides most", scatter.draw_deciding_input),
-)
-_VOLUMES = (
-    ("worn_volume", "worn volume over cycles", history.draw_history, "worn_volume"),
-    ("final_worn_volume", "worn volume at the last count over frequency", volume.draw_final, "worn_volume"),
-    ("worn_volume_map", "worn volume over frequency and cycles",
-     partial(volume.draw_map, name="worn_volume"), "worn_volume"),
-    ("wear_rate_map", "wear rate over frequency and cycles",
-     partial(volume.draw_map, name="wear_rate"), "worn_volume", "wear_rate"),
-)  # fmt: skip
-_RESPONSES = (
-    ("frequency_response", "response curve of the new joint and of one worn joint", response.draw_responses,
-     "response_amplitude"),
-    ("response_after_own_wear", "response of different joints, each after wear at its own frequency",
-     response.draw_after_wear, "response_amplitude"),
-    ("excitation_frequency", "frequency of an excitation that follows the resonance", history.draw_excitation),
-)  # fmt: skip
-_ROOT = (
-    ("worn_root", "worn root in three dimensions, wear exaggerated", root.draw_root),
-    ("whole_disk", "all sectors of the disk", root.draw_disk),
-    ("wear_depth", "wear depth of each pair", pairs.draw_depths),
-    ("worn_profile", "wear depth on the flanks, or the scar over x", pairs.draw_profile),
-)
-_PAIRS = (
-    ("mean_pressure", "mean pressure, first and last count", pairs.draw_pressure, "mean_pressure"),
-    ("fretting_loops", "tangential force over displacement through a period", loops.draw_fretting),
-    ("normal_load", "normal force through a period", loops.draw_normal),
-    ("pair_motion", "motion of pairs in the contact plane", loops.draw_motion),
-)
-_FRACTIONS = (
-    ("slip_fraction", "fraction of the period in slip, on the root", root.draw_slip, "slip_fraction"),
-    ("open_fraction", "fraction of the period open, on the root", root.draw_open, "open_fraction"),
-)
-_SECTOR = (("natural_frequencies", "sector and its natural frequencies", sector.draw_sector),)
+_ONE: dict[str, Any] = {"scene": OF_PAIRS, "at": POINT}
+_BLOCK: dict[str, Any] = {"kinds": (MISSIONS,), "at": POINT}
+_MODE: dict[str, Any] = {"kinds": (MODES,)}
+_WEAR: dict[str, Any] = {"kinds": (WEAR,)}
 
 FIGURES = (
-    *_of(MISSIONS, rows=_BLOCKS),
-    *_of(MODES, rows=_MODES),
-    *_of(WEAR, MISSIONS, rows=_SAMPLES + _VOLUMES),
-    *_of(WEAR, rows=_RESPONSES),
-    *_of(WEAR, MISSIONS, rows=(("trends", "wear, peak and its shift along every axis", trends.draw_trends),)),
-    *_of(WEAR, MISSIONS, rows=_ROOT, scene=OF_PAIRS),
-    *_of(WEAR, rows=_PAIRS, scene=OF_PAIRS),
-    *_of(MODES, rows=_FRACTIONS, scene=OF_PAIRS),
-    *_of(WEAR, MISSIONS, MODES, rows=(("pair_numbers", "numbers of the pairs", pairs.draw_numbers),), scene=OF_PAIRS),
-    *_of(WEAR, MISSIONS, rows=_SECTOR, scene=sector.OF_SECTOR, always=True),
-    *_of(WEAR, MISSIONS, MODES, rows=(("outcome_map", "how the points ended", outcome.draw_outcomes),), always=True),
-    *_of(WEAR, MISSIONS, rows=(("certificates", "worst certificates (table)", outcome.list_certificates),)),
-    *_of(WEAR, rows=(("precision", "error against run time", precision.draw_precision),)),
-    *_of(WEAR, rows=(("precision_settings", "all settings with their errors (table)", precision.list_settings),)),
+    Entry("blocks", "Blocks of the mission with their wear (table)", missions.list_blocks, **_BLOCK),
+    Entry("block_shares", "Wear by block over the missions", missions.draw_shares, **_BLOCK),
+    Entry("block_responses", "Vibration of each block over the missions", missions.draw_responses, **_BLOCK),
+    *(
+        Entry(name, title, partial(response.draw_mode, name=name), needs=(name,), **_MODE)
+        for name, title in (
+            ("natural_frequency", "Natural frequency of a mode over its amplitude"),
+            ("damping_ratio", "Damping ratio of a mode over its amplitude"),
+        )
+    ),
+    Entry("worn_volume_bands", "Worn volume of the samples over {slow}", scatter.draw_bands),
+    Entry("worn_volume_bands_course", "Worn volume of the samples over {over}", scatter.draw_bands_over_course),
+    Entry("exceedance", "Probability of more wear", scatter.draw_exceedance),
+    Entry("deciding_inputs", "What decides the worn volume", scatter.draw_deciding_inputs),
+    Entry("deciding_input", "Worn volume over the input that decides most", scatter.draw_deciding_input),
+    Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, needs=("worn_volume",), at=COURSE),
+    Entry("final_worn_volume", "Final worn volume over {over}", wear.draw_final, needs=("worn_volume",)),
+    *(
+        Entry(f"{name}_map", title, partial(wear.draw_map, name=name), needs=("worn_volume", name))
+        for name, title in (
+            ("worn_volume", "Worn volume over {over} and {slow}"),
+            ("wear_rate", "Wear rate over {over} and {slow}"),
+        )
+    ),
+    Entry(
+        "frequency_response",
+        "Frequency response of one joint, new and worn",
+        response.draw_responses,
+        **_WEAR,
+        needs=("response_amplitude",),
+    ),
+    Entry(
+        "response_after_own_wear",
+        "Response of different joints, each after wear at its own frequency",
+        response.draw_after_wear,
+        **_WEAR,
+        needs=("response_amplitude",),
+    ),
+    Entry(
+        "excitation_frequency", "Frequency of an excitation that follows the resonance", wear.draw_excitation, **_WEAR
+    ),
+    Entry("trends", "Trends along the axes of the study", trends.draw_trends),
+    Entry("worn_root", "The worn root", root.draw_root, **_ONE),
+    Entry("whole_disk", "The whole disk", root.draw_disk, scene=OF_PAIRS),
+    Entry("wear_depth", "Wear depth of each pair", contact.draw_depths, **_ONE),
+    Entry("worn_profile", "Worn profile of the contact surfaces", contact.draw_profile, **_ONE),
+    Entry("mean_pressure", "Mean pressure", contact.draw_pressure, **_WEAR, **_ONE, needs=("mean_pressure",)),
+    Entry("fretting_loops", "Fretting loops", loops.draw_fretting, **_WEAR, **_ONE),
+    Entry("normal_load", "Normal force through a period", loops.draw_normal, **_WEAR, **_ONE),
+    Entry("pair_motion", "Motion of the pairs in the contact plane", loops.draw_motion, **_WEAR, **_ONE),
+    *(
+        Entry(
+            f"{name}_fraction",
+            title,
+            partial(root.draw_fraction, name=f"{name}_fraction"),
+            **_MODE,
+            **_ONE,
+            needs=(f"{name}_fraction",),
+        )
+        for name, title in (("slip", "Where the joint slips"), ("open", "Where the joint opens"))
+    ),
+    Entry(
+        "pair_numbers", "Numbers of the contact pairs", contact.draw_numbers, (WEAR, MISSIONS, MODES), scene=OF_PAIRS
+    ),
+    Entry(
+        "natural_frequencies",
+        "Sector and its natural frequencies, joint stuck",
+        sector.draw_sector,
+        scene=sector.OF_SECTOR,
+        always=True,
+    ),
+    Entry("outcome_map", "How the points ended", outcome.draw_outcomes, (WEAR, MISSIONS, MODES), always=True),
+    Entry("certificates", "Certificates: how right the states are (table)", outcome.list_certificates),
+    Entry("precision", "Error against run time", precision.draw_precision, **_WEAR),
 )
 """The figures of all results."""
 
@@ -135,9 +169,7 @@ def draw_report(result: Result) -> Iterator[Item]:
     has_results = bool(result.held.any())
     for entry in FIGURES:
         if kind in entry.kinds and (has_results or entry.always):
-            # the style is that of the whole process: it is not left on while the caller has the word
-            with style():
-                item = entry.make(result)
+            item = entry.make(result)
             if item is not None:
                 yield item
     if not has_results:
@@ -147,5 +179,6 @@ def draw_report(result: Result) -> Iterator[Item]:
 def list_figures() -> str:
     """The table of figures for the page REPORT."""
     only: dict[tuple[str, ...], str] = {(MISSIONS,): f" ({MISSIONS})", (MODES,): f" ({MODES})"}
-    rows = [f"| `{entry.name}` | {entry.shows}{only.get(entry.kinds, '')} |" for entry in FIGURES]
+    named = ((entry, entry.title.format(slow="cycles", over="frequency")) for entry in FIGURES)
+    rows = [f"| `{entry.name}` | {title}{only.get(entry.kinds, '')} |" for entry, title in named]
     return "\n".join(("| file | shows |", "|---|---|", *rows))

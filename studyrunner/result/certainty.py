@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -103,7 +102,10 @@ def _certainty(result: Result, of: str, errors: NDArray[np.float64]) -> Certaint
         place = tuple(int(index) for index in np.unravel_index(int(np.argmax(order)), order.shape))
         worst, where = float(errors[place]), result.describe(result.point_at(place)) if result.varying else ""
         if above.any():
-            found = advise_volume(result, place) if of == "worn volume" else "set a smaller solver.rtol"
+            found = "set a smaller solver.rtol"
+            if of == "worn volume":
+                rates = result.at("wear_rate_error", result.point_at(place)) if result.has("wear_rate_error") else ()
+                found = advise_error(worst, np.asarray(rates).tolist(), settings_of(result, place))
             advice = f"for {show_rtol(float(result.rtol[place]))} {found}"
     n_known, n_less = (int(np.count_nonzero(each)) for each in (within, above))
     rtol = float(several[0]) if several.size == 1 else math.nan
@@ -134,13 +136,10 @@ def describe_ended(result: Result, number: int) -> list[str]:
         place = tuple(index.tolist())
         said = "" if messages is None else str(messages[place])
         if result.held[place] and result.counted[:-1] not in said:
-            error = float(result.errors[place])
-            end = (
-                ""
-                if result.computed[place]
-                else f"computed up to {show_cycles(float(result.last_cycle[place]), result.counted)}"
-            )
-            known = f"worn volume known within {show_error(result, place)}" if 0.0 < error <= WELL_ENOUGH else ""
+            last = show_cycles(float(result.last_cycle[place]), result.counted)
+            end = "" if result.computed[place] else f"computed up to {last}"
+            is_known = 0.0 < result.errors[place] <= WELL_ENOUGH
+            known = f"worn volume known within {show_error(result, place)}" if is_known else ""
             said = ", ".join(filter(None, (end, known, said)))
         where = result.describe(result.point_at(place))
         lines += [f"{where}: {said}"] if said else []
@@ -155,42 +154,30 @@ def advise_ended(result: Result, number: int) -> list[str]:
     # advice depends on a few axes: one point for each of their values
     axes = [place for place, name in enumerate(result.axes) if name in _OF_ADVICE]
     _, first = np.unique(found[:, axes], axis=0, return_index=True)
-    texts = [advise_point(result, tuple(found[row].tolist())) for row in sorted(first.tolist())]
-    return [text for text in dict.fromkeys(texts) if text]
-
-
-def advise_point(result: Result, place: tuple[int, ...]) -> str:
-    """Advice for a point whose outcome is not `converged`; empty where there is none."""
-    ending = result.endings[int(result.dataset["outcome"].values[place])]
-    return advise(ending.word, settings_of(result, place))
-
-
-def advise_volume(result: Result, place: tuple[int, ...]) -> str:
-    """What would make the error of the worn volume of a point smaller, in a few words."""
-    rates: list[float] = []
-    if result.has("wear_rate_error"):
-        rates = result.at("wear_rate_error", result.point_at(place)).values.tolist()
-    return advise_error(float(result.errors[place]), rates, settings_of(result, place))
+    word, places = result.endings[number].word, (tuple(found[row].tolist()) for row in sorted(first.tolist()))
+    return [text for text in dict.fromkeys(advise(word, settings_of(result, place)) for place in places) if text]
 
 
 def settings_of(result: Result, place: tuple[int, ...]) -> Used:
     """Settings of a point, as far as the file tells."""
-    dataset, point = result.dataset, result.point_at(place)
-    solver: Mapping[str, Any] = result.study.get("solver", {})
-    slow_time: Mapping[str, Any] = result.study.get("slow_time", {})
+    dataset, point, solver = result.dataset, result.point_at(place), result.study.get("solver", {})
+    slow_time = result.study.get("slow_time", {})
 
     def of(key: str) -> Any:
         return dataset[key].values[point[key]] if key in point else solver.get(key, _AUTO)
 
+    def number(key: str) -> int | str:
+        return _AUTO if str(of(key)) == _AUTO else int(float(of(key)))
+
     def words(key: str) -> tuple[str, ...]:
-        return tuple(str(word) for word in dataset[key].values) if key in point else ()
+        return tuple(map(str, dataset[key].values)) if key in point else ()
 
     return Used(
         # missions and modes have neither step nor scheme, and what they take of their own controls its error
         scheme=str(of("scheme")) if "scheme" in point else "adaptive",
         sweep=str(of("sweep")),
-        harmonics=_AUTO if str(of("harmonics")) == _AUTO else int(float(of("harmonics"))),
-        samples=_AUTO if str(of("samples")) == _AUTO else int(float(of("samples"))),
+        harmonics=number("harmonics"),
+        samples=number("samples"),
         rtol=float(result.rtol[place]),
         schemes=words("scheme"),
         sweeps=words("sweep"),

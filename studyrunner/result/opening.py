@@ -26,6 +26,9 @@ from studyrunner.study.toml_text import NoTomlError, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, KEPT, LOOPS, Variable
 
+ENDED = "ended"
+"""Coordinate of an opened result: `outcome` in words."""
+
 _MOST_POINTS = 10**6
 _MOST_VALUES = 2**27  # of a variable without contact pairs, which may be read as a whole
 _MOST_NAMES = 2**20  # values along any dimension
@@ -34,11 +37,7 @@ _LARGEST_NUMBER = 1e30
 _INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", *CERTIFICATE)
 """Ends of the names of variables that may be infinite: errors that are not known, what comes after any cycle."""
 _LONGEST_NAME, _LONGEST_SENTENCE = 120, 400
-_DEEPEST, _INTEGERS = 3, 2.0**63  # of what is nested in a study
 _REMEDY = "give a result file of run-study that is whole"
-
-ENDED = "ended"
-"""Coordinate of an opened result: `outcome` in words."""
 
 _WITHOUT_AXES = SCENE["mesh"] | SCENE["natural_frequency"] | {"stuck_frequency": STUCK_FREQUENCY}
 _OF_CONTACTS = {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
@@ -90,7 +89,7 @@ def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
     words = dict(zip(numbers, str(outcome.attrs.get("flag_meanings", "")).split(), strict=False))
     named = [words.get(number, f"outcome_{number}") for number in outcome.values.ravel().tolist()]
     found = outcome.copy(data=np.array(named, dtype=np.str_).reshape(outcome.shape)).drop_attrs(deep=False)
-    return found.assign_attrs(long_name="how the computation of the point ended, in a word")
+    return found.assign_attrs(units="1", long_name="how the computation of the point ended, in a word")
 
 
 def open_known(path: str | Path) -> xr.Dataset:
@@ -168,7 +167,7 @@ def check_numbers(dataset: xr.Dataset, source: str) -> None:
 
 
 def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
-    """The effective study of a file, by table; empty where it is no TOML. Very deeply nested values are left out.
+    """The effective study of a file, by table; empty where it is no TOML.
 
     Raises UserError where the study is no text in UTF-8, too long, or nested too deeply.
     """
@@ -178,7 +177,7 @@ def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str
         return {}
     except UserError as error:
         raise UserError(source, "the attribute study", None, error.remedy) from None
-    return {name: found for name, table in tables.items() if isinstance(found := _plain(table, _DEEPEST), dict)}
+    return {name: table for name, table in tables.items() if isinstance(table, dict)}
 
 
 def _need(right: object, name: str, found: str) -> None:
@@ -311,16 +310,3 @@ def _line(value: object, longest: int) -> str:
     text = value.decode("utf-8", "backslashreplace") if isinstance(value, bytes) else str(value)
     text = show_text(" ".join(text[: 2 * longest].split()))
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
-
-
-def _plain(value: object, deepest: int) -> object:
-    """A value of a study for text and arithmetic; None where it is nested too deeply."""
-    if isinstance(value, dict | list) and deepest == 0:
-        return None
-    if isinstance(value, dict):
-        return {_line(name, _LONGEST_NAME): _plain(item, deepest - 1) for name, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item, deepest - 1) for item in value]
-    if isinstance(value, int) and abs(value) >= _INTEGERS:
-        return math.copysign(math.inf, value)
-    return value if isinstance(value, bool | int | float) else _line(value, _LONGEST_NAME)

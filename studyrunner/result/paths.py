@@ -27,7 +27,13 @@ def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
         str(target).encode(sys.getfilesystemencoding())
         remedy = _obstacle(option, path, target, inputs)
         if not remedy:
-            try_to_create(target)
+            trial = new_partial(target)
+            with create(trial) as file:
+                try:
+                    file.write(_TRIAL)
+                    sync(file)
+                finally:
+                    trial.unlink()
     except OSError as error:
         remedy = f"give a file that can be written: {error.strerror}"
     except ValueError:
@@ -65,17 +71,6 @@ def _is_stream(target: Path) -> bool:
             if os.path.samestat(target.stat(), os.fstat(number)):
                 return True
     return False
-
-
-def try_to_create(path: Path) -> None:
-    """Creates a file beside `path`, writes to it and removes it. Raises OSError."""
-    trial = new_partial(path)
-    with create(trial) as file:
-        try:
-            file.write(_TRIAL)
-            sync(file)
-        finally:
-            trial.unlink()
 
 
 def remove_leftovers(path: Path) -> None:

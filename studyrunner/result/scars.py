@@ -20,7 +20,6 @@ _MIRRORED = {"cylinder_on_flat": 1, "sphere_on_flat": 2}
 
 _UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 _HEADER = re.compile(r"\s*(x|depth)\s*[_(\[ ]\s*(m|mm|um|µm)\s*[)\]]?\s*", re.IGNORECASE)
-_MOST_BYTES = 20_000_000
 
 
 @dataclass(frozen=True)
@@ -68,8 +67,6 @@ class Profile:
 def read_profile(path: Path) -> Profile:
     """The profile in a CSV file: a header such as `x_mm,depth_um`, then a row for each position. Raises UserError."""
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise UserError(str(path), "the file", None, f"give a file of at most {_MOST_BYTES // 10**6} MB")
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(str(path), "the file", None, f"give a CSV file that can be read: {error}") from None

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,34 @@ from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.result.view import Point, Result
 
 EXISTS = "contact_exists"
+NO_DEPTH = 1e-15
+"""Wear depth, m, below which it is round-off: far less than an atom."""
+
 OF_PAIRS = (*(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)), *SCENE["mesh"])
 """Variables that say where the pairs are."""
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """The contact pairs of one point. position (n, 3): m, and area (n,): m2, NaN where the file has none. surface (n,):
+    labels, "contact" where the file has none.
+    """
+
+    position: NDArray[np.float64]
+    area: NDArray[np.float64]
+    surface: NDArray[np.str_]
+
+
+def contact_pairs(result: Result, point: Point) -> Pairs:
+    """Where the pairs of a point are."""
+
+    def read(name: str, missing: object) -> NDArray[Any]:
+        found = result.at(name, point).values if result.has(name) else missing
+        return np.broadcast_to(np.asarray(found), (result.dataset.sizes["contact"],))
+
+    position = np.stack([read(f"contact_{axis}", np.nan) for axis in "xyz"], axis=1).astype(float)
+    surface = read("contact_surface", "contact").astype(np.str_)
+    return Pairs(position, read("contact_area", np.nan).astype(float), surface)
 
 
 def axes_of_scenes(result: Result, names: Collection[str] = OF_PAIRS) -> tuple[str, ...]:

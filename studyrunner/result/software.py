@@ -1,39 +1,24 @@
-"""Software of a result: address of publication and commit. What is not known, or cannot be found, is left out.
+"""Commit of the software that computes a result, in its checkout; left out where it is not known.
 
 By hand: `setuptools-scm` knows the commit of the installation, not of the checkout that runs.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
-from importlib import metadata
 from pathlib import Path
 
 CHANGED = " with local changes"
 """End of the text of a commit with changed files."""
 
-_PUBLISHED_AS = ("repository", "source", "source code", "homepage", "documentation")
 _SECONDS_FOR_GIT = 5.0
 
 
-def describe_software(name: str) -> dict[str, str]:
-    """Attributes `software_url` and `software_commit` of a result, of the distribution of this name."""
-    labelled = {}
-    for line in metadata.metadata(name).get_all("Project-URL") or []:
-        label, _, url = line.partition(",")
-        labelled[label.strip().lower()] = url.strip()
-    try:
-        # of a package that was installed from a repository (PEP 610)
-        commit = json.loads(metadata.distribution(name).read_text("direct_url.json") or "{}")["vcs_info"]["commit_id"]
-    except (ValueError, TypeError, KeyError):
-        commit = ""
-    # the checkout that the code is run from, if it is one; else what was installed
-    commit = commit_of(Path(__file__).parents[2]) or commit
-    found = {"software_url": next((labelled[label] for label in _PUBLISHED_AS if label in labelled), "")}
-    found |= {"software_commit": commit if isinstance(commit, str) else ""}
-    return {key: text for key, text in found.items() if text}
+def describe_software() -> dict[str, str]:
+    """Attribute `software_commit` of a result; none where the code runs from no checkout."""
+    commit = commit_of(Path(__file__).parents[2])
+    return {"software_commit": commit} if commit else {}
 
 
 def commit_of(folder: Path) -> str:

@@ -170,6 +170,8 @@ def axes_of_difference(
 
     keys: of each scene, equal where the scenes are equal in it.
     """
+    if len(set(keys)) == 1:
+        return (), np.array(0)
     first: dict[Hashable, int] = {}
     alike = np.array([first.setdefault(key, number) for number, key in enumerate(keys)])
     numbers = alike[list(scenes.numbers)].reshape([len(values) for values in study.axes_of_parts.values()])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import get_args
+from typing import Any, get_args
 
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter.section import OF_PAIRS
@@ -17,6 +17,7 @@ from studyrunner.study.realisation import is_of_pairs
 from studyrunner.study.sections import AUTO, DEFAULT, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.values import Wrong
+from studyrunner.variables import KEPT
 
 _MOST_POINTS = 1_000_000
 
@@ -88,7 +89,8 @@ def _followed(study: Study) -> str | None:
     """What the frequency follows, also before the study is complete."""
     if study.follow is not None:
         return study.follow.of
-    return next((str(each) for each in study.axes.frequency or () if isinstance(each, str)), None)
+    given: tuple[Any, ...] = study.axes.frequency or ()
+    return next((each for each in given if isinstance(each, str)), None)
 
 
 def size_of_result(study: Study) -> Iterator[Wrong]:
@@ -108,7 +110,7 @@ def _variables(study: Study) -> Iterator[Wrong]:
     """Variables are of the kind of study and of the scene."""
     known = dict.fromkeys((*study.variables, *(name for name in SCENE if name != "exact" or study.kind is WEAR)))
     for name in study.outputs.variables:
-        if name not in (DEFAULT, *known):
+        if name not in (DEFAULT, *KEPT, *known):
             remedy = f"give names out of {', '.join(known)}: {study.kind.name} do not have it"
             yield Wrong("outputs.variables", name, remedy)
         elif name in ("mesh", "exact") and name not in study.scene.offers:

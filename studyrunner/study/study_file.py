@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter.section import flat_table
-from studyrunner.study.kinds import MISSIONS, MODES
+from studyrunner.study.kinds import MODES
 from studyrunner.study.mission import OWN_AXES, MissionBlock, check_used_axes, engine_frequency, read_blocks
 from studyrunner.study.mistakes import Mistakes, check_table, close_name, nearest_name
 from studyrunner.study.overrides import override
@@ -112,10 +112,13 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     tables = _known_tables(table, found)
     _take_worn(tables, origin, found)
     axes, blocks = _axes_and_blocks(tables, origin, found)
+    sections = _check_sections(tables, origin, found)
+    if blocks or "mission" not in tables:
+        sections["mission"] = blocks
     parts, renamed = [], keys_below_axes(axes)
     for part in combinations(tables, axes):
         with found.collecting(renamed):
-            checked = _check_part(part, origin, blocks, found)
+            checked = _check_part(part, sections, origin, found)
             parts.append(checked if found else _complete(checked))
     found.raise_any(table)
     study = parts[0]
@@ -191,38 +194,56 @@ def _axes_and_blocks(
     return (*axes, *worn_axis(tables["scene"].get("worn", {}), name)), blocks
 
 
-def _check_part(tables: Tables, origin: Origin, blocks: tuple[MissionBlock, ...], before: Mistakes) -> Study:
-    """A study without axes that are keys of [scene] or [wear], of tables that are right. Raises UserError.
+def _check_sections(tables: Tables, origin: Origin, found: Mistakes) -> dict[str, Any]:
+    """The tables but [scene] and [wear], which differ along axes: those that are right."""
+    if any(each in FOLLOWED for each in listed(tables["axes"].get("frequency"))):
+        tables.setdefault("loading", {})
+    scene, sections = _scene_kind(tables, origin), {}
+    for name, kind in SECTIONS.items():
+        if name in tables and name not in found and name != "wear":
+            others = (*scene.model_fields, *WearSection.AXES) if scene and name == "axes" else ()
+            with found.collecting():
+                sections[name] = check_table(kind, tables[name], origin.source, name, others)
+    return sections
 
-    before: mistakes because of which tables are missing.
+
+def _check_part(tables: Tables, sections: Mapping[str, Any], origin: Origin, before: Mistakes) -> Study:
+    """A study without axes that are keys of [scene] or [wear]. Raises UserError.
+
+    sections: its other tables that are right. before: mistakes because of which tables are missing.
     """
-    found, tables = Mistakes(origin.source), dict(tables)
-    parts: dict[str, Any] = {"source": origin.source, "folder": origin.path.parent, "archived": origin.archived}
+    found, parts = Mistakes(origin.source), dict(sections)
     if "scene" not in before:
         with found.collecting():
             parts["scene"] = check_scene(tables["scene"], origin)
-    if "mission" not in tables or (of_blocks := _block_studies(tables, blocks, origin, before, found)):
-        parts |= {"mission": blocks, "block_studies": of_blocks if "mission" in tables else ()}
-    if _follows(tables):
-        tables.setdefault("loading", {})
-    scene = _scene_kind(tables, origin)
-    for name, kind in SECTIONS.items():
-        if name in tables and name not in before:
-            others = (*scene.model_fields, *WearSection.AXES) if scene and name == "axes" else ()
-            with found.collecting():
-                parts[name] = check_table(kind, tables[name], origin.source, name, others)
-    study = Study.model_construct(**parts)
+    with found.collecting():
+        parts["wear"] = check_table(WearSection, tables["wear"], origin.source, "wear")
+    study = Study.model_construct(**parts, source=origin.source, folder=origin.path.parent, archived=origin.archived)
     wrong = [name for name in (*tables, "mission") if name not in parts]
     for name in wrong:
         # a rule that asks for it is left out
         vars(study).pop(name, None)
     check_rules(study, found, complete=not wrong)
+    if sections.get("mission") and "axes" in parts:
+        study = _with_block_studies(study, tables["scene"], origin, found)
     found.raise_any()
     return study
 
 
-def _follows(tables: Tables) -> bool:
-    return any(each in FOLLOWED for each in listed(tables["axes"].get("frequency")))
+def _with_block_studies(study: Study, scene: Mapping[str, Any], origin: Origin, found: Mistakes) -> Study:
+    """The study with a study of each block alone. scene: table of the study."""
+    studies = []
+    for block in study.mission:
+        own = {name: (getattr(block, name),) for name in OWN_AXES if isinstance(getattr(block, name), float)}
+        update: dict[str, Any] = {"mission": (), "slow_time": SlowTimeSection()}
+        with found.collecting({f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}):
+            update["scene"] = check_scene({**scene, **block.parameters}, origin)
+            if block.engine_order is not None:
+                own["frequency"] = (engine_frequency(block, update["scene"].parameters, origin.source),)
+        axes = {"frequency": study.axes.frequency or (_IDLE_FREQUENCY,), **own}
+        update["axes"] = study.axes.model_copy(update=axes)
+        studies.append(study.model_copy(update=update))
+    return study.model_copy(update={"block_studies": tuple(studies)})
 
 
 def _complete(study: Study) -> Study:
@@ -246,30 +267,6 @@ def _complete(study: Study) -> Study:
     update |= {"slow_time": SlowTimeSection(cycles=0.0)} if kind is MODES else {}
     update["block_studies"] = tuple(each.model_copy(update={"outputs": outputs}) for each in study.block_studies)
     return with_room_for_wear(study.model_copy(update=update))
-
-
-def _block_studies(
-    tables: Tables, blocks: Sequence[MissionBlock], origin: Origin, before: Mistakes, found: Mistakes
-) -> tuple[Study, ...]:
-    """For each block a study of this block alone; none where a parameter of a block is wrong."""
-    studies: list[Study] = []
-    for block in blocks:
-        own = {name: getattr(block, name) for name in OWN_AXES if isinstance(getattr(block, name), float)}
-        alone = {name: table for name, table in tables.items() if name not in ("mission", "loading")}
-        alone["scene"] = {**tables["scene"], **block.parameters}
-        unused = (*MISSIONS.unused["axes"], *(["frequency"] if _follows(tables) else []))
-        given = {key: value for key, value in tables["axes"].items() if key not in unused}
-        alone["axes"] = {"frequency": _IDLE_FREQUENCY, **given, **own}
-        alone["slow_time"] = {}
-        alone["outputs"] = {key: value for key, value in tables["outputs"].items() if key == "scene"}
-        renamed = {f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}
-        with found.collecting(renamed):
-            study = _check_part(alone, origin, (), before)
-            if block.engine_order is not None:
-                frequency = engine_frequency(block, study.scene.parameters, origin.source)
-                study = study.model_copy(update={"axes": study.axes.model_copy(update={"frequency": (frequency,)})})
-            studies.append(study)
-    return tuple(studies) if len(studies) == len(blocks) else ()
 
 
 def format_study(study: Study) -> str:

@@ -6,6 +6,7 @@ a history that was not computed to the end, or is known to a factor of two only,
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +17,11 @@ from numpy.typing import NDArray
 
 from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, describe_ended
 from studyrunner.result.points import COMPLETE_WORDS
+from studyrunner.result.scene_pairs import contact_pairs
 from studyrunner.result.units import show_number
 from studyrunner.result.view import Result, as_history
 from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.sentence import describe_ranking, describe_volumes
-from studyrunner.summary.doubts import doubts
 from studyrunner.summary.wear import (
     Life,
     MeshChange,
@@ -33,6 +34,9 @@ from studyrunner.summary.wear import (
     vibration_of,
     where_is,
 )
+
+SMALL = 0.1
+"""Largest depth over the width of the contact that is called small: slopes and stiffness change by that order."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +119,7 @@ def summarise(result: Result) -> Summary:
         shortest_life(result),
         compare_meshes(result),
         stuck_frequency=result.stuck_frequency,
-        doubts=doubts(result),
+        doubts=tuple(filter(None, (_not_small(result), _in_radians(result)))),
     )
 
 
@@ -133,26 +137,23 @@ def _samples(result: Result) -> Samples | None:
 
 
 def _modes(result: Result) -> tuple[ModeRange, ...]:
+    numbers = [name for name in result.varying if name != "mode" and result.dataset[name].dtype.kind in "iuf"]
+    ends = {name: (show_number(float(result.dataset[name].values[place])) for place in (0, -1)) for name in numbers}
+    over = ", ".join(f"{name.replace('_', ' ')} {' to '.join(each)}" for name, each in ends.items())
     place, found = result.axes.index("mode"), []
-    ends = ((name, result.dataset[name].values) for name in result.varying if name != "mode")
-    over = ", ".join(
-        f"{name.replace('_', ' ')} {' to '.join(show_number(float(each)) for each in (values[0], values[-1]))}"
-        for name, values in ends
-        if values.dtype.kind in "iuf"
-    )
     for index, number in enumerate(result.dataset["mode"].values.tolist()):
-        computed = np.asarray(result.computed.take(index, axis=place))
-        frequency, damping = (_ends(result, name, index, computed) for name in ("natural_frequency", "damping_ratio"))
+        computed = result.computed.take(index, axis=place)
+        frequency, damping = (
+            _ends(result.read(name).values.take(index, axis=place)[computed] if result.has(name) else np.zeros(0))
+            for name in ("natural_frequency", "damping_ratio")
+        )
         found.append(ModeRange(int(number), over, frequency, damping, int(computed.sum()), computed.size))
     return tuple(found)
 
 
-def _ends(result: Result, name: str, mode: int, computed: NDArray[np.bool_]) -> tuple[float, float]:
-    """Smallest and largest value over the computed points of a mode."""
-    if not result.has(name) or not computed.any():
-        return np.nan, np.nan
-    values = result.read(name).values.take(mode, axis=result.axes.index("mode"))[computed]
-    return float(values.min()), float(values.max())
+def _ends(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Smallest and largest value; NaN where there are none."""
+    return (float(values.min()), float(values.max())) if values.size else (np.nan, np.nan)
 
 
 def _failures(result: Result) -> tuple[Failure, ...]:
@@ -173,3 +174,37 @@ def _failures(result: Result) -> tuple[Failure, ...]:
         found.append(Failure(ending.word, is_complete, n_points, first, advice, lines[0]))
     found.sort(key=lambda each: (each.is_complete, -each.n_points))
     return tuple(found)
+
+
+def _not_small(result: Result) -> str:
+    """Where wear is not small against the contact, as the method assumes.
+
+    The reference takes the depth of the wear for "very small compared with the dimension of the structures in contact",
+    so that mass, stiffness and the places of the pairs stay as they were designed. The width is the side of a square as
+    large as the smallest contact surface.
+    """
+    pairs = contact_pairs(result, result.shown_point())
+    areas = [float(np.nansum(pairs.area[pairs.surface == surface])) for surface in np.unique(pairs.surface)]
+    width = math.sqrt(min((area for area in areas if area > 0.0), default=math.inf))
+    if not result.has("largest_wear_depth"):
+        return ""
+    ratios = np.where(result.computed, result.read("largest_wear_depth").values, 0.0) / width
+    largest = np.nanmax(np.nan_to_num(ratios))
+    if largest <= SMALL:
+        return ""
+    point = result.point_at(np.unravel_index(int(np.nanargmax(ratios)), ratios.shape))
+    return (
+        f"the method assumes shallow wear, but the depth is {largest:.2g} of the contact width at"
+        f" {result.describe(point)}: take fewer cycles, and check that wear_coefficient is in 1/Pa"
+    )
+
+
+def _in_radians(result: Result) -> str:
+    """Frequencies that are all far above the first resonance, and near it if they are in rad/s."""
+    first = result.stuck_frequency
+    if math.isnan(first) or "frequency" not in result.axes:
+        return ""
+    values = result.dataset["frequency"].values / (2.0 * math.pi)
+    if not (2.0 * math.pi * values.min() > 2.0 * first and 0.5 * first < values.max() and values.min() < 2.0 * first):
+        return ""
+    return f"all frequencies are far above the first resonance, {first:.6g} Hz: are they in rad/s?"

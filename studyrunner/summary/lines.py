@@ -14,7 +14,7 @@ MOST_LINES = 9
 _MOST_FAILURES, _MOST_MODES, _MOST_DOUBTS = 2, 4, 1
 _WIDTH, _LONGEST = 12, 160
 _LEAST = 1e-4  # relative error that is told, of any smaller one
-_PLAIN = str.maketrans({"³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
+_PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 _SHARE = 0.5
 """Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
 
@@ -37,10 +37,11 @@ def summary_rows(summary: Summary) -> tuple[tuple[str, str], ...]:
     elif summary.certainty is not None and summary.certainty.of == "worn volume":
         rows.append(("wear", "no worn volume is known within 50 %"))
     if isinstance(wear, MostWear):
-        at = f" in the sample that wears most, {wear.where}" if summary.samples is not None else ""
+        at = f" in the sample that wears most ({wear.where})" if summary.samples is not None else ""
         rows.append(("deepest", _deepest(wear.deepest, at)))
         if wear.blocks:
-            rows.append(("blocks", ", ".join(f"{name} {show_percent(share)}" for name, share in wear.blocks)))
+            shares = ", ".join(f"{name} {show_percent(share)}" for name, share in wear.blocks)
+            rows.append(("blocks", f"share of the wear: {shares}"))
     if summary.vibration is not None:
         rows.append(_vibration(summary.vibration, summary))
     rows += [(f"mode {mode.number}", _mode(mode)) for mode in summary.modes[:_MOST_MODES]]
@@ -65,11 +66,11 @@ def _count(value: float, summary: Summary) -> str:
 
 
 def show_known(number: Number, units: str, unknown: str = " (error not known)") -> str:
-    """A number with its error: "1.52 mm3 +- 1.3 %"."""
+    """A number with its error: "1.52 mm3 ± 1.3 %"."""
     text = scale_for(units, number.value).show(number.value)
     if math.isnan(number.error):
         return f"{text}{unknown}"
-    return f"{text} +- {show_percent(max(number.error / number.value, _LEAST))}" if number.value > 0.0 else text
+    return f"{text} ± {show_percent(max(number.error / number.value, _LEAST))}" if number.value > 0.0 else text
 
 
 def _most(wear: MostWear, summary: Summary) -> str:
@@ -114,7 +115,7 @@ def _nothing(wear: NothingWore, summary: Summary) -> str:
     elif wear.largest_slip > 0.0:
         why = f": pairs slip by up to {scale_for('m', wear.largest_slip).show(wear.largest_slip)} without wear"
     stuck = f" (first resonance {summary.stuck_frequency:.4g} Hz)" if math.isfinite(summary.stuck_frequency) else ""
-    return f"nothing wore{why} at {wear.where}{stuck}"
+    return f"nothing wore{why} {wear.where}{stuck}"
 
 
 def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
@@ -125,11 +126,11 @@ def _vibration(vibration: Vibration, summary: Summary) -> tuple[str, str]:
     )
     start, end = vibration.frequency
     worn = isinstance(summary.wear, MostWear)
-    at = f" at {vibration.where}" if vibration.where else ""
+    at = f", most at {vibration.where}" if summary.n_points > 1 else ""
     if worn:
-        at = " in that sample" if summary.samples else " at the same point" if summary.n_points > 1 else ""
+        at = " in that sample" if summary.samples else " in this case" if summary.n_points > 1 else ""
     if vibration.followed:
-        known = "" if math.isnan(end.error) else f" +- {end.error:.2g}"
+        known = "" if math.isnan(end.error) else f" ± {end.error:.2g}"
         moved = f"moved from {start:.6g} to {end.value:.6g}{known} Hz" if worn else f"at {start:.6g} Hz"
         return vibration.followed, f"{moved}, response of {vibration.of} {f'{first} to {last}' if worn else first}"
     text = f"{vibration.of}{at}: {first}"
@@ -151,7 +152,7 @@ def _life(life: Life, summary: Summary) -> str:
         return f"no {'other ' if unsure else ''}point computed to the end reaches {target}{unsure}"
     known = "(error not known)"
     if math.isfinite(life.count.error):
-        known = f"+- {show_percent(life.count.error / life.count.value)}"
+        known = f"± {show_percent(life.count.error / life.count.value)}"
     text = f"{_count(round(life.count.value), summary)} {known} to {target}"
     text += f" at {life.where} (the shortest life)" if life.where and summary.n_points > 1 else ""
     verb = "does" if life.n_beyond == 1 else "do"

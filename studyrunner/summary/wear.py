@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from studyrunner.result.points import WELL_ENOUGH
-from studyrunner.result.scene_pairs import last_depth, tells_depth
+from studyrunner.result.scene_pairs import contact_pairs, last_depth, tells_depth
 from studyrunner.result.view import NO_VOLUME, Result
 
 _NO_SLIP = 1e-12  # m, round-off: less than the size of an atom
@@ -55,7 +55,7 @@ class NothingWore:
     """No point that was computed to the end wears."""
 
     largest_slip: float  # m, of any pair, 0 where all stick; NaN where the file does not say
-    where: str  # these points in words, as "212 Hz" or "all 3 frequencies"
+    where: str  # these points in words, as "at 212 Hz" or "at all 3 frequencies"
 
 
 @dataclass(frozen=True)
@@ -138,19 +138,18 @@ def _deepest(result: Result, point: dict[str, int], at: int) -> Deepest:
         error = float(result.at("wear_depth_error", point, at).values[pair])
     elif result.has("wear_depth_max_error"):
         error = float(result.at("wear_depth_max_error", point, at).values)
-    names = [str(name) for name in result.dataset.coords if str(name).startswith("contact_")]
-    found = {name: result.at(name, point).values for name in names}
-    surface, area = found.get("contact_surface"), found.get("contact_area")
-    share = of_area = math.nan
-    if surface is not None and area is not None and "contact_edge" in found:
-        own, edge = surface == surface[pair], found["contact_edge"] != 0
+    pairs, share, of_area = contact_pairs(result, point), math.nan, math.nan
+    if result.has("contact_surface", "contact_area", "contact_edge"):
+        own, edge = pairs.surface == pairs.surface[pair], result.at("contact_edge", point).values != 0
         if edge[own].any() and depth[own].any():
-            share, of_area = (float(each[own & edge].sum() / each[own].sum()) for each in (depth * area, area))
+            share, of_area = (
+                float(each[own & edge].sum() / each[own].sum()) for each in (depth * pairs.area, pairs.area)
+            )
     return Deepest(
         Number(float(depth[pair]), error),
         int(result.dataset["contact"].values[pair]),
-        "" if surface is None else str(surface[pair]),
-        tuple(float(found[f"contact_{axis}"][pair]) if f"contact_{axis}" in found else math.nan for axis in "xyz"),
+        str(pairs.surface[pair]) if result.has("contact_surface") else "",
+        tuple(pairs.position[pair].tolist()),
         share,
         of_area,
     )
@@ -175,9 +174,13 @@ def _all_points(result: Result) -> str:
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
     one = result.varying[0] if len(result.varying) == 1 else ""
     words = {"frequency": "frequencies", "sample": "samples"}.get(one, "points")
+    at = "in" if words == "samples" else "at"
     if n_computed < n_points:
-        return f"{n_computed} of {n_points} {words}, the others have no result"
-    return f"all {n_points} {words}" if n_points > 1 else where_is(result, result.shown_point()) or "the only point"
+        return f"{at} {n_computed} of {n_points} {words}, the others have no result"
+    if n_points > 1:
+        return f"{at} all {n_points} {words}"
+    where = where_is(result, result.shown_point())
+    return f"at {where}" if where else "at the only point"
 
 
 def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibration | None:

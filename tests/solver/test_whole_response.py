@@ -151,28 +151,6 @@ def test_both_parameters_lead_to_the_same_states():
 
 
 @pytest.mark.slow
-def test_on_unstable_branches_as_well():
-    """Over the amplitude the unstable branch passes the one over the frequency at 0.02 N."""
-    model, settings = scene("vibro_impact"), SolverSettings(harmonics=7, samples=128)
-    frequency = response_curve(model, (0.215, 0.26), 0.02, 0.0, settings=settings, errors=False)
-    amplitude = response_curve(model, 0.24, (0.02, 0.14), 0.0, settings=settings, errors=False)
-    seen = [crossings(frequency, frequency.frequency, 0.24), crossings(amplitude, amplitude.excitation_amplitude, 0.02)]
-    # both begin or end at the branch without impacts
-    np.testing.assert_allclose(sorted(seen[0]), sorted(seen[1]), rtol=1e-3)
-    assert len(seen[0]) == 3
-
-
-def crossings(curve, parameter, value):
-    """Responses at which a curve passes a value of its parameter, by cubic interpolation."""
-    passed = np.flatnonzero((parameter[:-1] - value) * (parameter[1:] - value) <= 0.0)
-    found = []
-    for at in passed.tolist():
-        near = slice(max(at - 1, 0), at + 3)
-        found.append(float(np.polyfit(parameter[near] - value, abs(curve.response[near, 0]), 3 if at else 2)[-1]))
-    return found
-
-
-@pytest.mark.slow
 def test_a_joint_that_bounces_doubles_its_period():
     curve = response_curve(scene("vibro_impact"), (0.146, 0.148), 0.02, 0.0, settings=SETTINGS, errors=False)
     assert curve.stability == ()

@@ -7,8 +7,7 @@ import pytest
 import xarray as xr
 
 from studyrunner.cli import main
-from studyrunner.report.drawing import Drawing
-from studyrunner.report.figures.history import draw_excitation
+from studyrunner.report.figures.wear import draw_excitation
 from studyrunner.result.view import Result
 from studyrunner.study.study_file import format_study, read_study
 from tests.studyrunner.test_scene_axes import arguments, compute
@@ -73,14 +72,13 @@ def test_every_point_without_a_resonance_says_why(capsys):
 def test_the_report_draws_the_frequency_over_cycles():
     found = computed("drawn.nc")
     result = Result(Path("drawn.nc"), found)
-    drawing = draw_excitation(result)
-    assert isinstance(drawing, Drawing)
-    lines = drawing.figure.axes[0].get_lines()
+    figure, caption = draw_excitation(result)
+    lines = figure.axes[0].get_lines()
     followed = found.excitation_frequency.squeeze().values
     assert len(lines) == len(followed) == 2
     for line, expected in zip(lines, followed, strict=True):
         np.testing.assert_array_equal(line.get_ydata(), expected)
-    assert drawing.caption.startswith(f"The excitation follows the resonance: from {followed[0, 0]:.6g} to")
+    assert caption.startswith(f"The excitation follows the resonance: from {followed[0, 0]:.6g} to")
     # the middle of the range is no frequency of the point
     assert "205" not in result.describe(result.shown_point(), ["frequency"])
 

@@ -48,7 +48,7 @@ def result(study_file):
 
 
 def without_time(dataset):
-    return dataset.drop_vars("run_time").drop_attrs(deep=False)
+    return dataset.drop_vars(["run_time", "ended"]).drop_attrs(deep=False)
 
 
 def test_the_result_has_its_axes_and_the_values_of_the_solver(result):

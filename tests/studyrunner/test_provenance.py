@@ -1,8 +1,6 @@
-"""Commit and address of the software, and the date in a result: where they are known or asked for, and nothing else."""
+"""Commit of the software, and the date in a result: where they are known or asked for, and nothing else."""
 
-import json
 import subprocess
-from importlib import metadata
 from pathlib import Path
 
 import netCDF4
@@ -10,9 +8,8 @@ import pytest
 
 from studyrunner.api import run_study
 from studyrunner.cli import main
-from studyrunner.result import software
 from studyrunner.result.creation_date import check_date
-from studyrunner.result.software import CHANGED, commit_of, describe_software
+from studyrunner.result.software import CHANGED, commit_of
 from studyrunner.user_error import UserError
 from tests.studyrunner.faked_runs import SMALL
 
@@ -43,28 +40,6 @@ def test_the_commit_is_that_of_git(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("direct_url", "expected"),
-    [
-        (None, {}),
-        ("[1]", {}),
-        (json.dumps({"url": "file:///home/me", "dir_info": {"editable": True}}), {}),
-        (json.dumps({"url": "a", "vcs_info": {"commit_id": "a" * 40}}), {"software_commit": "a" * 40}),
-        (json.dumps({"url": 3, "vcs_info": {"commit_id": 4}}), {}),
-    ],
-)
-def test_a_package_from_a_repository_says_its_commit(direct_url, expected, tmp_path, monkeypatch):
-    about = tmp_path / "tool-1.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: tool\nVersion: 1\n", encoding="utf-8")
-    if direct_url is not None:
-        (about / "direct_url.json").write_text(direct_url, encoding="utf-8")
-    monkeypatch.setattr(metadata, "distribution", lambda _: metadata.Distribution.at(about))
-    monkeypatch.setattr(metadata, "metadata", lambda _: metadata.Distribution.at(about).metadata)
-    monkeypatch.setattr(software, "commit_of", lambda _: "")
-    assert describe_software("tool") == expected
-
-
-@pytest.mark.parametrize(
     ("given", "kept"),
     [
         ("20261123", "2026-11-23"),
@@ -91,13 +66,13 @@ def test_a_wrong_date_is_bad_input(wrong, capsys):
 
 @pytest.mark.usefixtures("folder")
 def test_date_and_software_stand_in_the_result_and_change_nothing_else(solver, monkeypatch):
-    there = {"software_url": "https://b.example/r", "software_commit": "b" * 40}
-    monkeypatch.setattr("studyrunner.run.describe_software", lambda _: {})
+    there = {"software_commit": "b" * 40}
+    monkeypatch.setattr("studyrunner.run.describe_software", dict)
     assert main(SMALL) == 0
     without, n_results = attributes(), solver.n_results
     solver.begin_again()
     # what is finished is known by the same hashes whatever the date and the commit
-    monkeypatch.setattr("studyrunner.run.describe_software", lambda _: there)
+    monkeypatch.setattr("studyrunner.run.describe_software", lambda: there)
     assert main([*SMALL, "--date=2026-11-23"]) == 0
     assert attributes() == without | there | {"date_created": "2026-11-23"}
     assert main([*SMALL, "--date"]) == 0

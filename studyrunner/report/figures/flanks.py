@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studyrunner.report.panels import FloatArray
 from studyrunner.result.grid import Grid, find_grid
+from studyrunner.result.scene_pairs import contact_pairs
 from studyrunner.result.view import Result
-
-FloatArray = NDArray[np.float64]
 
 JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
 """The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""
@@ -45,9 +45,9 @@ class Flank:
     surface: str
     pairs: NDArray[np.intp]
     area: FloatArray
-    cells: Cells | None
-    seen: FloatArray | None
-    directions: tuple[str, str]
+    cells: Cells | None = None
+    seen: FloatArray | None = None
+    directions: tuple[str, str] = ("", "")
 
     @property
     def origin(self) -> str:
@@ -62,17 +62,14 @@ class Flank:
 
 def find_flanks(result: Result) -> tuple[Flank, ...]:
     """The contact surfaces of a file, in order of first appearance; a single one where the file has no labels."""
-    coordinates, n_pairs = result.dataset.coords, result.dataset.sizes["contact"]
-    labels, area, positions = np.full(n_pairs, "contact"), np.ones(n_pairs), np.full((n_pairs, 3), np.nan)
-    if "contact_surface" in coordinates:
-        labels = coordinates["contact_surface"].values.astype(str)
-    if "contact_area" in coordinates:
-        area = np.asarray(coordinates["contact_area"].values, dtype=float)
-    if all(f"contact_{axis}" in coordinates for axis in "xyz"):
-        positions = np.stack([coordinates[f"contact_{axis}"].values for axis in "xyz"], axis=1)
+    found = contact_pairs(result, result.shown_point())
+    area = np.where(np.isfinite(found.area), found.area, 1.0)
     words = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model")))
-    surfaces = [(surface, np.flatnonzero(labels == surface)) for surface in dict.fromkeys(labels.tolist())]
-    return tuple(_build_flank(name or "contact", own, area[own], positions[own], words) for name, own in surfaces)
+    flanks = []
+    for surface in dict.fromkeys(found.surface.tolist()):
+        pairs = np.flatnonzero(found.surface == surface)
+        flanks.append(_build_flank(surface or "contact", pairs, area[pairs], found.position[pairs], words))
+    return tuple(flanks)
 
 
 def _build_flank(
@@ -80,7 +77,7 @@ def _build_flank(
 ) -> Flank:
     """Own (n, 3): positions of its pairs, m. words: of its directions, where the scene has some."""
     if not np.isfinite(own).all():
-        return Flank(surface, pairs, area, None, None, ("", ""))
+        return Flank(surface, pairs, area)
     centred = own - own.mean(axis=0)
     _, _, plane = np.linalg.svd(np.vstack([centred, np.zeros((3, 3))]), full_matrices=False)
     largest = np.argmax(np.abs(np.round(plane, 6)), axis=1)[:, None]

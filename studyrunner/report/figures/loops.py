@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 import studyrunner.accessor  # noqa: F401  (registers Dataset.fretwear)
-from studyrunner.report.drawing import Drawing, FloatArray, Missing, add_legend, line_style, new_panels, title_at
+from studyrunner.report.drawing import Drawn
 from studyrunner.report.figures.flanks import JOINT_WORDS
+from studyrunner.report.panels import FloatArray, add_legend, label_outer, line_style, new_panels
 from studyrunner.result.scene_pairs import last_depth, tells_depth
 from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import Result, as_sentences
@@ -25,68 +25,57 @@ _Curves = dict[int, tuple[FloatArray, FloatArray]]
 """Of each pair x and y (n_ends, n_phases + 1), closed, in SI, at the first and at the last cycle count."""
 
 
-def draw_fretting(result: Result) -> Drawing | Missing | None:
+def draw_fretting(result: Result) -> Drawn:
     """Tangential force over tangential displacement, one row a direction."""
     loops = _read_loops(result)
-    if loops is None:
+    if not loops:
         depth = last_depth(result, result.shown_point()) if tells_depth(result) else np.zeros(1)
         deepest = int(result.dataset["contact"].values[np.argmax(np.nan_to_num(depth))])
-        said = f"Add pairs to [outputs] loops, as loops = [{deepest}], or use study-report --loops {deepest}."
-        return Missing("fretting_loops", "Fretting loops", said)
-    rows = []
-    for name in _TANGENTS:
-        curves = {
+        return f"Add pairs to [outputs] loops, as loops = [{deepest}], or use study-report --loops {deepest}."
+    found = {
+        name: {
             pair: (_centred(loop, "displacement", name), _centred(loop, "force", name)) for pair, loop in loops.items()
         }
-        rows += [(curves, name)] if any(np.any(force) for _, force in curves.values()) else []
+        for name in _TANGENTS
+    }
+    rows = {name: curves for name, curves in found.items() if any(np.any(force) for _, force in curves.values())}
     if not rows:
         return None
     words = _words(result, len(rows))
-    length = scale_for("m", *(move for curves, _ in rows for move, _ in curves.values()))
-    load = scale_for("N", *(force for curves, _ in rows for _, force in curves.values()))
-    labels = [(length.label(f"displacement, {words[name]}"), load.label(f"force, {words[name]}")) for _, name in rows]
-    text = as_sentences(
+    scales = _scales(list(rows.values()), "m", "N")
+    labels = [(f"displacement, {words[name]}", f"force, {words[name]}") for name in rows]
+    return _draw(result, list(rows.values()), scales, labels), as_sentences(
         "Tangential force over relative displacement through a period, each about its mean: the area inside is the"
         " energy of friction",
         _tell_drift(result, loops, words),
         *_how_made(result, loops),
     )
-    figure = _draw(result, [curves for curves, _ in rows], (length, load), labels)
-    return Drawing("fretting_loops", title_at(result, "Fretting loops"), text, figure)
 
 
-def draw_normal(result: Result) -> Drawing | None:
+def draw_normal(result: Result) -> Drawn:
     """Normal force through a period."""
-    loops = _read_loops(result) or {}
-    curves = {}
+    loops, curves = _read_loops(result), {}
     for pair, loop in loops.items():
         force = loop["force"].sel(component="normal").transpose("cycle", "phase").values
         if np.isfinite(force).all() and force.any():
             curves[pair] = np.broadcast_to(np.degrees(loop["phase"].values), force.shape), force
     if not curves:
         return None
-    load = scale_for("N", *(force for _, force in curves.values()))
-
-    def finish(panel: Axes) -> None:
-        panel.set_xlim(0, 360)
-        panel.set_xticks([0, 90, 180, 270, 360])
+    figure = _draw(result, [curves], (Scale(1.0, "°"), _scales([curves], "1", "N")[1]), [("phase", "normal force")])
+    for panel in figure.axes:
+        panel.set(xlim=(0, 360), xticks=[0, 90, 180, 270, 360])
         panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]) if panel.dataLim.ymin < 0.0 else 0.0)
-
-    figure = _draw(result, [curves], (Scale(1.0, "°"), load), [("phase (°)", load.label("normal force"))], finish)
     opened = (
         f"pair {pair} " + ", then ".join(f"{100.0 * np.mean(each[:-1] <= 0.0):.0f} %" for each in force)
         for pair, (_, force) in curves.items()
     )
-    text = as_sentences(
-        f"Where the force is zero the pair is open: {', '.join(opened)} of the period", *_how_made(result, loops)
-    )
-    return Drawing("normal_load", title_at(result, "Normal load through a period"), text, figure)
+    said = f"Where the force is zero the pair is open: {', '.join(opened)} of the period"
+    return figure, as_sentences(said, *_how_made(result, loops))
 
 
-def draw_motion(result: Result) -> Drawing | None:
+def draw_motion(result: Result) -> Drawn:
     """Path of the relative displacement in the contact plane; nothing where pairs have one tangent only."""
-    loops = _read_loops(result) or {}
-    curves = {}
+    loops, curves = _read_loops(result), {}
     for pair, loop in loops.items():
         if loop["displacement"].sel(component=list(_TANGENTS)).notnull().all():
             first, second = (_centred(loop, "displacement", name) for name in _TANGENTS)
@@ -94,17 +83,12 @@ def draw_motion(result: Result) -> Drawing | None:
     if not any(np.any(second) for _, second in curves.values()):
         return None
     length, words = scale_for("m", *(each for pair in curves.values() for each in pair)), _words(result, 2)
-    labels = [
-        (length.label(f"displacement, {words[_TANGENTS[0]]}"), length.label(f"displacement, {words[_TANGENTS[1]]}"))
-    ]
-    figure = _draw(
-        result, [curves], (length, length), labels, lambda panel: panel.set_aspect("equal", adjustable="datalim")
-    )
-    text = as_sentences(
-        "Path of the relative displacement in the contact plane about its mean; a pair that sticks is a dot",
-        *_how_made(result, loops),
-    )
-    return Drawing("pair_motion", title_at(result, "Motion of the pairs in the contact plane"), text, figure)
+    first_label, second_label = (f"displacement, {words[name]}" for name in _TANGENTS)
+    figure = _draw(result, [curves], (length, length), [(first_label, second_label)])
+    for panel in figure.axes:
+        panel.set_aspect("equal", adjustable="datalim")
+    said = "Path of the relative displacement in the contact plane about its mean; a pair that sticks is a dot"
+    return figure, as_sentences(said, *_how_made(result, loops))
 
 
 def find_loops(result: Result, point: dict[str, int]) -> list[int]:
@@ -118,20 +102,25 @@ def find_loops(result: Result, point: dict[str, int]) -> list[int]:
     return [int(pair) for pair in wanted if force.sel(contact=pair).notnull().any()]
 
 
-def _read_loops(result: Result) -> dict[int, xr.Dataset] | None:
+def _read_loops(result: Result) -> dict[int, xr.Dataset]:
     """Loops of the most worn pairs at the first and last count: those computed again, or those of the file."""
     point, source = result.shown_point(), result.again.get("loops")
+    if source is None and find_loops(result, point):
+        source = result.dataset[["loop_displacement", "loop_force"]].isel(point)
     if source is None:
-        pairs = find_loops(result, point)
-        source = result.dataset[["loop_displacement", "loop_force"]].isel(point) if pairs else None
-    if source is None:
-        return None
+        return {}
     pairs = [int(pair) for pair in source["contact"].values if source["loop_force"].sel(contact=pair).notnull().any()]
     if tells_depth(result):
         worn = dict(zip(result.dataset["contact"].values.tolist(), last_depth(result, point).tolist(), strict=True))
         pairs.sort(key=lambda pair: -np.nan_to_num(worn.get(pair, 0.0)))
     ends = source.isel(cycle=[0, -1] if source.sizes["cycle"] > 1 else [0])
     return {pair: ends.fretwear.loop(pair) for pair in sorted(pairs[:_MOST_PAIRS])}
+
+
+def _scales(rows: list[_Curves], across: str, upright: str) -> tuple[Scale, Scale]:
+    """Scales of x and y for all curves."""
+    x, y = ([pair[which] for curves in rows for pair in curves.values()] for which in (0, 1))
+    return scale_for(across, *x), scale_for(upright, *y)
 
 
 def _words(result: Result, n_directions: int) -> dict[str, str]:
@@ -162,29 +151,25 @@ def _tell_drift(result: Result, loops: dict[int, xr.Dataset], words: dict[str, s
 
 
 def _how_made(result: Result, loops: dict[int, xr.Dataset]) -> tuple[str, str]:
-    again = result.again.get("loops")
-    held = [] if again is not None else find_loops(result, result.shown_point())
-    others = ", ".join(str(pair) for pair in held if pair not in loops)
-    more = f"The file also holds loops of the pairs {textwrap.shorten(others, 40)}" if others else ""
-    return more, "" if again is None else str(again.attrs["how"])
+    """Which loops are not shown, and how those of a worn joint were computed again."""
+    if "loops" in result.again:
+        return "", str(result.again["loops"].attrs["how"])
+    others = ", ".join(str(pair) for pair in find_loops(result, result.shown_point()) if pair not in loops)
+    return f"The file also holds loops of the pairs {textwrap.shorten(others, 40)}" if others else "", ""
 
 
-def _draw(
-    result: Result,
-    rows: list[_Curves],
-    scales: tuple[Scale, Scale],
-    labels: list[tuple[str, str]],
-    finish: Callable[[Axes], object] = lambda _: None,
-) -> Any:
+def _draw(result: Result, rows: list[_Curves], scales: tuple[Scale, Scale], labels: list[tuple[str, str]]) -> Figure:
     """One column a pair, one row a set of curves; a marker where the period begins, an arrow its way."""
     ends = [result.cycle_label(0), result.cycle_label(-1)]
     figure, panels = new_panels(len(rows), len(rows[0]), 0.5 + 2.7 * len(rows))
-    for row, (curves, (across, upright)) in enumerate(zip(rows, labels, strict=True)):
-        for column, (pair, curve) in enumerate(curves.items()):
+    for row, (curves, texts) in enumerate(zip(rows, labels, strict=True)):
+        across, upright = (
+            textwrap.fill(scale.label(text), _LABEL_WIDTH, break_on_hyphens=False)
+            for scale, text in zip(scales, texts, strict=True)
+        )
+        for column, (pair, (x_of_ends, y_of_ends)) in enumerate(curves.items()):
             panel = panels[row, column]
-            for number, (x, y) in enumerate(
-                zip(*(scale(each) for scale, each in zip(scales, curve, strict=True)), strict=True)
-            ):
+            for number, (x, y) in enumerate(zip(scales[0](x_of_ends), scales[1](y_of_ends), strict=True)):
                 look = line_style(number) | {"markevery": [0], "label": ends[number]}
                 panel.plot(x, y, **look)
                 if scales[0].unit != "°" and np.ptp(x) + np.ptp(y) > 0.0:
@@ -194,8 +179,8 @@ def _draw(
                     panel.annotate("", (x[at + 1], y[at + 1]), (x[at], y[at]), arrowprops=way, annotation_clip=False)
             panel.set_title(f"pair {pair}" if row == 0 else "")
             panel.locator_params(nbins=5)
-            panel.set_xlabel(textwrap.fill(across, _LABEL_WIDTH, break_on_hyphens=False))
-            panel.set_ylabel("" if column else textwrap.fill(upright, _LABEL_WIDTH, break_on_hyphens=False))
-            finish(panel)
+            panel.set(xlabel=across, ylabel=upright)
+    for row in range(len(rows)):
+        label_outer(panels[row : row + 1])
     add_legend(figure)
     return figure

@@ -7,19 +7,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from studyrunner.percent import show_percent
-from studyrunner.report.drawing import (
-    COLOURS,
-    Drawing,
-    FloatArray,
-    Missing,
-    Table,
-    add_legend,
-    add_line,
-    line_style,
-    new_panels,
-    set_from_zero,
-    title_at,
-)
+from studyrunner.report.drawing import Drawn, Table
+from studyrunner.report.panels import COLOURS, FloatArray, add_legend, add_line, line_style, new_panels, set_from_zero
 from studyrunner.result.units import scale_for, show_number
 from studyrunner.result.view import NO_VOLUME, Result, as_sentences
 
@@ -62,24 +51,23 @@ def list_blocks(result: Result) -> Table:
         f"Cycles of one mission{f', wear after {result.cycle_label(last)}' if reached.size else ''}",
         "A passage whose rate is far below (zeta f)² wears as its steady states do",
     )
-    return Table("blocks", title_at(result, "Blocks of the mission"), columns, tuple(rows), note)
+    return Table(columns, tuple(rows), note)
 
 
-def _missing(result: Result, name: str, title: str, *needs: str) -> Missing | None:
-    """A sentence where the file lacks variables of blocks, or has too many of them."""
-    blocks = _blocks(result)
+def _lacking(blocks: xr.Dataset, *needs: str) -> str:
+    """A sentence where the file lacks variables of blocks, or has too many of them; else empty."""
     lacks, number = [each for each in needs if each not in blocks], blocks.sizes["block"]
     if lacks:
-        return Missing(name, title, f"Add {' and '.join(lacks)} to [outputs] variables.")
+        return f"Add {' and '.join(lacks)} to [outputs] variables."
     said = f"The mission has {number} blocks, more than the {_MOST_BLOCKS} that are drawn."
-    return Missing(name, title, said) if number > _MOST_BLOCKS else None
+    return said if number > _MOST_BLOCKS else ""
 
 
-def draw_shares(result: Result) -> Drawing | Missing | None:
+def draw_shares(result: Result) -> Drawn:
     """Above, the shares of the blocks in the wear of one mission, on top of each other; below, their worn volumes."""
-    blocks, title = _blocks(result), "Wear by block"
-    if missing := _missing(result, "block_shares", title, "block_worn_volume", "block_share"):
-        return missing
+    blocks = _blocks(result)
+    if lacking := _lacking(blocks, "block_worn_volume", "block_share"):
+        return lacking
     worn, shares = blocks["block_worn_volume"].values, blocks["block_share"].values
     if len(result.cycles) == 1 or not np.nanmax(worn, initial=0.0) > NO_VOLUME:
         return None
@@ -91,24 +79,21 @@ def draw_shares(result: Result) -> Drawing | Missing | None:
     for place, patch in enumerate(patches):
         # beyond the colours there are, the same ones with hatches
         patch.set_hatch("" if place < len(COLOURS) else "///")
-    above.set_ylabel("share in a mission (%)")
-    above.set(ylim=(0.0, 100.0), xlim=(0.0, result.cycles[-1]))
+    above.set(ylabel="share in a mission (%)", ylim=(0.0, 100.0), xlim=(0.0, result.cycles[-1]))
     errors, scale = _errors(blocks, "block_worn_volume_error"), scale_for("m3", worn)
     _draw_lines(below, result.cycles, scale(worn), errors, names)
-    below.set_ylabel(scale.label("worn volume"))
-    below.set_xlabel("missions")
+    below.set(ylabel=scale.label("worn volume"), xlabel="missions")
     add_legend(figure, below.get_lines())
     known = np.flatnonzero(np.isfinite(shares).all(axis=1))
     ends = []
     for place, name in enumerate(names if known.size else []):
         first, last = (show_percent(float(shares[at, place])) for at in known[[0, -1]])
         ends.append(f"{name} {first} to {last}")
-    caption = as_sentences(
+    return figure, as_sentences(
         "Above, shares of the blocks in the volume worn in one mission; below, worn volumes by block",
         f"From the first mission to the last: {', '.join(ends)}" if ends else "",
         "Bands: estimated errors" if errors is not None else "",
     )
-    return Drawing("block_shares", title_at(result, title), caption, figure)
 
 
 def _errors(blocks: xr.Dataset, name: str) -> FloatArray | None:
@@ -126,11 +111,11 @@ def _draw_lines(
     set_from_zero(panel, float(np.nanmax(values, initial=0.0)))
 
 
-def draw_responses(result: Result) -> Drawing | Missing | None:
+def draw_responses(result: Result) -> Drawn:
     """Amplitude of the first response over the missions, at the begin of each block and at its end."""
-    blocks, title = _blocks(result), "Vibration of the blocks"
-    if missing := _missing(result, "block_responses", title, "response_amplitude"):
-        return missing
+    blocks = _blocks(result)
+    if lacking := _lacking(blocks, "response_amplitude"):
+        return lacking
     if len(result.cycles) == 1:
         return None
     ends = [name for name in _ENDS if name in blocks]
@@ -140,15 +125,12 @@ def draw_responses(result: Result) -> Drawing | Missing | None:
     scale, errors = scale_for("m", *amplitudes), _errors(blocks, "response_error")
     for panel, amplitude, end in zip(panels[0], amplitudes, ends, strict=True):
         _draw_lines(panel, result.cycles, scale(amplitude), errors, names)
-        panel.set_xlim(0.0, result.cycles[-1])
-        panel.set_xlabel("missions")
-        panel.set_title(f"at the {_ENDS[end]} of the block")
+        panel.set(title=f"at the {_ENDS[end]} of the block", xlabel="missions", xlim=(0.0, result.cycles[-1]))
     set_from_zero(panels[0, 0], max(float(np.nanmax(scale(each), initial=0.0)) for each in amplitudes))
     panels[0, 0].set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
     add_legend(figure)
-    caption = as_sentences(
+    return figure, as_sentences(
         "Amplitude of the first harmonic in the mission that ends at the number",
         "Bands: estimated errors" if errors is not None else "",
         f"{len(result.responses) - 1} more responses are in the file" if len(result.responses) > 1 else "",
     )
-    return Drawing("block_responses", title_at(result, title), caption, figure)

@@ -2,56 +2,59 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
-from studyrunner.report.drawing import COLOURS, Drawing, Table, add_legend, new_panel
-from studyrunner.report.figures.courses import find_course
-from studyrunner.result.choice import choose
+from studyrunner.report.drawing import Drawn, Table
+from studyrunner.report.panels import COLOURS, add_legend, add_map, is_narrow, new_panel
+from studyrunner.report.selection import choose, find_course
 from studyrunner.result.points import CONVERGED
 from studyrunner.result.units import show_cycles
 from studyrunner.result.view import Result, as_sentences
 from studyrunner.variables import CERTIFICATE
 
-_MOST_ROWS, _MOST_CELLS, _MOST_TICKS = 24, 400, 9
+_MOST_ROWS, _MOST_CELLS, _LABEL_WIDTH = 24, 400, 20
 # what was computed to the end is light, so that what failed stands out
 _CONVERGED_COLOUR, _OTHERS = "#dfe7ef", (COLOURS[1], COLOURS[0], *COLOURS[2:], "#7f7f7f", "#F0E442")
 
 
-def draw_outcomes(result: Result) -> Drawing | None:
+def draw_outcomes(result: Result) -> Drawn:
     """One cell a point: the course across, a row for each other combination; nothing where all points are alike."""
     course = find_course(result)
     if course is None or (result.dataset["outcome"].values == CONVERGED).all():
         return None
     choice = choose(result, [course.axis], _MOST_ROWS)
-    field = np.array([course.read(result, "outcome", point) for point in choice.points]).astype(int)
-    present = np.unique(field)
+    field = np.array([course.read(result, "outcome", point) for point in choice.points])
+    present = np.unique(field).astype(int)
     special = [number for number in present.tolist() if number != CONVERGED]
     colours = {number: _OTHERS[place % len(_OTHERS)] for place, number in enumerate(special)}
     cells = [colours.get(number, _CONVERGED_COLOUR) for number in present.tolist()]
+    labels = [textwrap.fill(label, _LABEL_WIDTH) if is_narrow() else label for label in choice.labels]
+    n_lines = sum(label.count("\n") for label in labels)
     figure, panel = new_panel(1.4 + 0.32 * len(field))
+    figure.set_figheight(1.4 + 0.32 * len(field) + 0.15 * n_lines)
     norm = BoundaryNorm([*(present - 0.5), present[-1] + 0.5], len(present))
     look: dict[str, Any] = {"edgecolors": "white", "linewidth": 0.8} if field.size <= _MOST_CELLS else {}
     across, down = (np.arange(size + 1) - 0.5 for size in field.shape[::-1])
-    panel.pcolormesh(across, down, field, cmap=ListedColormap(cells), norm=norm, **look)
-    panel.grid(visible=False)
+    add_map(panel, across, down, field, norm, cmap=ListedColormap(cells), **look)
     panel.invert_yaxis()
-    kept = np.arange(0, course.values.size, -(-course.values.size // _MOST_TICKS))
+    kept = np.arange(0, course.values.size, -(-course.values.size // (4 if is_narrow() else 9)))
     panel.set_xticks(kept, [f"{course.values[index]:.6g}" for index in kept])
     panel.set_xlabel(course.label)
-    panel.set_yticks(np.arange(len(choice.labels)), choice.labels)
+    panel.set_yticks(np.arange(len(labels)), labels)
     panel.tick_params(length=0)
     panel.spines[:].set_visible(False)
     words = {number: result.endings[number].word.replace("_", " ") for number in present.tolist()}
     add_legend(figure, [Patch(facecolor=cell, label=words[n]) for n, cell in zip(words, cells, strict=True)])
     meaning = [f"{words[number].capitalize()}: {result.endings[number].sentence}" for number in special]
-    return Drawing("outcome_map", "How the points ended", as_sentences(*meaning, choice.sentence), figure)
+    return figure, as_sentences(*meaning, choice.sentence)
 
 
-def list_certificates(result: Result) -> Table | None:
+def list_certificates(result: Result) -> Drawn:
     """The worst certificates and where they are."""
     rows = []
     for name, words in CERTIFICATE.items():
@@ -66,5 +69,4 @@ def list_certificates(result: Result) -> Table | None:
     if not rows or not result.computed.any():
         return None
     note = "The largest over all points computed to the end and all counts in the file; 0 is the best."
-    columns = ("certificate", "worst value", "where")
-    return Table("certificates", "Certificates: how right the states are", columns, tuple(rows), note)
+    return Table(("certificate", "worst value", "where"), tuple(rows), note)

@@ -1,4 +1,4 @@
-"""Error against run time: a picture with a line for each scheme, and a table of all settings."""
+"""Error against run time: a picture with a line for each scheme; its CSV file has all settings with their errors."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from studyrunner.percent import show_percent
-from studyrunner.report.drawing import Drawing, Missing, Table, add_legend, line_style, new_panels, set_log
+from studyrunner.report.drawing import Drawn
 from studyrunner.report.figures.settings import KEYS, QUANTITIES, RESOLVED, ComparedPoint, Setting, compare_settings
+from studyrunner.report.panels import add_legend, line_style, new_panels, set_log
 from studyrunner.result.view import Result, as_sentences
 from studyrunner.system.progress import count
 
-_MOST_POINTS, _TITLE, _DASH = 3, "Error against run time", "\N{EN DASH}"
+_MOST_POINTS = 3
 _SHAPES, _SIZE = "os^DvPX<>p", 5.5
 _RING: dict[str, Any] = {"marker": "o", "markerfacecolor": "none", "markeredgecolor": "black", "linestyle": "none"}
 
 
-def draw_precision(result: Result) -> Drawing | Missing | None:
+def draw_precision(result: Result) -> Drawn:
     """One row a point, one column a quantity; nothing where no settings are compared."""
     points = compare_settings(result)
     shown = _choose(points)
     if points and not shown:
-        said = "No error is clearly larger than the uncertainty of the reference: give finer values of a key."
-        return Missing("precision", _TITLE, said)
+        return "No error is clearly larger than the uncertainty of the reference: give finer values of a key."
     if not shown:
         return None
     quantities = [name for name in QUANTITIES if any(point.is_clear(name).any() for point in shown)]
@@ -43,15 +43,14 @@ def draw_precision(result: Result) -> Drawing | Missing | None:
         panel.set_xlabel("CPU time of one point (s)")
     add_legend(figure, marks.legend())
     failed = sum(int((~point.computed).sum()) for point in points)
-    caption = as_sentences(
+    return figure, as_sentences(
         "Each mark is one setting; a line joins those of a scheme than which no quicker one is as exact; rings: of all",
         "Open marks, in the grey: errors below"
         f" {RESOLVED:.0f} times the uncertainty of the reference, which tell no setting from another",
-        *(f"{point.label or 'Reference'}: {_tell_reference(point)}" for point in shown),
+        *_tell_references(shown),
         f"Left out: {count(failed, 'result')} not computed to the end" if failed else "",
         f"{count(len(points) - len(shown), 'other point')} not drawn" if len(points) > len(shown) else "",
     )
-    return Drawing("precision", _TITLE, caption, figure)
 
 
 def _choose(points: Sequence[ComparedPoint]) -> list[ComparedPoint]:
@@ -62,13 +61,17 @@ def _choose(points: Sequence[ComparedPoint]) -> list[ComparedPoint]:
     return [clear[number] for number in chosen]
 
 
-def _tell_reference(point: ComparedPoint) -> str:
-    """What the errors at a point are measured against, and how well this is known."""
-    if point.reference is None:
-        return "errors are those against the exact answer"
-    known = " and ".join(f"{show_percent(point.uncertainty[name])} ({words})" for name, words in QUANTITIES.items())
-    finest = point.settings[point.reference].describe()
-    return f"errors are those against the finest setting ({finest}), known to {known}"
+def _tell_references(points: Sequence[ComparedPoint]) -> list[str]:
+    """What the errors at each point are measured against, and how well this is known."""
+    told = []
+    for point in points:
+        said = "errors are those against the exact answer"
+        if point.reference is not None:
+            each = (f"{show_percent(point.uncertainty[name])} ({words})" for name, words in QUANTITIES.items())
+            finest = point.settings[point.reference].describe()
+            said = f"errors are those against the finest setting ({finest}), known to {' and '.join(each)}"
+        told.append(f"{point.label or 'Reference'}: {said}")
+    return told
 
 
 class _Marks:
@@ -131,24 +134,3 @@ def _draw_panel(panel: Axes, point: ComparedPoint, quantity: str, marks: _Marks)
     if 0.8 * bottom < least < math.inf:
         panel.axhspan(0.8 * bottom, least, color="0.9", zorder=0)
     panel.set_ylim(bottom=0.8 * bottom)
-
-
-def list_settings(result: Result) -> Table | None:
-    """All settings at each point that is drawn, the quickest first, with their errors."""
-    shown, keys = _choose(compare_settings(result)), [key for key in KEYS if key in result.varying]
-    rows: list[tuple[str, ...]] = []
-    for point in shown:
-        fronts = {name: point.front(name) for name in QUANTITIES}
-        for row in np.argsort(np.where(point.computed, point.values["run_time"], math.inf), kind="stable").tolist():
-            values = (point.label, *map(point.settings[row].words, keys))
-            if not point.computed[row]:
-                rows.append((*values, *[_DASH] * 3, f"failed: {point.endings[row].replace('_', ' ')}"))
-                continue
-            remarks = ["reference"] if row == point.reference else []
-            remarks += [f"cheapest for its {QUANTITIES[name]}" for name, front in fronts.items() if row in front]
-            errors = [point.errors[name][row] for name in QUANTITIES]
-            told = [show_percent(error) if np.isfinite(error) else _DASH for error in errors]
-            rows.append((*values, f"{point.values['run_time'][row]:.3g}", *told, ", ".join(remarks)))
-    columns = ("point", *keys, "CPU time (s)", "worn volume", "response", "remark")
-    note = as_sentences(*(f"{point.label or 'Reference'}: {_tell_reference(point)}" for point in shown))
-    return Table("precision_settings", "All settings", columns, tuple(rows), note) if rows else None

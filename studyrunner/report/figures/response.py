@@ -1,4 +1,4 @@
-"""Frequency response of the new joint and of one worn joint (Fig. 9 of the paper), and of joints worn differently."""
+"""Response over frequency of the new and of one worn joint (Fig. 9 of the paper), of joints worn differently; modes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from studyrunner.report.drawing import (
+from studyrunner.report.drawing import Drawn
+from studyrunner.report.panels import (
     COLOURS,
-    Drawing,
     FloatArray,
-    Missing,
     add_legend,
     add_line,
     line_style,
@@ -20,32 +19,33 @@ from studyrunner.report.drawing import (
     new_panel,
     new_panels,
     set_from_zero,
+    set_log,
 )
-from studyrunner.report.figures.courses import Course, find_course
-from studyrunner.result.choice import choose
+from studyrunner.report.selection import Course, choose, find_course, labelled
 from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import NO_VOLUME, Result, as_sentences
 
-_MOST_LINES, _MOST_RESPONSES, _MOST_FOLDS = 3, 3, 12
+_MOST_LINES, _MOST_RESPONSES, _MOST_FOLDS, _MOST_MODES = 3, 3, 12, 6
 _OF_WEAR = ("wear_coefficient", "step", "scheme")
 _BEFORE = "worn_cycle"
 _RING: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 10, "markerfacecolor": "none"}
 _WORN: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (5, 1.5)), "marker": "s", "markersize": 4.5}
 
 
-def draw_responses(result: Result) -> Drawing | Missing:
+def draw_responses(result: Result) -> Drawn:
     """Amplitude of the first harmonic over frequency, one panel a response.
 
     Lines are of the new joint, or of joints that were worn before; with `result.again["response"]` also of the joint
     that is worn as the shown point is.
     """
-    name, title, course = "frequency_response", "Frequency response of the new joint", find_course(result, "frequency")
-    again = result.again.get("response")
+    course, again = find_course(result, "frequency"), result.again.get("response")
     if course is None and again is None:
         said = "The study has one frequency: give several under [axes] frequency"
-        return Missing(name, title, f"{result.no_worn_response or said}.")
+        return f"{result.no_worn_response or said}."
     if course is not None and result.cycles[0] != 0.0:
-        return Missing(name, title, "The file holds no new joint: add 0 to slow_time.outputs.")
+        return "The file holds no new joint: add 0 to slow_time.outputs."
+    if again is not None:
+        again = again.sel(response=list(result.responses))
     n_panels = min(len(result.responses), _MOST_RESPONSES)
     figure, panels = new_panels(n_panels, 1, 0.5 + 3.1 * n_panels, sharex=True)
     unit, told = str(result.dataset["response_amplitude"].attrs.get("units", "m")), ("", "")
@@ -62,7 +62,7 @@ def draw_responses(result: Result) -> Drawing | Missing:
         panel.set_ylabel(scale.label(f"amplitude of {result.responses[number]}"))
     panels[-1, 0].set_xlabel("excitation frequency (Hz)")
     add_legend(figure)
-    text = as_sentences(
+    return figure, as_sentences(
         f"Largest amplitude of the first harmonic of {result.responses[0]}: {'; '.join(filter(None, peaks))}",
         f"One joint, {again.attrs['title']}: its response curve at that wear, without further wear" if again else "",
         f"{again.attrs['how']}" if again else "",
@@ -70,11 +70,6 @@ def draw_responses(result: Result) -> Drawing | Missing:
         "More responses are in the file" if len(result.responses) > n_panels else "",
         *told,
     )
-    if _BEFORE in result.axes:
-        title = "Frequency response of one joint, worn before"
-    elif again is not None:
-        title = f"Frequency response, new and {again.attrs['title']}"
-    return Drawing(name, title, text, figure)
 
 
 def _draw_new(
@@ -89,10 +84,23 @@ def _draw_new(
     peaks = []
     for place, (line, (point, label)) in enumerate(zip(lines, choice, strict=True)):
         text = label if _BEFORE in result.varying else ", ".join(filter(None, (label, "new joint")))
-        _draw_branch(result, panel, course, {**result.shown_point(), **point}, scale(line), place, text)
+        full = {**result.shown_point(), **point}
+        at, values = course.values, scale(line)
+        if result.has("stable"):
+            unstable = course.read(result, "stable", full)[:, 0] == 0
+            if unstable.any():
+                panel.plot(at[unstable], values[unstable], color="black", label="unstable", **_RING)
+        if result.has("branch"):
+            # open where the sweep has jumped
+            jumps = np.flatnonzero(np.diff(course.read(result, "branch", full)) != 0) + 1
+            at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan)
+        # the second colour is that of the worn joint
+        panel.plot(at, values, **course.line_style(place + (place > 0)), label=text)
         peaks.append(_tell_peak(scale, line, course.values, text))
     if result.has("exact_response_amplitude"):
-        _draw_exact(result, panel, course, scale, number)
+        exact = course.read(result, "exact_response_amplitude", result.shown_point())[:, 0, number]
+        if np.isfinite(exact).any():
+            panel.plot(course.values, scale(exact), color="0.5", linewidth=5, alpha=0.45, zorder=1, label="exact")
     _mark_folds(result, panel)
     return peaks, (mark_failed(panel, course.values, np.isnan(lines)), choice.sentence)
 
@@ -114,31 +122,7 @@ def _tell_peak(scale: Scale, values: FloatArray, frequency: FloatArray, text: st
     if np.isnan(values).all():
         return ""
     top = int(np.nanargmax(values))
-    return f"{scale.show(float(values[top]))} at {frequency[top]:.6g} Hz ({text})"
-
-
-def _draw_branch(
-    result: Result, panel: Axes, course: Course, point: dict[str, int], values: FloatArray, number: int, label: str
-) -> None:
-    """The line of a new joint, open where the sweep has jumped; its unstable states in rings."""
-    at = course.values
-    if result.has("stable"):
-        unstable = course.read(result, "stable", point)[:, 0] == 0
-        if unstable.any():
-            named = "unstable" in panel.get_legend_handles_labels()[1]
-            panel.plot(at[unstable], values[unstable], color="black", label="_" if named else "unstable", **_RING)
-    if result.has("branch"):
-        jumps = np.flatnonzero(np.diff(course.read(result, "branch", point)) != 0) + 1
-        at, values = np.insert(at, jumps, np.nan), np.insert(values, jumps, np.nan)
-    # the second colour is that of the worn joint
-    panel.plot(at, values, **course.line_style(number + (number > 0)), label=label)
-
-
-def _draw_exact(result: Result, panel: Axes, course: Course, scale: Scale, number: int) -> None:
-    """The exact answer at the shown point as a broad grey line."""
-    exact = course.read(result, "exact_response_amplitude", result.shown_point())[:, 0, number]
-    if np.isfinite(exact).any():
-        panel.plot(course.values, scale(exact), color="0.5", linewidth=5, alpha=0.45, zorder=1, label="exact")
+    return labelled(f"{scale.show(float(values[top]))} at {frequency[top]:.6g} Hz", text)
 
 
 def _mark_folds(result: Result, panel: Axes) -> None:
@@ -149,12 +133,12 @@ def _mark_folds(result: Result, panel: Axes) -> None:
     sweeps = result.dataset["sweep"].values.astype(str) if "sweep" in fold.dims else [""]
     for number, sweep in enumerate(sweeps):
         values = (fold.isel(sweep=number) if sweep else fold).values
-        for place, frequency in enumerate(np.unique(values[np.isfinite(values)])[:_MOST_FOLDS]):
-            label = "_" if place else f"fold, sweep {sweep}: jump to another branch"
+        label = f"fold, sweep {sweep}: jump to another branch"
+        for frequency in np.unique(values[np.isfinite(values)])[:_MOST_FOLDS]:
             panel.axvline(frequency, color="0.4", linewidth=0.9, linestyle=("--", ":")[number % 2], label=label)
 
 
-def draw_after_wear(result: Result) -> Drawing | None:
+def draw_after_wear(result: Result) -> Drawn:
     """Amplitude of each point after its own wear, beside that of the new joint; nothing where no point wears."""
     course = find_course(result, "frequency")
     wears = not result.has("worn_volume") or float(np.nanmax(result.worn, initial=0.0)) > NO_VOLUME
@@ -162,26 +146,50 @@ def draw_after_wear(result: Result) -> Drawing | None:
         return None
     choice = choose(result, ["frequency"], _MOST_LINES)
     amplitudes = [course.read(result, "response_amplitude", point)[..., 0] for point in choice.points]
-    scale, (figure, panel) = (
-        scale_for(str(result.dataset["response_amplitude"].attrs["units"]), *amplitudes),
-        new_panel(3.4),
-    )
+    scale, (figure, panel) = scale_for("m", *amplitudes), new_panel(3.4)
     first = "new joint" if result.cycles[0] == 0.0 else f"each after its own {result.cycle_label(0)}"
     for number, (amplitude, label) in enumerate(zip(amplitudes, choice.labels, strict=True)):
-        style = course.line_style(number)
         text = ", ".join(filter(None, (label, f"each after its own {result.cycle_label(-1)}")))
         if number == 0:
             panel.plot(course.values, scale(amplitude[:, 0]), color="0.5", linewidth=1.0, label=first)
-        panel.plot(course.values, scale(amplitude[:, -1]), **style | {"linestyle": "none"}, label=text)
+        look = course.line_style(number) | {"linestyle": "none"}
+        panel.plot(course.values, scale(amplitude[:, -1]), **look, label=text)
     set_from_zero(panel, panel.dataLim.ymax)
     panel.set_ylabel(scale.label(f"amplitude of {result.responses[0]}"))
     course.set_axis(panel)
     add_legend(figure)
-    text = as_sentences(
+    return figure, as_sentences(
         "Each mark is another joint, which wore at its own frequency: the marks are no response curve",
         "That they are low where the new joint resonates does not mean that wear protects",
         "The response curves of one new and one worn joint are above",
         choice.sentence,
     )
-    title = "Response of different joints, each after wear at its own frequency"
-    return Drawing("response_after_own_wear", title, text, figure)
+
+
+def draw_mode(result: Result, name: str) -> Drawn:
+    """Natural frequency or damping ratio of modes over the amplitude with error bars, a line for each wear state."""
+    course, unit = find_course(result, "modal_amplitude"), " Hz" if name == "natural_frequency" else ""
+    if course is None:
+        return "The study has one amplitude: give several under [axes] modal_amplitude."
+    choice = choose(result, ["modal_amplitude"], _MOST_MODES, first=("cycle", "mode", "sweep"))
+    figure, panel = new_panel(3.6)
+    values = np.array([course.read(result, name, point) for point in choice.points])
+    for number, (point, label) in enumerate(choice):
+        error = course.read(result, f"{name}_error", point) if result.has(f"{name}_error") else None
+        if np.isfinite(values[number]).any():
+            add_line(panel, course.values, values[number], error, **course.line_style(number), label=label or "mode")
+    panel.set_xlabel(course.label)
+    panel.set_ylabel(name.replace("_", " ") + (" (Hz)" if unit else ""))
+    set_log(panel.xaxis, float(course.values[0]), float(course.values[-1]))
+    low, high = float(np.nanmin(values, initial=np.inf)), float(np.nanmax(values, initial=-np.inf))
+    # negative damping, e.g. of the air, has no logarithm
+    if name == "damping_ratio" and 0.0 < low <= high:
+        set_log(panel.yaxis, low, high, percent=True)
+    crosses = mark_failed(panel, course.values, np.isnan(values))
+    add_legend(figure)
+    return figure, as_sentences(
+        f"From {low:.6g}{unit} to {high:.6g}{unit}" if low <= high else "No point has a state",
+        "Bars: estimated errors; none where they are smaller than the markers" if result.has(f"{name}_error") else "",
+        crosses,
+        choice.sentence,
+    )

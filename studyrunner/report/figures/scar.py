@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
-from studyrunner.report.drawing import (
+from studyrunner.report.panels import (
     COLOURS,
-    Drawing,
     FloatArray,
     add_colour_bar,
     add_legend,
@@ -16,17 +16,14 @@ from studyrunner.report.drawing import (
     new_panel,
     new_panels,
     set_from_zero,
-    title_at,
 )
 from studyrunner.result.scars import Scar
-from studyrunner.result.scene_pairs import depths, last_depth
+from studyrunner.result.scene_pairs import NO_DEPTH, depths, last_depth
 from studyrunner.result.units import scale_for
 from studyrunner.result.view import Result, as_sentences
 
-_NO_DEPTH = 1e-15  # m; a depth below this is round-off: it is far less than an atom
 
-
-def draw_scar_pressure(result: Result, scar: Scar) -> Drawing:
+def draw_scar_pressure(result: Result, scar: Scar) -> tuple[Figure, str]:
     """Mean pressure over x at the first and the last cycle count."""
     shown = result.shown_point()
     states = {cycle: result.at("mean_pressure", shown, cycle).values for cycle in (0, result.last_kept(shown))}
@@ -39,24 +36,23 @@ def draw_scar_pressure(result: Result, scar: Scar) -> Drawing:
     panel.set_ylabel(scale.label("mean pressure"))
     add_legend(figure)
     largest = [f"{scale.show(float(np.nanmax(each)))} ({result.cycle_label(cycle)})" for cycle, each in states.items()]
-    text = as_sentences(f"Mean over a period. Largest: {', '.join(largest)}", _how_much(scar))
-    return Drawing("mean_pressure", title_at(result, "Mean pressure over x"), text, figure)
+    return figure, as_sentences(f"Mean over a period. Largest: {', '.join(largest)}", _how_much(scar))
 
 
-def draw_scar_depth(result: Result, scar: Scar) -> Drawing:
+def draw_scar_depth(result: Result, scar: Scar) -> tuple[Figure, str]:
     """Depth over x before and after wear, downwards as the surface sinks, with a measured one where there is one; of a
     sphere a map on the left.
     """
     shown, measured = result.shown_point(), result.measured
     last, after = result.last_kept(shown), last_depth(result, shown)
     scale, along = scale_for("m", after, *([measured.depth] if measured else [])), scale_for("m", scar.x)
-    figure, (panels,) = new_panels(1, 2 if scar.width else 1, 3.4)
-    panel = panels[-1]
+    figure, panels = new_panels(1, 2 if scar.width else 1, 3.4)
+    panel = panels[0, -1]
     if scar.width:
         norm = Normalize(0.0, scale(float(np.nanmax(after))).item())
-        _draw_map(panels[0], scar, scale(after), norm, along.factor)
-        panels[0].set(xlabel=along.label("x"), ylabel=along.label("y"))
-        add_colour_bar(figure, panels[:1], norm, scale.label("wear depth"), fraction=0.05)
+        _draw_map(panels[0, 0], scar, scale(after), norm, along.factor)
+        panels[0, 0].set(xlabel=along.label("x"), ylabel=along.label("y"))
+        add_colour_bar(figure, panels[0, :1], norm, scale.label("wear depth"), fraction=0.05)
     at, pairs = along(scar.x[scar.line]), scar.pairs[scar.line]
     before = np.nan_to_num(depths(result, shown)[0])
     panel.plot(at, scale(before[pairs]), color="0.4", linewidth=1.0, linestyle="--", label="before")
@@ -72,15 +68,14 @@ def draw_scar_depth(result: Result, scar: Scar) -> Drawing:
     panel.invert_yaxis()
     panel.set(xlabel=along.label("x"), ylabel=scale.label("depth"))
     add_legend(figure)
-    worn = np.abs(scar.x[scar.line][after[pairs] > _NO_DEPTH])
-    text = as_sentences(
+    worn = np.abs(scar.x[scar.line][after[pairs] > NO_DEPTH])
+    return figure, as_sentences(
         f"{result.when(last, 'after').capitalize()}. Deepest: {scale.show(float(np.nanmax(after)))}",
         f"Worn from x = {along.show(float(worn.min()))} to {along.show(float(worn.max()))} on both sides",
         "The depth is the sum of both bodies",
         _how_much(scar),
         "" if measured is None else f"Measured: {measured.name}",
     )
-    return Drawing("worn_profile", title_at(result, "Wear scar"), text, figure)
 
 
 def _draw_map(panel: Axes, scar: Scar, values: FloatArray, norm: Normalize, factor: float) -> None:

@@ -13,18 +13,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import (
+from studyrunner.report.drawing import Drawn
+from studyrunner.report.panels import (
     COLOURS,
-    Drawing,
     FloatArray,
-    Missing,
     add_legend,
+    label_outer,
     line_style,
     new_panels,
     set_from_zero,
 )
-from studyrunner.report.figures.courses import find_course, slow_time
-from studyrunner.result.choice import choose
+from studyrunner.report.selection import choose, find_course, slow_time
 from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import NO_VOLUME, Point, Result, as_sentences
 from studyrunner.statistics.samples import DRAWN, SAMPLE
@@ -33,7 +32,7 @@ from studyrunner.system.progress import count
 
 _Shown = list[tuple[Point, str, xr.Dataset]]
 """Combinations of the axes beside the samples with their labels and statistics."""
-_Draw = Callable[[Result, xr.Dataset], Drawing | Missing | None]
+_Draw = Callable[[Result, xr.Dataset], Drawn]
 
 _MOST_PANELS, _MOST_LINES = 4, 3
 _LOWEST, _HIGHEST = 0, 1  # places along the dimension `bound`
@@ -50,16 +49,14 @@ _EXCEEDED = (
 _GROUPS = (("samples", "o", 0), ("lower group", "o", 0), ("upper group", "s", 1), ("between", "D", 3))
 
 
-def _of_samples(draw: _Draw) -> Callable[[Result], Drawing | Missing | None]:
+def _of_samples(draw: _Draw) -> Callable[[Result], Drawn]:
     """A figure of the statistics of a result; nothing where it has no samples, or nothing is worn."""
 
     @wraps(draw)
-    def drawn(result: Result) -> Drawing | Missing | None:
-        worn = (
-            SAMPLE in result.varying
-            and result.has("worn_volume")
-            and float(result.read("worn_volume").max()) > NO_VOLUME
-        )
+    def drawn(result: Result) -> Drawn:
+        if SAMPLE not in result.varying or not result.has("worn_volume"):
+            return None
+        worn = float(result.read("worn_volume").max()) > NO_VOLUME
         return draw(result, result.statistics) if worn and result.statistics is not None else None
 
     return drawn
@@ -82,24 +79,24 @@ def _largest(*values: FloatArray) -> float:
     return max((float(each[np.isfinite(each)].max(initial=0.0)) for each in values), default=0.0)
 
 
-def _panel_grid(shown: _Shown, height: float, **options: Any) -> tuple[Figure, NDArray[Any]]:
+def _panel_grid(shown: _Shown, height: float, sharex: bool = False) -> tuple[Figure, NDArray[Any]]:
     """A figure and its panels (rows, columns) with the labels, two by two where there are four, else side by side."""
     n_columns = 2 if len(shown) == _MOST_PANELS else len(shown)
     n_rows = -(-len(shown) // n_columns)
-    figure, panels = new_panels(n_rows, n_columns, 0.5 + height * n_rows, sharey=True, **options)
+    figure, panels = new_panels(n_rows, n_columns, 0.5 + height * n_rows, sharex=sharex, sharey=True)
     for panel, (_, label, _) in zip(panels.flat, shown, strict=True):
         panel.set_title(textwrap.fill(label, _CHARACTERS // n_columns))
     return figure, panels
 
 
 @_of_samples
-def draw_bands(result: Result, statistics: xr.Dataset) -> Drawing | None:
+def draw_bands(result: Result, statistics: xr.Dataset) -> Drawn:
     """5, 25, 50, 75 and 95 % of the samples over the cycles."""
     return _draw_bands(result, statistics, "") if statistics.sizes["cycle"] > 1 else None
 
 
 @_of_samples
-def draw_bands_over_course(result: Result, statistics: xr.Dataset) -> Drawing | None:
+def draw_bands_over_course(result: Result, statistics: xr.Dataset) -> Drawn:
     """5, 25, 50, 75 and 95 % of the samples at the last count over the course."""
     course = find_course(result)
     if course is None:
@@ -107,7 +104,7 @@ def draw_bands_over_course(result: Result, statistics: xr.Dataset) -> Drawing | 
     return _draw_bands(result, statistics.isel(cycle=-1).isel({course.axis: course.index}), course.axis)
 
 
-def _draw_bands(result: Result, statistics: xr.Dataset, over: str) -> Drawing:
+def _draw_bands(result: Result, statistics: xr.Dataset, over: str) -> Drawn:
     """over: axis of the study, empty for slow time."""
     name, course = "worn_volume_quantile", find_course(result, over) if over else None
     shown, left_out = _choose(result, statistics, [over] if over else [])
@@ -121,27 +118,23 @@ def _draw_bands(result: Result, statistics: xr.Dataset, over: str) -> Drawing:
     figure, panels = _panel_grid(shown, 3.0, sharex=True)
     for panel, volume, error in zip(panels.flat, volumes, wrong, strict=True):
         _draw_band(panel, at, volume, error, scale)
-    for panel in panels[-1]:
+        panel.set_xlabel(slow_time(result, cycles))
         if course:
             course.set_axis(panel)
-        else:
-            panel.set_xlabel(slow_time(result, cycles))
-    for panel in panels[:, 0]:
         panel.set_ylabel(scale.label("worn volume"))
+    label_outer(panels)
     panels[0, 0].set_xlim(at.min(), at.max())
     # errors and what is open count to twice what is known
     set_from_zero(panels[0, 0], scale(min(max(known, _largest(*wrong, *volumes)), 2.0 * known)).item())
     add_legend(figure)
     n_without = max(int(point["n_without_value"].max()) for _, _, point in shown)
-    text = as_sentences(
+    return figure, as_sentences(
         f"{count(int(statistics['n_samples']), 'sample')}: so much is worn at most in 5, 25, 50, 75 and 95 % of them",
         *(_tell_last(shown, scale) if course is None else []),
         "Dashed: 5 and 95 %, with every sample less or more its numerical error",
         f"Hatched: what {count(n_without, 'sample')} without a value to be trusted leave open" if n_without else "",
         left_out,
     )
-    title = f"Worn volume of the samples over {course.name if course else result.counted}"
-    return Drawing("worn_volume_bands_course" if over else "worn_volume_bands", title, text, figure)
 
 
 def _draw_band(panel: Axes, at: FloatArray, volume: FloatArray, wrong: FloatArray, scale: Scale) -> None:
@@ -185,7 +178,7 @@ def _range(scale: Scale, low: float, high: float) -> str:
 
 
 @_of_samples
-def draw_exceedance(result: Result, statistics: xr.Dataset) -> Drawing:
+def draw_exceedance(result: Result, statistics: xr.Dataset) -> Drawn:
     """Probability of more than a volume, and of deeper than a depth, with its confidence band."""
     last = statistics.isel(cycle=-1)
     shown, left_out = _choose(result, last, limit=_MOST_LINES)
@@ -200,12 +193,11 @@ def draw_exceedance(result: Result, statistics: xr.Dataset) -> Drawing:
             for bound in (_LOWEST, _HIGHEST) if (np.ptp(value, axis=1) > 0.0).any() else (_LOWEST,):
                 own = {"color": style["color"], "linestyle": style["linestyle"]}
                 panel.plot(at, value[:, bound], **own, label="_" if bound else label or "samples")
-        panel.set_xlabel(scale.label(words))
+        panel.set(xlabel=scale.label(words), ylabel="probability of more", ylim=(0.0, 1.02))
         panel.set_xlim(0.0, scale(last[dimension].values[-1]).item())
-        panel.set_ylim(0.0, 1.02)
-    panels[0, 0].set_ylabel("probability of more")
+    label_outer(panels)
     add_legend(figure)
-    text = as_sentences(
+    return figure, as_sentences(
         f"Probability that more is worn than a volume {result.when(-1)}"
         + (", and that a pair is worn deeper than a depth until then" if len(held) > 1 else "")
         + f", from {count(int(last['n_samples']), 'sample')}",
@@ -213,19 +205,17 @@ def draw_exceedance(result: Result, statistics: xr.Dataset) -> Drawing:
         "Where two lines are alike, samples without a value leave open what is between them",
         left_out,
     )
-    return Drawing("exceedance", "Probability of more wear", text, figure)
 
 
 @_of_samples
-def draw_deciding_inputs(result: Result, statistics: xr.Dataset) -> Drawing | Missing | None:
+def draw_deciding_inputs(result: Result, statistics: xr.Dataset) -> Drawn:
     """What each input decides at the last cycle count: Sobol' indices, or rank correlations, with their intervals."""
-    title, last = "What decides the worn volume", statistics.isel(cycle=-1)
+    last = statistics.isel(cycle=-1)
     measure = measure_of(last)
     if "input" not in last.dims:
         return None
     if measure is None or not last[measure].notnull().any():
-        sentence = "The file holds too few samples to say what decides, or samples that do not differ: raise samples."
-        return Missing("deciding_inputs", title, sentence)
+        return "The file holds too few samples to say what decides, or samples that do not differ: raise samples."
     shares = measure == "first_index"
     bars = {"first_index": "alone", "total_index": "with the others"} if shares else {measure: "rank correlation"}
     shown, left_out = _choose(result, last)
@@ -239,12 +229,11 @@ def draw_deciding_inputs(result: Result, statistics: xr.Dataset) -> Drawing | Mi
             panel.plot(at, middle, color=COLOURS[place], marker="s", linestyle="none", label=words)
             sides = np.maximum(np.stack([middle - interval[:, _LOWEST], interval[:, _HIGHEST] - middle]), 0.0)
             panel.errorbar(at, middle, yerr=np.nan_to_num(sides), fmt="none", ecolor="0.2", elinewidth=1.0, capsize=3.0)
-        names = [str(name).replace("_", "\n") for name in point["input"].values]
-        panel.set_xticks(range(len(names)), names)
+        panel.set_xticks(range(len(value)), [str(name).replace("_", "\n") for name in point["input"].values])
         panel.set_ylim(0.0 if shares else -1.02, 1.02)
-        panel.grid(visible=False, axis="x")
-    for panel in panels[:, 0]:
         panel.set_ylabel("share of the variance" if shares else "rank correlation")
+        panel.grid(visible=False, axis="x")
+    label_outer(panels)
     add_legend(figure)
     what = (
         "Share of the variance that each input decides, alone and with the others: first and total Sobol' index"
@@ -252,7 +241,7 @@ def draw_deciding_inputs(result: Result, statistics: xr.Dataset) -> Drawing | Mi
         else "1 or -1 where the volume rises or falls with this input alone; an effect that rises and falls is not seen"
     )
     intervals = f"Lines: {100.0 * float(last.attrs['confidence']):g} % confidence intervals"
-    return Drawing("deciding_inputs", title, as_sentences(*_tell_rankings(shown), what, intervals, left_out), figure)
+    return figure, as_sentences(*_tell_rankings(shown), what, intervals, left_out)
 
 
 def _tell_rankings(shown: _Shown) -> list[str]:
@@ -261,16 +250,8 @@ def _tell_rankings(shown: _Shown) -> list[str]:
     return [f"{label}: {says}" if label else says[0].upper() + says[1:] for label, says in told if says]
 
 
-def groups_of(point: xr.Dataset, worn: FloatArray) -> NDArray[np.int_]:
-    """Group of each sample (n,): 0 where all are one, 1 the lower, 2 the upper, 3 between. worn: m3."""
-    lower, upper = (float(end) for end in point["group_gap"].values)
-    if np.isnan(lower):
-        return np.zeros(worn.size, int)
-    return np.select([worn <= lower, worn >= upper], [1, 2], 3)
-
-
 @_of_samples
-def draw_deciding_input(result: Result, statistics: xr.Dataset) -> Drawing | None:
+def draw_deciding_input(result: Result, statistics: xr.Dataset) -> Drawn:
     """Worn volumes at the last count over the input with the largest index."""
     last = statistics.isel(cycle=-1)
     if "input" not in last.dims:
@@ -278,28 +259,24 @@ def draw_deciding_input(result: Result, statistics: xr.Dataset) -> Drawing | Non
     shown, left_out = _choose(result, last)
     scale = scale_for("m3", result.worn)
     figure, panels = _panel_grid(shown, 3.0)
-    names, highest, groups = [], 0.0, []
-    for panel, (point, label, found) in zip(panels.flat, shown, strict=True):
-        names.append(str(found["input"].values[leading_input(found)]))
-        highest = max(highest, _draw_dots(panel, result, point, found, names[-1], scale))
-        groups += [_tell_groups(found, label, scale)]
-    for panel in panels[:, 0]:
+    highest = 0.0
+    for panel, (point, _, found) in zip(panels.flat, shown, strict=True):
+        highest = max(highest, _draw_dots(panel, result, point, found, scale))
         panel.set_ylabel(scale.label(f"worn volume {result.when(-1)}"))
+    for row in range(len(panels)):
+        label_outer(panels[row : row + 1])
     set_from_zero(panels[0, 0], scale(highest).item())
     add_legend(figure)
     unknown = _tell_rankings([each for each in shown if deciding_input(each[2]) is None])
-    text = as_sentences(
+    return figure, as_sentences(
         *(unknown or ["Over the input that decides most of it alone"]),
         "Bars: numerical error of the sample" if np.isfinite(result.errors).any() else "",
-        *groups,
         "Crosses: samples that ended early, at what was worn by then" if (result.held & ~result.computed).any() else "",
         left_out,
     )
-    words = " and ".join(dict.fromkeys(name.replace("_", " ") for name in names))
-    return Drawing("deciding_input", f"Worn volume of the samples over {words}", text, figure)
 
 
-def drawn_values(result: Result, name: str, point: Point) -> tuple[FloatArray, str, str]:
+def _drawn_values(result: Result, name: str, point: Point) -> tuple[FloatArray, str, str]:
     """What the samples draw of an input (n_samples,) at a point, its unit and its name in words.
 
     Of an input with a draw for each pair it is the mean over the pairs.
@@ -313,16 +290,19 @@ def drawn_values(result: Result, name: str, point: Point) -> tuple[FloatArray, s
     return np.asarray(drawn.values, dtype=float), "" if units == "1" else units, words
 
 
-def _draw_dots(panel: Axes, result: Result, point: Point, found: xr.Dataset, name: str, scale: Scale) -> float:
+def _draw_dots(panel: Axes, result: Result, point: Point, found: xr.Dataset, scale: Scale) -> float:
     """The samples of one panel; the largest volume, m3, with some room for its error."""
     place = tuple(slice(None) if axis == SAMPLE else point[axis] for axis in result.axes)
     worn, computed = result.worn[place], result.computed[place]
-    drawn, units, words = drawn_values(result, name, point)
+    drawn, units, words = _drawn_values(result, str(found["input"].values[leading_input(found)]), point)
     across = scale_for(units, drawn)
-    at, wrong, group = across(drawn), worn * result.errors[place], groups_of(found, worn)
+    at, wrong = across(drawn), worn * result.errors[place]
     told = computed & np.isfinite(wrong) & (wrong > 0.0)
     sides = scale(np.stack([np.minimum(wrong, worn)[told], wrong[told]]))
     panel.errorbar(at[told], scale(worn[told]), yerr=sides, fmt="none", ecolor="0.7", elinewidth=0.9, zorder=1)
+    # 0 where all samples are one group, 1 the lower, 2 the upper, 3 between
+    lower, upper = (float(end) for end in found["group_gap"].values)
+    group = np.zeros(worn.size) if np.isnan(lower) else np.select([worn <= lower, worn >= upper], [1, 2], 3)
     size = 16.0 if worn.size > 300 else 26.0
     kinds = [(computed & (group == number), *look) for number, look in enumerate(_GROUPS)]
     kinds.append((~computed & np.isfinite(worn), "ended early", "X", 3))
@@ -333,14 +313,3 @@ def _draw_dots(panel: Axes, result: Result, point: Point, found: xr.Dataset, nam
     panel.set_xlabel(across.label(words))
     largest = float(np.nanmax(worn, initial=0.0))
     return min(largest + float(np.max(wrong[told], initial=0.0)), 1.5 * largest)
-
-
-def _tell_groups(point: xr.Dataset, label: str, scale: Scale) -> str:
-    """Where samples fall into two groups: how many are in each, and the pair that tells them apart."""
-    n_lower, n_upper = (int(number) for number in point["group_size"].values)
-    if not n_upper:
-        return ""
-    lower, upper = (scale.show(float(end)) for end in point["group_gap"].values)
-    where, contact = f" at {label}" if label else "", int(point["deciding_contact"])
-    text = f"Two groups{where}: {count(n_lower, 'sample')} up to {lower}, {n_upper} from {upper}"
-    return text if contact < 0 else f"{text}; the wear depth of pair {contact} tells them apart"

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from studyrunner.report.drawing import COLOURS, Drawing, Missing, line_style, new_panels, set_from_zero
+from studyrunner.report.drawing import Drawn
+from studyrunner.report.panels import COLOURS, line_style, new_panels, set_from_zero
 from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint_faces, rgb
 from studyrunner.report.root.surface import MESH
 from studyrunner.report.root.views import from_aslant
@@ -18,20 +19,18 @@ OF_SECTOR = (*MESH, "mesh_part", "natural_frequency")
 """Variables that the figure shows."""
 
 
-def draw_sector(result: Result) -> Drawing | Missing:
+def draw_sector(result: Result) -> Drawn:
     """The natural frequencies, and the mesh beside them where the file holds one."""
     if not result.has("natural_frequency") and "natural_frequencies" not in result.again:
-        said = "Use study-report --natural-frequencies, or add natural_frequency to [outputs] variables."
-        return Missing("natural_frequencies", "Natural frequencies of the sector", said)
+        return "Use study-report --natural-frequencies, or add natural_frequency to [outputs] variables."
     has_mesh = result.has(*MESH)
     ratios = [1.0, 1.7] if has_mesh else [1.0]
-    figure, (panels,) = new_panels(1, len(ratios), 4.0, width_ratios=ratios)
-    text = as_sentences(
-        _draw_mesh(result, panels[0]) if has_mesh else "",
-        _draw_frequencies(result, panels[-1]),
+    figure, panels = new_panels(1, len(ratios), 4.0, width_ratios=ratios)
+    return figure, as_sentences(
+        _draw_mesh(result, panels[0, 0]) if has_mesh else "",
+        _draw_frequencies(result, panels[0, -1]),
         f"Of the sector at {result.describe(result.shown_point(), result.fixed)}" if result.fixed else "",
     )
-    return Drawing("natural_frequencies", "Sector and its natural frequencies, joint stuck", text, figure)
 
 
 def _draw_frequencies(result: Result, panel: Axes) -> str:
@@ -43,8 +42,7 @@ def _draw_frequencies(result: Result, panel: Axes) -> str:
         style = {"linewidth": 0.8, "markersize": 3.5, "marker": line_style(number)["marker"]}
         panel.plot(diameters, mode, color="0.35", markerfacecolor=COLOURS[0], label=f"_mode {number + 1}", **style)
     set_from_zero(panel, float(np.nanmax(frequencies)))
-    panel.set_xlabel("nodal diameter")
-    panel.set_ylabel("natural frequency (Hz)")
+    panel.set(xlabel="nodal diameter", ylabel="natural frequency (Hz)")
     panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     text = f"With the joint stuck, {frequencies.shape[1]} modes, the lowest at {np.nanmin(frequencies):.4g} Hz"
     diameter = result.study.get("scene", {}).get("nodal_diameter")

@@ -12,10 +12,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from studyrunner.report.panels import FloatArray
 from studyrunner.result.units import show_number
 from studyrunner.result.view import NO_VOLUME, Result
-
-FloatArray = NDArray[np.float64]
 
 KEYS = ("scheme", "step", "harmonics", "samples", "tolerance", "rtol")
 """Axes along which only the numbers change and not what is computed."""
@@ -59,8 +58,8 @@ class ComparedPoint:
 
     label: the point in words, empty where nothing but settings varies. computed (n_setting,): whether to the last
     count. values (n_setting,): `run_time` in CPU seconds and what else the file says of the last count. worn
-    (n_setting,): m3. response (n_setting, n_response): m. endings: words of the outcomes. exact: worn volume and
-    response, None where the file holds none.
+    (n_setting,): m3. response (n_setting, n_response): m. exact: worn volume and response, None where the file holds
+    none.
     """
 
     label: str
@@ -69,7 +68,6 @@ class ComparedPoint:
     values: Mapping[str, FloatArray] = field(repr=False)
     worn: FloatArray = field(repr=False)
     response: FloatArray = field(repr=False)
-    endings: tuple[str, ...] = field(repr=False)
     exact: tuple[float, FloatArray] | None = field(repr=False)
 
     @cached_property
@@ -157,7 +155,7 @@ def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
     unknown = xr.full_like(outcome, np.nan, float)
     held = (*_VALUES, "worn_volume", "response_amplitude", "exact_worn_volume", "exact_response_amplitude")
     read = {name: table(result.read(name) if result.has(name) else unknown) for name in held}
-    computed, endings = table(outcome.copy(data=result.computed)) == 1.0, table(outcome)
+    computed = table(outcome.copy(data=result.computed)) == 1.0
     points = []
     for number, place in enumerate(itertools.product(*(range(result.dataset.sizes[name]) for name in others))):
         exact = float(read[held[-2]][number, 0]), np.atleast_1d(read[held[-1]][number, 0])
@@ -168,7 +166,6 @@ def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
             values={name: read[name][number] for name in _VALUES},
             worn=read["worn_volume"][number],
             response=read["response_amplitude"][number],
-            endings=tuple(result.endings[int(each)].word for each in endings[number]),
             exact=exact if all(np.isfinite(each).all() for each in exact) else None,
         )
         points.append(point)

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from studyrunner.report.drawing import COLOURS, Drawing, FloatArray, add_line, new_panels, set_log
+from studyrunner.report.drawing import Drawn
+from studyrunner.report.panels import COLOURS, FloatArray, add_line, is_narrow, new_panels, set_log
+from studyrunner.report.selection import spans_decades
 from studyrunner.result.units import scale_for, show_number, units_of
 from studyrunner.result.view import Result, as_sentences
 from studyrunner.statistics.samples import SAMPLE
 
 _PLAIN = ("frequency", "scheme", SAMPLE)
-_MOST_AXES, _DECADES, _SMALL = 6, 30.0, 7.5
+_MOST_AXES, _SMALL = 6, 7.5
 _LONG = 9  # characters that stand side by side under a small panel
 
 
@@ -32,7 +34,7 @@ class Quantity:
     errors: FloatArray
 
 
-def draw_trends(result: Result) -> Drawing | None:
+def draw_trends(result: Result) -> Drawn:
     """Small multiples: one row a quantity, one column an axis. Nothing where only frequency and scheme vary."""
     quantities = [one for one in find_quantities(result) if np.isfinite(one.values).any()]
     if not quantities or all(name in _PLAIN for name in result.varying):
@@ -54,12 +56,12 @@ def draw_trends(result: Result) -> Drawing | None:
             if any(one.values.shape[axis] > 1 for one in quantities[row + 1 :]):
                 panel.set_xlabel("")
                 panel.tick_params(labelbottom=False)
-        first = panels[row, axes.index(known[0])] if known else panels[row, 0]
-        first.set_ylabel(f"{quantity.label}\n({scale.unit})")
-        first.tick_params(labelleft=True)
-    caption = as_sentences(
-        f"Each column is one axis of the study; blue: through {result.describe(result.shown_point())}, where most is"
-        " worn; grey: all other combinations",
+            if is_narrow() or name == known[0]:
+                panel.set_ylabel(f"{quantity.label}\n({scale.unit})")
+                panel.tick_params(labelleft=True)
+    return figure, as_sentences(
+        f"For each axis of the study; blue: through {result.describe(result.shown_point())}, where most is worn; grey:"
+        " all other combinations",
         "Bars: estimated error of the worn volume; of the peak, its distance from the nearest frequency of the study",
         "The shift is the frequency of the largest response at the last count less that at the first, of points each"
         " after its own wear. Peaks at an end of the frequency range are left out"
@@ -67,7 +69,6 @@ def draw_trends(result: Result) -> Drawing | None:
         else "",
         f"Left out: {', '.join(left)}" if left else "",
     )
-    return Drawing("trends", "Trends along the axes of the study", caption, figure)
 
 
 def find_quantities(result: Result) -> list[Quantity]:
@@ -138,7 +139,7 @@ def _draw_lines(panel: Axes, result: Result, quantity: Quantity, name: str, fact
     # a word a line: panels are narrow
     panel.set_xlabel(name.replace("_", "\n") + (f"\n({units})" if units else ""))
     panel.tick_params(labelsize=_SMALL)
-    if not words and name != "frequency" and at[0] > 0.0 and at[-1] / at[0] > _DECADES:
+    if not words and name != "frequency" and spans_decades(at):
         set_log(panel.xaxis, float(at[0]), float(at[-1]))
         return
     room = (0.15 if len(at) <= 3 else 0.05) * float(np.ptp(at))

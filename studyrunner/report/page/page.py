@@ -40,15 +40,14 @@ _DARKEST, _BRIGHTEST = 0x18, 0xE8
 
 @dataclass(frozen=True)
 class Shown:
-    """A drawing as it stands on the page: SVG elements.
+    """A drawing as it stands on the page: SVG elements for wide and for narrow windows, and names of its files."""
 
-    column: that of narrow windows; empty where there is none. has_values: whether it has a CSV file.
-    """
-
-    drawing: Drawing
-    svg: str
-    column: str
-    has_values: bool
+    name: str
+    title: str
+    caption: str
+    wide: str
+    narrow: str
+    files: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ class Summary:
 
 
 def write_page(result: Result, items: Iterable[Drawing | Missing | Table], path: Path) -> Summary:
-    """Write the page, and beside it `<name>.svg` and `<name>.png` of each drawing.
+    """Write the page, and beside it the files of each drawing.
 
     Parameters
     ----------
@@ -122,10 +121,11 @@ def _turn_grey(found: re.Match[str]) -> str:
 
 
 def _save(drawing: Drawing, folder: Path) -> Shown:
-    texts = [
-        inline_svg(path.read_text(encoding="utf-8"), f"{path.stem}-", drawing.title) for path in drawing.save(folder)
-    ]
-    return Shown(drawing, texts[0], texts[1] if len(texts) > 1 else "", (folder / f"{drawing.name}.csv").exists())
+    paths = drawing.save(folder)
+    wide, narrow = (inline_svg(path.read_text(encoding="utf-8"), f"{path.stem}-", drawing.title) for path in paths)
+    files = [f"{drawing.name}.{kind}" for kind in ("svg", "png", "csv")] + [paths[1].name]
+    there = tuple(name for name in files if (folder / name).exists())
+    return Shown(drawing.name, drawing.title, drawing.caption, wide, narrow, there)
 
 
 def _build_page(result: Result, parts: Sequence[Shown | Missing | Table]) -> str:

@@ -1,9 +1,9 @@
-"""What the page tells of the study: its axes, its scene, how well the worn volume is known, how the points ended."""
+"""What the page tells of the study: the answer, how the points ended, its axes, its scene."""
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ from studyrunner.system.progress import count
 _MOST_VALUES = 12
 
 
-@dataclass(frozen=True)
-class Ended:
+class Ended(NamedTuple):
     """Points that ended in one way: how many, what that means and what may help, and the first of them, a line each."""
 
     points: str
@@ -29,16 +28,11 @@ class Ended:
     lines: list[str]
 
 
-@dataclass(frozen=True)
-class StudyFacts:
-    """The study in words.
-
-    summary: how well the worn volume is known, and how many points were computed. endings: of the points of which there
-    is more to say. facts: names and values. text: the effective study, None where the file has none.
-    """
+class StudyFacts(NamedTuple):
+    """The study in words. text: the effective study, None where the file has none."""
 
     answer: tuple[tuple[str, str], ...]
-    summary: str
+    ends: str
     endings: list[Ended]
     facts: list[tuple[str, str]]
     text: str | None
@@ -46,36 +40,40 @@ class StudyFacts:
 
 def describe_study(result: Result) -> StudyFacts:
     """What was studied and how it ended."""
-    attributes = result.dataset.attrs
+    numbers = Counter(result.dataset["outcome"].values.ravel().tolist())
+    endings = [
+        Ended(
+            count(numbers[number], "point"),
+            " ".join((ending.sentence, *advise_ended(result, number))),
+            describe_ended(result, number),
+        )
+        for number, ending in sorted(result.endings.items())
+        if numbers[number] and number != CONVERGED
+    ]
+    text = str(result.dataset.attrs["study"]) if "study" in result.dataset.attrs else None
+    return StudyFacts(summary_rows(summarise(result)), tell_ends(result), endings, _facts(result), text)
+
+
+def _facts(result: Result) -> list[tuple[str, str]]:
+    """Names and values: axes, drawn inputs, slow time, blocks, scene, versions."""
+    attributes, cycles = result.dataset.attrs, result.cycles
     facts = [(name.replace("_", " "), _axis_values(result, name)) for name in result.axes]
-    facts += _drawn(result)
-    cycles = result.cycles
-    first, last = (show_cycles(float(each), result.counted) for each in (cycles[0], cycles[-1]))
-    kept = f"{first} to {last}, {np.count_nonzero(~np.isnan(cycles))} kept"
+    for name, drawn in result.dataset.coords.items():
+        if str(name).startswith(DRAWN):
+            scale = scale_for(str(drawn.attrs.get("units", "")), drawn.values)
+            low, high = (scale.show(float(end), 4) for end in (drawn.min(), drawn.max()))
+            facts.append((f"drawn: {str(name).removeprefix(DRAWN).replace('_', ' ')}", f"{low} to {high}"))
     if not result.has_modes:
+        first, last = (show_cycles(float(each), result.counted) for each in (cycles[0], cycles[-1]))
+        kept = f"{first} to {last}, {np.count_nonzero(~np.isnan(cycles))} kept"
         facts.append((result.counted, kept if len(cycles) > 1 else first))
     if result.blocks is not None:
         facts.append(("blocks", ", ".join(map(str, result.blocks["block"].values))))
-    facts.append(("scene", _scene(result)))
+    n_pairs = count(result.dataset.sizes["contact"], "contact pair")
+    responses = f", response {', '.join(result.responses)}" if result.responses else ""
+    facts.append(("scene", f"{result.study.get('scene', {}).get('model') or 'unknown'}: {n_pairs}{responses}"))
     named = {"source": "source", "versions": "versions", "scene_sha256": "hash of the scene"}
-    facts += [(label, str(attributes[name])) for name, label in named.items() if name in attributes]
-    numbers = Counter(result.dataset["outcome"].values.ravel().tolist())
-    endings = [
-        Ended(count(numbers[number], "point"), _with_advice(result, number), describe_ended(result, number))
-        for number in sorted(result.endings)
-        if numbers[number] and number != CONVERGED
-    ]
-    return StudyFacts(
-        summary_rows(summarise(result)),
-        tell_ends(result),
-        endings,
-        facts,
-        str(attributes["study"]) if "study" in attributes else None,
-    )
-
-
-def _with_advice(result: Result, number: int) -> str:
-    return " ".join((result.endings[number].sentence, *advise_ended(result, number)))
+    return facts + [(label, str(attributes[name])) for name, label in named.items() if name in attributes]
 
 
 def _axis_values(result: Result, name: str) -> str:
@@ -90,22 +88,3 @@ def _axis_values(result: Result, name: str) -> str:
     if len(values) > _MOST_VALUES:
         return f"{values[0]} to {values[-1]}{after}, {len(values)} values{told}"
     return ", ".join(values) + after + told
-
-
-def _drawn(result: Result) -> list[tuple[str, str]]:
-    """Inputs that scatter: the smallest and the largest value that is drawn."""
-    found = []
-    for name, drawn in result.dataset.coords.items():
-        if str(name).startswith(DRAWN):
-            scale = scale_for(str(drawn.attrs.get("units", "")), drawn.values)
-            low, high = (scale.show(float(end), 4) for end in (drawn.min(), drawn.max()))
-            words = str(name).removeprefix(DRAWN).replace("_", " ")
-            found.append((f"drawn: {words}", f"{low} to {high}"))
-    return found
-
-
-def _scene(result: Result) -> str:
-    n_pairs = count(result.dataset.sizes["contact"], "contact pair")
-    responses = f", response {', '.join(result.responses)}" if result.responses else ""
-    model = result.study.get("scene", {}).get("model")
-    return f"{model or 'unknown'}: {n_pairs}{responses}"

@@ -10,30 +10,19 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from studyrunner.report.drawing import (
-    MAP,
-    Drawing,
-    FloatArray,
-    Missing,
-    add_colour_bar,
-    new_panel,
-    new_panels,
-    title_at,
-)
+from studyrunner.report.drawing import Drawn
+from studyrunner.report.panels import MAP, FloatArray, add_colour_bar, new_panel, new_panels
 from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.painting import body_colours, draw_scale_bar, paint_edges, paint_faces, rgb
-from studyrunner.report.root.surface import RootSurface, read_root
+from studyrunner.report.root.surface import RootSurface, known_counts, read_root
 from studyrunner.report.root.views import View, find_views
-from studyrunner.result.scars import find_scar
-from studyrunner.result.scene_pairs import depths, tells_depth
+from studyrunner.result.scene_pairs import NO_DEPTH, depths, tells_depth
 from studyrunner.result.units import Scale, scale_for, show_number
 from studyrunner.result.view import Result, as_sentences
 
 _MOST_CLOSE_UPS, _FEWEST_SECTORS = 2, 3
 _MOST_PAIRS, _MOST_FACES, _MOST_OF_DISK = 20_000, 60_000, 300_000
 _TO_EYE, _FADED = np.array([0.35, 0.25, 1.0]), 0.45  # the disk: direction to the eye, paleness of the other sectors
-_NO_DEPTH = 1e-15  # m; a depth below this is round-off: it is far less than an atom
-_PATCHES = "The file has no mesh: each pair is a patch"
 
 
 @dataclass(frozen=True)
@@ -56,75 +45,62 @@ class _Picture:
     @property
     def wears(self) -> bool:
         """Whether there is a depth to be seen."""
-        return float(self.depth.max()) > _NO_DEPTH
+        return float(self.depth.max()) > NO_DEPTH
 
 
 def _read_surface(result: Result) -> RootSurface | None:
-    """The surface as it is drawn; None without positions, or with too many pairs to tell apart."""
+    """The surface as it is drawn; None without a mesh, or with too many pairs to tell apart."""
     surface = read_root(result) if result.dataset.sizes["contact"] <= _MOST_PAIRS else None
     return None if surface is None else surface.near_contact(_MOST_FACES)
 
 
-def draw_root(result: Result) -> Drawing | None:
+def draw_root(result: Result) -> Drawn:
     """The worn shape of the shown point, coloured with its wear depth; the mean pressure where nothing is worn."""
     shown, surface = result.shown_point(), _read_surface(result)
     fields = {"wear_depth": depths(result, shown)} if tells_depth(result) else {}
     fields |= {name: result.at(name, shown).values for name in ("mean_pressure",) if result.has(name)}
-    held = np.ones(len(result.cycles), dtype=np.bool_)
-    for each in fields.values():
-        held &= np.isfinite(each).all(axis=1)
-    # of a cylinder or a sphere on a flat the scar over x shows more
-    if surface is None or not fields or not held.any() or find_scar(result) is not None:
+    known = known_counts(fields) if fields else np.zeros(0, int)
+    if surface is None or not known.size:
         return None
-    last = int(np.flatnonzero(held)[-1])
+    last = int(known[-1])
     depth = fields["wear_depth"][last] if "wear_depth" in fields else np.zeros(result.dataset.sizes["contact"])
-    worn = float(depth.max()) > _NO_DEPTH
+    worn = float(depth.max()) > NO_DEPTH
     name = "wear_depth" if worn or "mean_pressure" not in fields else "mean_pressure"
     values, label = fields[name][last], name.replace("_", " ")
     scale = scale_for("m" if name == "wear_depth" else "Pa", values)
     factor = surface.exaggeration(float(depth.max())) if worn else 1.0
     picture = _Picture(surface, find_views(result, surface), depth, values, scale, label, factor)
     pair = result.dataset["contact"].values[int(np.argmax(values))]
-    text = as_sentences(
+    return _paint(picture), as_sentences(
         f"{label.capitalize()} {result.when(last, 'after')}",
         f"Largest: {scale.show(float(values.max()))} at pair {pair}" if float(values.max()) > 0.0 else "",
         f"The wear depth, of both surfaces together, is taken off each surface, {show_number(factor)} times exaggerated"
         if worn
         else "",
         "Dashed: the edge of the contact surface before" if picture.close_ups and worn else "",
-        "" if surface.is_mesh else _PATCHES,
     )
-    return Drawing("worn_root", title_at(result, "The worn root" if worn else "The root"), text, _paint(picture))
 
 
-def draw_slip(result: Result) -> Drawing | Missing | None:
-    """Fraction of the period in which pairs slip, at the shown point: a large amplitude."""
-    return _draw_fraction(result, "slip_fraction", "Where the joint slips", "in slip")
-
-
-def draw_open(result: Result) -> Drawing | Missing | None:
-    """Fraction of the period in which pairs are open, at the shown point: a large amplitude."""
-    return _draw_fraction(result, "open_fraction", "Where the joint opens", "open")
-
-
-def _draw_fraction(result: Result, name: str, title: str, words: str) -> Drawing | Missing | None:
+def draw_fraction(result: Result, name: str) -> Drawn:
+    """Fraction of the period in which pairs slip, or are open, at the shown point: a large amplitude."""
     values, surface = np.asarray(result.at(name, result.shown_point()).values, dtype=float), _read_surface(result)
     if surface is None:
         return None
     if not np.isfinite(values).all():
-        return Missing(name, title, "No point has a state.")
-    label, nothing = f"fraction of the period {words}", np.zeros(len(values))
+        return "No point has a state."
+    label = f"fraction of the period {'in slip' if name == 'slip_fraction' else 'open'}"
+    nothing = np.zeros(len(values))
     picture = _Picture(surface, find_views(result, surface), nothing, values, scale_for("1", values), label)
     pair = result.dataset["contact"].values[int(np.argmax(values))]
     largest = f"Largest: {values.max():.3g} at pair {pair}" if values.max() > 0.0 else "No pair does"
-    caption = as_sentences(label.capitalize(), largest, "" if surface.is_mesh else _PATCHES)
-    return Drawing(name, title_at(result, title), caption, _paint(picture))
+    return _paint(picture), as_sentences(label.capitalize(), largest)
 
 
 def _paint(picture: _Picture) -> Figure:
     """The root as a whole, and the contact surfaces of its outer body from close by."""
     ratios = [1.0] + [2.0] * len(picture.close_ups)
-    figure, (panels,) = new_panels(1, len(ratios), 3.4, width_ratios=ratios)
+    figure, rows = new_panels(1, len(ratios), 3.4, width_ratios=ratios)
+    panels = rows[0]
     norm = Normalize(0.0, picture.scale(float(picture.values.max())).item() or 1.0)
     for panel, view in zip(panels, [picture.views[-1], *picture.close_ups], strict=True):
         _paint_view(panel, picture, view, norm)
@@ -158,7 +134,7 @@ def _name_leading_edge(panel: Axes, nodes: FloatArray, view: View, edge: FloatAr
     panel.annotate("leading edge", (at[0], at[1]), (text[0], text[1]), ha="center", va="top", arrowprops=line)
 
 
-def draw_disk(result: Result) -> Drawing | None:
+def draw_disk(result: Result) -> Drawn:
     """The disk of all sectors, that of the mesh in full colour (Fig. 2a); only faces that look to the eye are drawn.
 
     None where the study names no sectors about z, or their faces are too many.
@@ -167,7 +143,7 @@ def draw_disk(result: Result) -> Drawing | None:
     number = scene.get("n_sectors")
     if scene.get("model") != "dovetail_sector" or not isinstance(number, int) or surface is None:
         return None
-    if not surface.is_mesh or number < _FEWEST_SECTORS or number * len(surface.faces) > _MOST_OF_DISK:
+    if number < _FEWEST_SECTORS or number * len(surface.faces) > _MOST_OF_DISK:
         return None
     to_eye = _TO_EYE / np.linalg.norm(_TO_EYE)
     view = View("", np.ones(1, np.bool_), to_eye, np.array([1.0, 0.0, 0.0]), -1, -1)
@@ -182,8 +158,7 @@ def draw_disk(result: Result) -> Drawing | None:
     looking = face_normals(all_nodes, all_faces) @ to_eye > 0.0
     figure, panel = new_panel(4.6)
     paint_faces(panel, all_nodes, all_faces[looking], all_colours[looking], view, lines=0.0)
-    text = as_sentences(
+    return figure, as_sentences(
         f"The {number} sectors of the disk, that of the mesh in full colour",
         f"Axis of rotation: z, towards the reader; parts: {', '.join(surface.bodies)}",
     )
-    return Drawing("whole_disk", "The whole disk", text, figure)

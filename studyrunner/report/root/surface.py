@@ -1,9 +1,10 @@
-"""Faces that are drawn in three dimensions: those of the scene's mesh, or a patch a contact pair where it has none."""
+"""The mesh of a scene as it is drawn in three dimensions: outer faces of the bodies, and the contact pairs on them."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,12 +14,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from studyrunner.report.root.contact_faces import ContactFaces, face_normals, find_contact_faces
+from studyrunner.result.scene_pairs import contact_pairs
 from studyrunner.result.view import Result
 
 MESH = ("mesh_x", "mesh_y", "mesh_z", "mesh_quad")
 
 _DEEPEST = 0.04  # worn depth as it is drawn, over the size of the contact surfaces
-_STRAIGHT = 1e-6
 _CORNERS = 4
 
 
@@ -28,7 +29,7 @@ class RootSurface:
 
     nodes (n_nodes, 3): m. faces (n_faces, 4): nodes anticlockwise from outside; triangles repeat their last one.
     body (n_faces,): index into `bodies`, whose faces hang together by their nodes. contact: the faces in contact.
-    flanks: labels of the contact surfaces. is_mesh: else the faces are patches, one a pair.
+    flanks: labels of the contact surfaces.
     """
 
     nodes: NDArray[np.float64]
@@ -37,7 +38,6 @@ class RootSurface:
     bodies: tuple[str, ...]
     contact: ContactFaces
     flanks: tuple[str, ...]
-    is_mesh: bool
 
     def worn(self, depth: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
         """Nodes (n_nodes, 3), m, with the wear depth (n_contact,), m, of the pairs times a factor taken off.
@@ -77,39 +77,32 @@ class RootSurface:
         power = 10.0 ** math.floor(math.log10(wanted))
         return max(factor * power for factor in (1.0, 2.0, 5.0) if factor * power <= wanted * (1.0 + 1e-9))
 
+    def mean_normal(self, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Unit vector (3,): mean outward normal of some faces (n_faces,), weighted by their areas."""
+        total = face_normals(self.nodes, self.faces[chosen]).sum(axis=0)
+        return np.asarray(total / max(float(np.linalg.norm(total)), 1e-300))
+
 
 def read_root(result: Result) -> RootSurface | None:
-    """The faces of a file; None where it has no positions of pairs to draw them at."""
-    coordinates = result.dataset.coords
-    n_pairs = result.dataset.sizes["contact"]
-    if not all(f"contact_{axis}" in coordinates for axis in "xyz"):
+    """The faces of a file; None where it has no mesh, no positions of pairs, or no pairs on its mesh."""
+    pairs = contact_pairs(result, result.shown_point())
+    if not np.isfinite(pairs.position).all() or not result.has(*MESH):
         return None
-    positions = np.stack([coordinates[f"contact_{axis}"].values for axis in "xyz"], axis=1).astype(float)
-    if not np.isfinite(positions).all():
-        return None
-    labels = np.full(n_pairs, "contact")
-    if "contact_surface" in coordinates:
-        labels = coordinates["contact_surface"].values.astype(str)
-    flanks = tuple(dict.fromkeys(labels.tolist()))
-    flank = np.array([flanks.index(label) for label in labels.tolist()])
-    if result.has(*MESH) and len(result.dataset["mesh_quad"]) and result.dataset["mesh_quad"].shape[1] == _CORNERS:
-        surface = _of_mesh(result, positions, flank, flanks)
-        if len(surface.contact.nodes):
-            return surface
-    area = np.asarray(coordinates["contact_area"].values if "contact_area" in coordinates else np.nan, dtype=float)
-    # what is no area has no sides: NaN is none
-    return _of_patches(positions, area, flank, flanks) if (area > 0.0).all() else None
-
-
-def _of_mesh(
-    result: Result, positions: NDArray[np.float64], flank: NDArray[np.int64], flanks: tuple[str, ...]
-) -> RootSurface:
-    nodes = np.stack([result.read(f"mesh_{axis}").values for axis in "xyz"], axis=1).astype(float)
     faces = result.read("mesh_quad").values.astype(np.int64)
+    if not len(faces) or faces.shape[1] != _CORNERS:
+        return None
+    nodes = np.stack([result.read(f"mesh_{axis}").values for axis in "xyz"], axis=1).astype(float)
     parts = result.read("mesh_part").values.astype(str) if result.has("mesh_part") else np.full(len(faces), "")
+    flanks = tuple(dict.fromkeys(pairs.surface.tolist()))
+    flank = np.array([flanks.index(label) for label in pairs.surface.tolist()])
     body = _bodies(faces, len(nodes))
-    contact = find_contact_faces(nodes, faces, body, positions, flank)
-    return RootSurface(nodes, faces, body, _name_bodies(body, parts), contact, flanks, is_mesh=True)
+    contact = find_contact_faces(nodes, faces, body, pairs.position, flank)
+    return RootSurface(nodes, faces, body, _name_bodies(body, parts), contact, flanks) if len(contact.nodes) else None
+
+
+def known_counts(fields: Mapping[str, NDArray[np.float64]]) -> NDArray[np.intp]:
+    """Places of the cycle counts at which all of these fields (n_cycles, n_contact) have values."""
+    return np.flatnonzero(np.all([np.isfinite(values).all(axis=1) for values in fields.values()], axis=0))
 
 
 def _bodies(faces: NDArray[np.int64], n_nodes: int) -> NDArray[np.int64]:
@@ -129,66 +122,3 @@ def _name_bodies(body: NDArray[np.int64], parts: NDArray[np.str_]) -> tuple[str,
         name if name and count[name] == 1 else f"{name or 'body'} {names[: place + 1].count(name)}"
         for place, name in enumerate(names)
     )
-
-
-def _of_patches(
-    positions: NDArray[np.float64], area: NDArray[np.float64], flank: NDArray[np.int64], flanks: tuple[str, ...]
-) -> RootSurface:
-    """A rectangle at each pair, in the plane that fits the pairs of its surface best."""
-    nodes = np.empty((len(positions), 4, 3))
-    normals = np.empty((len(positions), 3))
-    for number in range(len(flanks)):
-        own = np.flatnonzero(flank == number)
-        first, second, lengths = _plane(positions[own], area[own])
-        for corner, (a, b) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1))):
-            nodes[own, corner] = positions[own] + 0.5 * (a * lengths[:, :1] * first + b * lengths[:, 1:] * second)
-        normals[own] = np.cross(first, second)
-    faces = np.arange(4 * len(positions)).reshape(-1, 4)
-    pairs = np.repeat(np.arange(len(positions)), 4)
-    contact = ContactFaces(
-        flank=flank,
-        nodes=faces.ravel(),
-        pairs=pairs[:, None],
-        weights=np.ones((pairs.size, 1)),
-        normals=np.repeat(normals, 4, axis=0),
-    )
-    body = np.zeros(len(faces), dtype=np.int64)
-    return RootSurface(nodes.reshape(-1, 3), faces, body, ("contact pairs",), contact, flanks, is_mesh=False)
-
-
-def _plane(
-    positions: NDArray[np.float64], area: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Unit vectors (3,) along the sides of the patches of a surface, and lengths (n, 2), m, of these sides.
-
-    The first points to the nearest neighbour of the pair in the middle: patches of a grid lie side by side. They are
-    squares of the area, but no larger than to the neighbour: where a symmetric half is modelled, areas count double.
-    Pairs on a line become strips whose plane stands straightest on an axis, a quarter as long as the line: of a plane
-    strain model the third direction has no length.
-    """
-    centred = positions - positions.mean(axis=0)
-    _, sizes, directions = np.linalg.svd(np.vstack([centred, np.zeros((3, 3))]), full_matrices=False)
-    spacing, first = float(np.sqrt(area.mean())), directions[0]
-    if len(positions) > 1 and sizes[0] > 0.0:
-        middle = int(np.argmin(np.linalg.norm(centred, axis=1)))
-        apart, near = cKDTree(positions).query(positions, k=2)
-        spacing = float(np.median(apart[:, 1])) or spacing
-        way = positions[near[middle, 1]] - positions[middle]
-        first = way / np.linalg.norm(way) if apart[middle, 1] > 0.0 else first
-    if sizes[1] > _STRAIGHT * sizes[0]:
-        normal = directions[2] * np.sign(directions[2][np.argmax(np.round(np.abs(directions[2]), 6))])
-        side = np.minimum(np.sqrt(area), spacing)
-        lengths = np.stack([side, side], axis=1)
-    else:
-        normal = np.eye(3)[2 - np.argmin(np.round(np.abs(first[::-1]), 6))]
-        length = 0.25 * float(np.ptp(positions @ first)) or spacing
-        lengths = np.tile([spacing, length], (len(positions), 1))
-    first = first - (first @ normal) * normal
-    first /= np.linalg.norm(first)
-    return first, np.cross(normal, first), lengths
-
-
-def mean_normal(surface: RootSurface, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Unit vector (3,): mean outward normal of some faces (n_faces,), weighted by their areas."""
-    total = face_normals(surface.nodes, surface.faces[chosen]).sum(axis=0)
-    return np.asarray(total / max(float(np.linalg.norm(total)), 1e-300))

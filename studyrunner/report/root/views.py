@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.report.root.surface import RootSurface, mean_normal
+from studyrunner.report.root.surface import RootSurface
 from studyrunner.result.view import Result
 
 MOST_VIEWS = 8
@@ -55,10 +55,6 @@ def find_views(result: Result, surface: RootSurface) -> tuple[View, ...]:
     """Close-ups of each contact surface of each body, the outermost body first, then the whole."""
     leading = LEADING.get(str(result.study.get("scene", {}).get("model")))
     up = _upwards(surface.nodes)
-    seen = np.ones(len(surface.faces), dtype=np.bool_)
-    if not surface.is_mesh:
-        normal = mean_normal(surface, surface.contact.flank >= 0)
-        return (View("contact pairs", seen, *_aslant(normal, up), -1, -1),)
     contact = surface.contact.flank >= 0
     # by where they are along the direction upwards
     height = {
@@ -94,7 +90,7 @@ def _close_up(
     own = surface.body == body
     inside = surface.nodes[np.unique(surface.faces[own & (surface.contact.flank >= 0)])]
     looked_at = own & (surface.contact.flank == flank)
-    normal = mean_normal(surface, looked_at)
+    normal = surface.mean_normal(looked_at)
     size = float(np.linalg.norm(np.ptp(inside, axis=0)))
     low, high = inside.min(axis=0) - _AROUND * size, inside.max(axis=0) + _AROUND * size
     centre = surface.nodes[surface.faces].mean(axis=1)

@@ -12,6 +12,7 @@ from selenium.webdriver.support.select import Select
 from selenium.webdriver.support.wait import WebDriverWait
 
 from studyrunner.report.page.page import write_page
+from tests.studyrunner.report.figure_numbers import draw_figure
 from tests.studyrunner.results import as_result
 
 CHROMIUM, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
@@ -46,8 +47,10 @@ def messages(browser):
     return [each for each in browser.get_log("browser") if each["source"] != "rendering"]
 
 
-def write(dataset, folder):
-    write_page(as_result(dataset, folder / "some.nc"), [], folder / "index.html")
+def write(dataset, folder, figures=()):
+    """The address of a page with the figures of these names."""
+    result = as_result(dataset, folder / "some.nc")
+    write_page(result, [draw_figure(result, name) for name in figures], folder / "index.html")
     return (folder / "index.html").as_uri()
 
 

@@ -5,13 +5,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from numpy.typing import NDArray
 
-from studyrunner.report.contents import draw_report
+from studyrunner.report.contents import FIGURES
 from studyrunner.report.drawing import Drawing
 from studyrunner.result.view import Result
 
 
 def draw_figure(result: Result, name: str) -> Drawing:
-    found = next(item for item in draw_report(result) if item.name == name)
+    found = next(entry for entry in FIGURES if entry.name == name).make(result)
     assert isinstance(found, Drawing)
     return found
 

@@ -42,7 +42,7 @@ def dataset():
 
 @pytest.fixture(scope="module")
 def address(dataset, tmp_path_factory):
-    return write(dataset, tmp_path_factory.mktemp("page"))
+    return write(dataset, tmp_path_factory.mktemp("page"), ["wear_depth"])
 
 
 @pytest.fixture
@@ -164,6 +164,8 @@ def test_the_page_fits_a_phone_and_follows_the_dark_mode(browser, address):
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
         load(browser, address)
         assert browser.execute_script("return document.documentElement.scrollWidth") <= PHONE[0]
+        shown = "return [...document.querySelectorAll('figure > div')].map((each) => each.getClientRects().length)"
+        assert browser.execute_script(shown) == [0, 1]
         assert browser.execute_script("return getComputedStyle(document.body).backgroundColor") == "rgb(24, 24, 24)"
         assert browser.execute_script("return document.getElementById('panel').layout.paper_bgcolor") == "#181818"
     finally:
@@ -174,17 +176,14 @@ def test_the_page_fits_a_phone_and_follows_the_dark_mode(browser, address):
 
 ONE = {"frequency": (190.0,), "wear_coefficient": (1e-11,), "scheme": ("implicit",), "sweep": ("up",)}
 UNUSUAL = {
-    "one cycle, scattered pairs": {
+    "words only, most failed, one count, scattered pairs": {
+        "axes": {**ONE, "harmonics": ("auto", "5"), "scheme": ("implicit", "explicit")},
+        "failed": (1, 2, 3),
         "cycles": (0.0,),
         "positions": np.random.default_rng(0).normal(size=(7, 3)),
         "surfaces": ["one"] * 7,
     },
-    "words only, most failed": {
-        "axes": {**ONE, "harmonics": ("auto", "5"), "scheme": ("implicit", "explicit")},
-        "failed": (1, 2, 3),
-    },
-    "one point": {"axes": ONE},
-    "nothing asked for": {"variables": ()},
+    "one point, nothing asked for": {"axes": ONE, "variables": ()},
 }
 
 

@@ -14,7 +14,7 @@ from matplotlib.transforms import Bbox
 
 from studyrunner.report import contents
 from studyrunner.report.contents import draw_report
-from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, set_in_column, style
+from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, Missing, fit_into_column, style
 from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.report.figures.trends import find_peak, find_quantities
 from studyrunner.result.view import Result
@@ -33,46 +33,48 @@ from tests.studyrunner.results import (
 )
 
 ALL_DRAWINGS = (
-    "final_worn_volume worn_volume worn_volume_map wear_rate_map frequency_response worn_root wear_depth worn_profile"
+    "final_worn_volume worn_volume worn_volume_map wear_rate_map frequency_response wear_depth worn_profile"
     " mean_pressure fretting_loops normal_load pair_motion pair_numbers natural_frequencies"
 )
 NOTHING = (
     *("worn_volume", "wear_rate", "wear_depth", "mean_pressure", "response_amplitude", "response_phase"),
     *("response_error", "wear_rate_error", "energy_error", "stable"),
 )
+FLAT = "worn_volume_map final_worn_volume wear_depth worn_profile"
+SAMPLED = "worn_volume_bands worn_volume_bands_course exceedance deciding_inputs deciding_input"
+# of each result what is drawn, what is not, as there is nothing to see, and whether it is tried on paper
 CASES = {
-    "complete": lambda: with_sector(with_loops(make_result())),
-    "one point": lambda: make_result(frequency=[200.0], scheme=["implicit"]),
-    "no cycles": lambda: make_result(cycles=[0.0]),
-    "all failed": lambda: make_result(failed=range(8)),
-    "nothing wears": lambda: make_result(wears=False),
-    "scattered pairs": lambda: make_result(pairs="scattered"),
-    "pairs nowhere": lambda: make_result(pairs="nowhere"),
-    "wear coefficients": lambda: make_result(frequency=[200.0], wear_coefficient=[1e-12, 1e-11, 1e-10]),
-    "many": lambda: with_sector(
-        with_loops(make_result(wear_coefficient=[1e-12, 1.1e-11], sweep=["up", "down"], failed=[3]))
+    "complete": (lambda: with_sector(with_loops(make_result())), ALL_DRAWINGS, "", False),
+    "one point": (
+        lambda: make_result(frequency=[200.0], scheme=["implicit"]),
+        "worn_volume",
+        "frequency_response worn_volume_map final_worn_volume outcome_map",
+        False,
     ),
-    "two responses": lambda: with_two_responses(make_result()),
-    "nothing asked for": lambda: make_result(without=NOTHING),
-    "samples": lambda: Result(Path("samples.nc"), sample_file()),
-    "settings": lambda: finest_file(1e-4),
+    "no cycles": (lambda: make_result(cycles=[0.0]), "", f"worn_volume {FLAT}", False),
+    "all failed": (lambda: make_result(failed=range(8)), "", ALL_DRAWINGS, False),
+    "nothing wears": (lambda: make_result(wears=False), "worn_volume", FLAT, False),
+    "scattered pairs": (lambda: make_result(pairs="scattered"), "worn_profile", "", True),
+    "pairs nowhere": (lambda: make_result(pairs="nowhere"), "wear_depth", "worn_profile pair_numbers", False),
+    "wear coefficients": (
+        lambda: make_result(frequency=[200.0], wear_coefficient=[1e-12, 1e-11, 1e-10]),
+        "trends",
+        "frequency_response",
+        False,
+    ),
+    "many": (
+        lambda: with_sector(
+            with_loops(make_result(wear_coefficient=[1e-12, 1.1e-11], sweep=["up", "down"], failed=[3]))
+        ),
+        "outcome_map trends",
+        "",
+        True,
+    ),
+    "two responses": (lambda: with_two_responses(make_result()), "frequency_response", "", True),
+    "nothing asked for": (lambda: make_result(without=NOTHING), "", "worn_volume frequency_response", False),
+    "samples": (lambda: Result(Path("samples.nc"), sample_file()), SAMPLED, "", True),
+    "settings": (lambda: finest_file(1e-4), "precision", "", True),
 }
-ABSENT = {
-    "one point": {"frequency_response", "worn_volume_map", "final_worn_volume", "outcome_map"},
-    "no cycles": {"worn_volume", "worn_volume_map", "wear_depth", "worn_profile"},
-    "nothing wears": {"worn_volume_map", "final_worn_volume", "wear_depth", "worn_profile"},
-    "pairs nowhere": {"worn_profile", "pair_numbers"},
-    "all failed": set(ALL_DRAWINGS.split()),
-}
-"""What is not drawn, as there is nothing to see."""
-
-PRESENT = {
-    "complete": ALL_DRAWINGS,
-    "many": "outcome_map trends",
-    "samples": "worn_volume_bands worn_volume_bands_course exceedance deciding_inputs deciding_input",
-    "settings": "precision",
-}
-PRINTED = {"many", "scattered pairs", "two responses", "samples", "settings"}
 _THIN = 2.0
 """Pixels by which boxes of text may touch."""
 
@@ -80,63 +82,57 @@ _THIN = 2.0
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_each_kind_of_result_has_its_figures_and_they_can_be_read(case):
-    items = list(draw_report(CASES[case]()))
-    drawn = [item.name for item in items if isinstance(item, Drawing)]
+    make, present, absent, on_paper = CASES[case]
+    items = list(draw_report(make()))
+    drawn = {item.name for item in items if isinstance(item, Drawing)}
     assert len({item.name for item in items}) == len(items)
-    assert not ABSENT.get(case, set()) & set(drawn)
-    assert set(PRESENT.get(case, "").split()) <= set(drawn)
+    assert set(present.split()) <= drawn
+    assert not set(absent.split()) & drawn
     for item in items:
         assert item.title
         if isinstance(item, Drawing):
             assert item.caption.endswith(".")
             assert "nan" not in item.caption
-            assert item.figure.axes
-            if case in PRINTED:
-                _check_print(item)
+            if on_paper:
+                _check_print(item.figure, WIDTH, item.name)
+                _check_print(item.narrow(), COLUMN_WIDTH, item.name)
         elif isinstance(item, Missing):
             assert item.sentence.endswith(".")
         else:
-            assert item.rows
             assert all(len(row) == len(item.columns) for row in item.rows)
 
 
-def _check_print(drawing):
-    """Legends cover no panel, nothing is cut off or runs into its neighbour, whole and as wide as a column."""
-    for width_in_print in (WIDTH, COLUMN_WIDTH) if drawing.fits_column else (WIDTH,):
-        figure = drawing.figure
-        with style():
-            if width_in_print == COLUMN_WIDTH:
-                set_in_column(figure)
-            canvas = FigureCanvasAgg(figure)
-            figure.draw_without_rendering()
-        renderer = canvas.get_renderer()
-        inside = figure.get_tightbbox(renderer)
-        width, height = figure.get_size_inches()
-        assert width == width_in_print
-        assert min(inside.x0, inside.y0, width - inside.x1, height - inside.y1) > -_THIN / figure.dpi, drawing.name
-        whole = [panel.get_tightbbox(renderer) for panel in figure.axes]
-        whole += [legend.get_window_extent(renderer) for legend in figure.legends]
-        for one, other in combinations([box for box in whole if box is not None], 2):
-            common = Bbox.intersection(one, other)
-            assert common is None or np.min(common.size) <= _THIN, drawing.name
-        assert all(text.get_fontsize() >= 7.0 for text in figure.findobj(Text) if text.get_text()), drawing.name
+def _check_print(figure, width_in_print, name):
+    """Legends cover no panel, nothing is cut off or runs into its neighbour, on a page and in a column."""
+    if width_in_print == COLUMN_WIDTH:
+        fit_into_column(figure)
+    with style():
+        canvas = FigureCanvasAgg(figure)
+        figure.draw_without_rendering()
+    renderer = canvas.get_renderer()
+    inside = figure.get_tightbbox(renderer)
+    width, height = figure.get_size_inches()
+    assert width == width_in_print
+    assert min(inside.x0, inside.y0, width - inside.x1, height - inside.y1) > -_THIN / figure.dpi, name
+    whole = [panel.get_tightbbox(renderer) for panel in figure.axes]
+    whole += [legend.get_window_extent(renderer) for legend in figure.legends]
+    for one, other in combinations([box for box in whole if box is not None], 2):
+        common = Bbox.intersection(one, other)
+        assert common is None or np.min(common.size) <= _THIN, name
+    assert all(text.get_fontsize() >= 7.0 for text in figure.findobj(Text) if text.get_text()), name
 
 
 @pytest.mark.slow
-def test_figures_are_saved_as_svg_and_png_those_of_one_panel_for_a_column_too(tmp_path):
-    def width(path):
-        return int.from_bytes(path.read_bytes()[16:20])
-
+def test_figures_are_saved_as_svg_and_png_for_a_page_and_for_a_column(tmp_path):
     before = dict(mpl.rcParams)
-    drawings = {item.name: item for item in draw_report(make_result()) if isinstance(item, Drawing)}
-    for name, n_files in (("final_worn_volume", 2), ("worn_volume_map", 1)):
-        paths = drawings[name].save(tmp_path)
-        assert len(paths) == n_files
-        content = paths[0].read_bytes()
-        assert len(content) < 200_000
-        assert width(paths[0].with_suffix(".png")) == 2250  # 190 mm at 300 dpi
-        assert draw_figure(make_result(), name).save(tmp_path)[0].read_bytes() == content
-    assert width(tmp_path / "final_worn_volume_column.png") == 1065  # 90 mm at 300 dpi
+    for name in ("final_worn_volume", "worn_volume_map"):
+        paths = draw_figure(make_result(), name).save(tmp_path)
+        contents_of = [path.read_bytes() for path in paths]
+        assert max(map(len, contents_of)) < 200_000
+        # 190 mm and 90 mm at 300 dpi
+        pngs = [path.with_suffix(".png").read_bytes() for path in paths]
+        assert [int.from_bytes(png[16:20]) for png in pngs] == [2250, 1065]
+        assert [path.read_bytes() for path in draw_figure(make_result(), name).save(tmp_path)] == contents_of
     assert dict(mpl.rcParams) == before
 
 
@@ -151,12 +147,10 @@ def test_variables_are_read_no_more_than_needed(tmp_path):
 
 
 def test_the_output_to_ask_for_is_named():
-    sentences = {
-        item.name: item.sentence for item in draw_report(make_result(without=NOTHING)) if hasattr(item, "sentence")
-    }
-    for name, variable in (("worn_volume", "worn_volume"), ("frequency_response", "response_amplitude")):
-        assert variable in sentences[name]
-    assert "loops = [0]" in sentences["fretting_loops"]
+    items = draw_report(make_result(without=NOTHING))
+    sentences = {item.name: item.sentence for item in items if isinstance(item, Missing)}
+    asked = {"worn_volume": "worn_volume", "frequency_response": "response_amplitude", "fretting_loops": "loops = [0]"}
+    assert all(word in sentences[name] for name, word in asked.items())
 
 
 def test_worn_volume_over_cycles_with_its_error_and_its_end():
@@ -166,8 +160,7 @@ def test_worn_volume_over_cycles_with_its_error_and_its_end():
     for number, label in enumerate(("implicit scheme", "explicit scheme")):
         worn = 1e9 * values_of(result, "worn_volume", frequency=2, scheme=number)
         np.testing.assert_allclose(lines[label], [[0.0, 1.0, 5.0, 20.0], worn])
-    ended = lines["ended early"]
-    np.testing.assert_allclose([ended[0].item(), ended[1].item()], [5.0, worn[2]])
+    np.testing.assert_allclose(np.ravel(lines["ended early"]), [5.0, worn[2]])
     band = next(found for found in panel.collections if found.get_gid() == "error")
     error = values_of(result, "worn_volume_error", frequency=2, scheme=0)[-1]
     highest = 1e9 * values_of(result, "worn_volume", frequency=2, scheme=0)[-1] * (1.0 + error)
@@ -191,9 +184,8 @@ def test_final_volumes_have_bars_and_marks():
     result = with_endings(make_result(failed=[7]), endings, {})
     panel = draw_figure(result, "final_worn_volume").figure.axes[0]
     lines = lines_of(panel)
-    assert lines["above rtol"][0].tolist() == [202.0, 204.0, 201.0]
-    assert lines["sensitive"][0].tolist() == [202.0]
-    assert lines["no result"][0].tolist() == [204.0]
+    marked = {"above rtol": [202.0, 204.0, 201.0], "sensitive": [202.0], "no result": [204.0]}
+    assert {label: lines[label][0].tolist() for label in marked} == marked
     # what was worn by the last count before it ended
     early = 1e9 * values_of(result, "worn_volume", frequency=1, scheme=0)[2]
     np.testing.assert_allclose(lines["ended early"], [[201.0], [early]])
@@ -206,9 +198,7 @@ def test_final_volumes_have_bars_and_marks():
 def test_frequency_response_of_both_sweeps_is_open_at_the_fold_and_unstable_states_are_ringed():
     result = make_result(sweep=["up", "down"], scheme=["implicit"])
     branch, fold, stable = (result.dataset[name].copy() for name in ("branch", "fold_frequency", "stable"))
-    branch[2:, ..., 0] = 1
-    fold[2, ..., 0] = 201.4
-    stable[1, ..., 0] = 0
+    branch[2:, ..., 0], fold[2, ..., 0], stable[1, ..., 0] = 1, 201.4, 0
     changed = with_variables(result, branch=branch, fold_frequency=fold, stable=stable)
     lines = lines_of(draw_figure(changed, "frequency_response").figure.axes[0])
     for number, sweep in enumerate(("up", "down")):
@@ -219,28 +209,25 @@ def test_frequency_response_of_both_sweeps_is_open_at_the_fold_and_unstable_stat
         assert np.flatnonzero(~known).tolist() == ([2] if number == 0 else [])
     (fold,) = [line for label, line in lines.items() if label.startswith("fold, sweep up")]
     assert set(fold[0].tolist()) == {201.4}
-    ringed = 1e3 * values_of(result, "response_amplitude", frequency=1, cycle=0, sweep=0)
+    ringed = 1e3 * values_of(result, "response_amplitude", frequency=1, cycle=0, sweep=1)
     np.testing.assert_allclose(lines["unstable"], [[201.0], [ringed]])
 
 
-def test_worn_joints_have_response_curves_of_their_own():
+def test_worn_joints_have_response_curves_and_joints_that_wore_differently_are_marks():
     made = make_result(scheme=["implicit"], wear_coefficient=[0.0, 1e5])
     worn = Result(made.path, made.dataset.rename(wear_coefficient="worn_cycle"))
     lines = lines_of(draw_figure(worn, "frequency_response").figure.axes[0])
     for number, label in enumerate(("worn cycle 0 1/Pa", "worn cycle 100\N{NO-BREAK SPACE}000 1/Pa")):
         expected = 1e3 * values_of(worn, "response_amplitude", worn_cycle=number, cycle=0)
         np.testing.assert_allclose(lines[label][1], expected)
-
-
-def test_joints_that_wore_differently_are_marks_and_no_curve():
     result = make_result()
-    drawing = draw_figure(result, "response_after_own_wear")
-    assert "different joints" in drawing.title
-    lines = drawing.figure.axes[0].get_lines()
-    expected = 1e3 * values_of(result, "response_amplitude", scheme=0, cycle=-1)
-    (own,) = [line for line in lines if str(line.get_label()).startswith("implicit")]
+    (own,) = [
+        line
+        for line in draw_figure(result, "response_after_own_wear").figure.axes[0].get_lines()
+        if str(line.get_label()).startswith("implicit")
+    ]
     assert own.get_linestyle() == "None"
-    np.testing.assert_allclose(own.get_ydata(), expected)
+    np.testing.assert_allclose(own.get_ydata(), 1e3 * values_of(result, "response_amplitude", scheme=0, cycle=-1))
 
 
 def test_an_exact_answer_is_drawn_beside_the_computed_one():
@@ -263,30 +250,17 @@ def test_natural_frequencies_and_mesh():
     np.testing.assert_allclose(lines_of(right)["this study"], [[0, 0], [200.0, 204.0]])
 
 
-def test_the_map_of_outcomes_speaks_words():
+def test_the_map_of_outcomes_speaks_words_and_the_worst_certificate_is_named_with_its_place():
     result = make_result(failed=[2, 5])
     drawing = draw_figure(result, "outcome_map")
     panel = drawing.figure.axes[0]
     np.testing.assert_array_equal(cells_of(panel), [[0, 3, 0, 0], [0, 0, 3, 0]])
     assert [label.get_text() for label in panel.get_xticklabels()] == ["200", "201", "202", "204"]
     assert [text.get_text() for text in drawing.figure.legends[0].get_texts()] == ["converged", "branch lost"]
-
-
-def test_the_worst_certificate_is_named_with_its_place():
-    result = make_result()
-    table = next(item for item in draw_report(result) if item.name == "certificates")
+    table = next(item for item in draw_report(make_result()) if item.name == "certificates")
     (row,) = [row for row in table.rows if row[0] == "estimated error of the response"]
-    assert float(row[1]) == pytest.approx(float(result.dataset["response_error"].max()), rel=0.05)
+    assert float(row[1]) == pytest.approx(float(make_result().dataset["response_error"].max()), rel=0.05)
     assert row[2].startswith("202 Hz")
-
-
-def test_wear_depth_of_each_pair():
-    result = make_result()
-    lines = lines_of(draw_figure(result, "wear_depth").figure.axes[0])
-    for number, label in enumerate(("implicit scheme", "explicit scheme")):
-        x, y = lines[label]
-        np.testing.assert_allclose(np.round(x), np.arange(12))
-        np.testing.assert_allclose(y, 1e6 * values_of(result, "wear_depth", frequency=2, scheme=number, cycle=-1))
 
 
 def _by_position(result, values, pairs):
@@ -296,8 +270,13 @@ def _by_position(result, values, pairs):
     return values[order].reshape(2, 3)
 
 
-def test_pressure_and_worn_profile_on_both_flanks():
+def test_depth_and_pressure_of_the_pairs():
     result = make_result()
+    lines = lines_of(draw_figure(result, "wear_depth").figure.axes[0])
+    for number, label in enumerate(("implicit scheme", "explicit scheme")):
+        x, y = lines[label]
+        np.testing.assert_allclose(np.round(x), np.arange(12))
+        np.testing.assert_allclose(y, 1e6 * values_of(result, "wear_depth", frequency=2, scheme=number, cycle=-1))
     panels = draw_figure(result, "mean_pressure").figure.axes[:4]
     for number, panel in enumerate(panels):
         pressure = 1e-6 * values_of(result, "mean_pressure", frequency=2, scheme=0, cycle=[0, -1][number // 2])
@@ -360,15 +339,9 @@ def test_words_of_the_joint_are_the_same_in_maps_and_loops():
     result.dataset.attrs["study"] = '[scene]\nmodel = "dovetail_sector"\n'
     profile = draw_figure(result, "worn_profile").figure.axes
     motion = draw_figure(result, "pair_motion").figure.axes[0]
-    words = "axial", "up the flank"
-    for one, other, word in zip(
-        (profile[2].get_xlabel(), profile[0].get_ylabel()),
-        (motion.get_xlabel(), motion.get_ylabel()),
-        words,
-        strict=True,
-    ):
-        assert word in one.replace("\n", " ")
-        assert word in other.replace("\n", " ")
+    labels = (profile[2].get_xlabel(), motion.get_xlabel()), (profile[0].get_ylabel(), motion.get_ylabel())
+    for both, word in zip(labels, ("axial", "up the flank"), strict=True):
+        assert all(word in label.replace("\n", " ") for label in both)
     # the axes of the mesh, where the scene has no words
     assert draw_figure(make_result(), "worn_profile").figure.axes[2].get_xlabel() == "z (mm)"
 
@@ -411,9 +384,8 @@ def test_samples_are_those_of_the_file():
     expected = np.quantile(dataset["worn_volume"].values[0, 0], 0.5, axis=0, method="inverted_cdf") * 1e9
     np.testing.assert_allclose(median.get_ydata(), expected)
     bars = draw_figure(result, "deciding_inputs").figure.axes[0]
-    heights = [patch.get_height() for patch in bars.patches]
     names = [text.get_text().replace("\n", " ") for text in bars.get_xticklabels()]
-    assert names[int(np.argmax(heights))] == "wear coefficient"
+    assert names[int(np.argmax([patch.get_height() for patch in bars.patches]))] == "wear coefficient"
     for place, panel in enumerate(draw_figure(result, "deciding_input").figure.axes):
         (points,) = [found for found in panel.collections if found.get_label() == "samples"]
         drawn = dataset["sample_wear_coefficient"].values, dataset["worn_volume"].values[place, 0, :, -1] * 1e9

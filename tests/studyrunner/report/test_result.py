@@ -5,25 +5,11 @@ import pytest
 import xarray as xr
 
 from studyrunner.api import open_result
-from studyrunner.result.choice import choose
+from studyrunner.report.selection import choose
 from studyrunner.result.units import scale_for, show_cycles, show_number, show_power
 from studyrunner.result.view import open_for_report
 from studyrunner.user_error import UserError
 from tests.studyrunner.results import make_result
-
-
-def test_a_result_file_is_opened_lazily(tmp_path):
-    path = tmp_path / "made.nc"
-    made = make_result()
-    made.dataset.to_netcdf(path)
-    result = open_for_report(path)
-    assert not result.dataset["worn_volume"].variable._in_memory
-    assert result.axes == made.axes
-    assert result.title == "Made up"
-    np.testing.assert_array_equal(result.read("worn_volume").values, made.dataset["worn_volume"].values)
-    assert result.shown_point() == made.shown_point()
-    result.dataset.close()
-
 
 NO_POINT = xr.Dataset({"outcome": ("frequency", np.zeros(0, np.int8))}, {"cycle": [0.0], "contact": [0]})
 
@@ -70,16 +56,6 @@ def test_combinations_within_the_limit_are_all_chosen():
     )
     assert choice.sentence == ""
     assert all("frequency" not in point for point in choice.points)
-
-
-def test_points_in_words():
-    result = make_result(frequency=[212.25, 213.0])
-    assert result.describe({"frequency": 0, "scheme": 1}) == "212.25 Hz, explicit scheme"
-    single = make_result(frequency=[212.25], scheme=["implicit"])
-    assert single.describe(single.shown_point()) == (
-        "212.25 Hz, wear coefficient 1.1e-11 1/Pa, excitation amplitude 0.5 N, step 1000 cycles, implicit scheme,"
-        " sweep up"
-    )
 
 
 @pytest.mark.parametrize(

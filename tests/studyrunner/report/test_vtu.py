@@ -6,8 +6,7 @@ import meshio
 import numpy as np
 import pytest
 
-from studyrunner.report import contents
-from studyrunner.report.cli import BAD_INPUT, WRITTEN, main
+from studyrunner.report.cli import BAD_INPUT, main
 from studyrunner.report.root import vtu
 from tests.studyrunner.report.root_cases import dovetail_file, dovetail_pairs
 from tests.studyrunner.results import as_result, build_file
@@ -27,9 +26,7 @@ def folder(dataset, tmp_path_factory):
     folder = tmp_path_factory.mktemp("vtu")
     (folder / "vtu").mkdir()
     (folder / "vtu" / "root_9999.vtu").touch()  # of an older, longer series
-    series = vtu.find_writer(as_result(dataset, folder / "some.nc"))(folder)
-    assert series.path == folder / "root.pvd"
-    assert series.n_files == 5
+    assert vtu.find_writer(as_result(dataset, folder / "some.nc"))(folder) == 5
     return folder
 
 
@@ -68,16 +65,6 @@ def test_the_files_hold_the_numbers_of_the_pairs(folder, dataset):
         body, surface = (np.concatenate(mesh.cell_data[name]) for name in ("body", "contact_surface"))
         assert set(body) == {0, 1}
         assert (np.bincount(surface + 1)[1:] == 2 * 3).all()
-
-
-@pytest.mark.slow
-def test_the_command_writes_the_series_beside_the_page(tmp_path, monkeypatch, capsys, dataset):
-    monkeypatch.setattr(contents, "draw_report", lambda _: iter(()))
-    monkeypatch.chdir(tmp_path)
-    dataset.to_netcdf("some.nc")
-    assert main(["some.nc", "--vtu"]) == WRITTEN
-    assert (tmp_path / "some-report" / "root.pvd").is_file()
-    assert "some-report/root.pvd: time series of 5 VTU files" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("wrong", ["no library", "no positions"])

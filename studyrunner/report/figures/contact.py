@@ -1,4 +1,4 @@
-"""Wear depth and pressure of the pairs: per pair, on the flanks, over a scar (Figs. 5, 10, 11, 12 of the paper)."""
+"""Wear depth and pressure of the pairs: by number, on their surfaces, over a scar (Figs. 3, 5, 10, 11, 12)."""
 
 from __future__ import annotations
 
@@ -13,45 +13,43 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from studyrunner.report.drawing import (
-    Drawing,
+from studyrunner.report.drawing import Drawn
+from studyrunner.report.figures.flanks import Flank, find_flanks
+from studyrunner.report.figures.scar import draw_scar_depth, draw_scar_pressure
+from studyrunner.report.panels import (
     FloatArray,
-    Missing,
     add_colour_bar,
     add_legend,
+    add_map,
+    is_narrow,
     label_outer,
     line_style,
     new_panel,
     new_panels,
     set_from_zero,
-    title_at,
 )
-from studyrunner.report.figures.flanks import Flank, find_flanks
-from studyrunner.report.figures.scar import draw_scar_depth, draw_scar_pressure
-from studyrunner.result.choice import choose
+from studyrunner.report.selection import choose, labelled
 from studyrunner.result.scars import find_scar
-from studyrunner.result.scene_pairs import last_depth, tells_depth
+from studyrunner.result.scene_pairs import NO_DEPTH, last_depth, tells_depth
 from studyrunner.result.units import Scale, scale_for
 from studyrunner.result.view import Result, as_sentences
 from studyrunner.system.progress import count
 
 _MOST_SERIES, _MOST_PROFILES, _MOST_FLANKS = 4, 5, 3
 _MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS = 150, 4, 120
-_SLENDER, _LABEL_WIDTH = 0.12, 14
-_DOTS: dict[str, Any] = {"edgecolors": "0.3", "linewidths": 0.4}
-_NO_DEPTH = 1e-15  # m; a depth below this is round-off: it is far less than an atom
+_SLENDER, _LOW, _LABEL_WIDTH, _LONGEST_NAME = 0.12, 0.4, 14, 20
 
 
 def _worn_depth(result: Result) -> FloatArray | None:
     """Wear depths (n_contact,), m, of the shown point at its last count; None where nothing is worn."""
     depth = last_depth(result, result.shown_point())
-    return depth if len(result.cycles) > 1 and float(depth.max()) > _NO_DEPTH else None
+    return depth if len(result.cycles) > 1 and float(depth.max()) > NO_DEPTH else None
 
 
-def draw_depths(result: Result) -> Drawing | Missing | None:
+def draw_depths(result: Result) -> Drawn:
     """Wear depth per pair at the last cycle count, one series a scheme (Fig. 5)."""
     if not tells_depth(result):
-        return Missing("wear_depth", "Wear depth of the pairs", result.lacks("wear_depth"))
+        return result.lacks("wear_depth")
     if _worn_depth(result) is None or result.dataset.sizes["contact"] == 1:
         return None
     shown, course = result.shown_point(), result.course_axis
@@ -63,9 +61,8 @@ def draw_depths(result: Result) -> Drawing | Missing | None:
     panel.set_ylabel(scale.label(f"wear depth {result.when(result.last_kept(shown))}"))
     _name_surfaces(panel, result)
     add_legend(figure)
-    deepest = [f"{_largest(result, depth, scale)}{f' ({label})' if label else ''}" for label, depth in series.items()]
-    text = as_sentences(f"Deepest: {', '.join(deepest)}", choice.sentence)
-    return Drawing("wear_depth", title_at(result, "Wear depth of each pair"), text, figure)
+    deepest = [labelled(_largest(result, depth, scale), label) for label, depth in series.items()]
+    return figure, as_sentences(f"Deepest: {', '.join(deepest)}", choice.sentence)
 
 
 def _largest(result: Result, values: FloatArray, scale: Scale) -> str:
@@ -101,10 +98,12 @@ def _name_surfaces(panel: Axes, result: Result) -> None:
         if number % 2:
             panel.axvspan(left, right, color="0.93", zorder=0)
         over = panel.get_xaxis_transform()
-        panel.text(0.5 * (left + right), 1.01, labels[start], transform=over, ha="center", va="bottom")
+        # a name that is wider than its figure would leave its panel no room
+        name = labels[start][:_LONGEST_NAME]
+        panel.text(0.5 * (left + right), 1.01, name, transform=over, ha="center", va="bottom")
 
 
-def draw_pressure(result: Result) -> Drawing | None:
+def draw_pressure(result: Result) -> Drawn:
     """Mean pressure on each flank at the first and the last cycle count (Figs. 10, 11)."""
     scar = find_scar(result)
     if scar is not None:
@@ -123,12 +122,11 @@ def draw_pressure(result: Result) -> Drawing | None:
         add_legend(figure)
     else:
         figure = _draw_fields(flanks, fields, scale, "mean pressure")
-    largest = [f"{_largest(result, values, scale)} ({label})" for label, values in fields.items()]
-    text = as_sentences(f"Mean over a period. Largest: {', '.join(largest)}", _how_drawn(flanks), left_out)
-    return Drawing("mean_pressure", title_at(result, "Mean pressure"), text, figure)
+    largest = [labelled(_largest(result, values, scale), label) for label, values in fields.items()]
+    return figure, as_sentences(f"Mean over a period. Largest: {', '.join(largest)}", _how_drawn(flanks), left_out)
 
 
-def draw_profile(result: Result) -> Drawing | None:
+def draw_profile(result: Result) -> Drawn:
     """Wear depth on each flank at the last cycle count: map, and lines along it (Fig. 12); or the scar."""
     depth = _worn_depth(result) if tells_depth(result) else None
     if depth is None:
@@ -146,20 +144,18 @@ def draw_profile(result: Result) -> Drawing | None:
         figure = _draw_profiles(flanks, depth, scale)
     else:
         figure = _draw_fields(flanks, {result.cycle_label(last): depth}, scale, "wear depth")
-    mean = [
-        f"{flank.surface} {scale.show(float(np.average(depth[flank.pairs], weights=flank.area)))}" for flank in flanks
-    ]
-    text = as_sentences(
+    means = (float(np.average(depth[flank.pairs], weights=flank.area)) for flank in flanks)
+    named = ", ".join(f"{flank.surface} {scale.show(mean)}" for flank, mean in zip(flanks, means, strict=True))
+    return figure, as_sentences(
         f"Wear depth {result.when(last, 'after')}. Deepest: {_largest(result, depth, scale)}",
-        f"Mean over the area: {', '.join(mean)}",
-        "Below, the same along each row of pairs" if on_grid else "",
+        f"Mean over the area: {named}",
+        "Below each map, the same along each row of pairs" if on_grid else "",
         _how_drawn(flanks),
         left_out,
     )
-    return Drawing("worn_profile", title_at(result, "Worn profile"), text, figure)
 
 
-def draw_numbers(result: Result) -> Drawing | None:
+def draw_numbers(result: Result) -> Drawn:
     """The number of each pair where it lies on its surface (Fig. 3b); nothing without positions, or with many pairs."""
     flanks, names = find_flanks(result), result.dataset["contact"].values
     placed = all(flank.seen is not None for flank in flanks)
@@ -169,18 +165,17 @@ def draw_numbers(result: Result) -> Drawing | None:
     figure, panels = new_panels(len(flanks), 1, min(height * len(flanks), 8.0))
     for panel, flank in zip(panels[:, 0], flanks, strict=True):
         # the colour says nothing: cells without one
-        plain, own = ListedColormap(["#ffffff00"]), names[flank.pairs]
+        plain, own = ListedColormap(["#ffffff00"]), names[flank.pairs].astype(float)
         _draw_field(panel, flank, own, Normalize(0.0, max(own.max(), 1.0)), cmap=plain, edgecolors="0.6")
         places = np.asarray(flank.seen)
         if flank.cells is not None:
             middles = [0.5 * (edges[1:] + edges[:-1]) for edges in (flank.cells.x_edges, flank.cells.y_edges)]
             places[flank.cells.pair] = np.stack(np.meshgrid(*middles), axis=-1)
         for name, (x, y) in zip(own, 1e3 * places, strict=True):
-            panel.text(x, y, str(name), ha="center", va="center", fontsize=8, clip_on=False)
+            panel.text(x, y, f"{name:.0f}", ha="center", va="center", fontsize=8, clip_on=False)
         panel.set_title(flank.surface)
     label_outer(panels)
-    text = as_sentences(f"As along the dimension contact: {len(names)} pairs", flanks[0].origin)
-    return Drawing("pair_numbers", "Numbers of the contact pairs", text, figure)
+    return figure, as_sentences(f"As along the dimension contact: {len(names)} pairs", flanks[0].origin)
 
 
 def _choose_flanks(result: Result, values: Sequence[FloatArray]) -> tuple[tuple[Flank, ...], str]:
@@ -222,15 +217,16 @@ def _draw_fields(flanks: Sequence[Flank], fields: dict[str, FloatArray], scale: 
 
 def _draw_field(panel: Axes, flank: Flank, values: NDArray[Any], norm: Normalize, **look: Any) -> None:
     """One field of a flank: cells of its grid, or dots at its pairs."""
-    panel.grid(visible=False)
     if flank.cells is not None:
         cells = flank.cells
-        panel.pcolormesh(1e3 * cells.x_edges, 1e3 * cells.y_edges, values[cells.pair], norm=norm, **look)
-        # cells as they are in the flank, unless it is so slender that nothing would be seen
-        panel.set_aspect("equal" if flank.height_over_width > _SLENDER else "auto")
+        add_map(panel, 1e3 * cells.x_edges, 1e3 * cells.y_edges, values[cells.pair], norm, **look)
+        # cells as they are in the flank, unless it is so slender that too little would be seen
+        panel.set_aspect("equal" if flank.height_over_width > (_LOW if is_narrow() else _SLENDER) else "auto")
     elif flank.seen is not None:
+        dots: dict[str, Any] = {"edgecolors": "0.3", "linewidths": 0.4}
+        panel.grid(visible=False)
         x, y = 1e3 * flank.seen.T
-        panel.scatter(x, y, 160 if look else 60, values, norm=norm, label="pairs", **(_DOTS | look))
+        panel.scatter(x, y, 160 if look else 60, values, norm=norm, label="pairs", **(dots | look))
         panel.margins(0.12)
         panel.set_aspect("equal", adjustable="datalim")
     panel.set_xlabel(f"{flank.directions[0]} (mm)")
@@ -256,7 +252,7 @@ def _draw_profiles(flanks: Sequence[Flank], depth: FloatArray, scale: Scale) -> 
             panel.plot(1e3 * cells.x, values[cells.pair[int(row)]], label=label, **line_style(number))
         panel.set_ylim(1.06 * deepest, -0.04 * deepest)
         panel.set_xlabel(f"{flank.directions[0]} (mm)")
-    panels[1, 0].set_ylabel(scale.label("wear depth"))
+        panel.set_ylabel(scale.label("wear depth"))
     label_outer(panels)
     add_colour_bar(figure, panels, norm, scale.label("wear depth"), fraction=0.05)
     add_legend(figure)

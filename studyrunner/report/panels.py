@@ -1,0 +1,207 @@
+"""Panels of figures and what stands in them: lines with errors, maps, legends, scales of axes."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis, XAxis
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from numpy.typing import ArrayLike, NDArray
+
+from studyrunner.result.units import show_power
+
+FloatArray = NDArray[np.float64]
+
+MAP = "cividis"
+"""Colour map of values from low to high: its lightness grows evenly, and it looks the same to the colour blind."""
+
+ERROR = "fretwear_error"
+"""Attribute of a line: the error of its values."""
+
+# Okabe & Ito (2008), "Color universal design", without its yellow, which vanishes on white. Lightness differs as well.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9")
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (6, 1.5, 1.2, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_CHARACTERS, _MARK, _LEGEND_ROW = 14.0, 6, 0.18  # of a legend: letters in an inch, a mark in letters, inches of a row
+_FEWEST_TICKS, _MOST_TICKS = 3, 6
+_WIDE, _LEAST, _LOW, _HIGH = 5.0, 1.5, 2.6, 3.2  # inches: least width of a wide figure; heights in a narrow one
+
+
+def is_narrow() -> bool:
+    """Whether figures are now built as wide as a column."""
+    return bool(mpl.rcParams["figure.figsize"][0] < _WIDE)
+
+
+def new_panels(
+    n_rows: int, n_columns: int, height: float, sharex: Any = False, sharey: Any = False, **ratios: Any
+) -> tuple[Figure, NDArray[Any]]:
+    """A figure, inches high, that lays itself out, and its axes (n_rows, n_columns). Nothing has to close it.
+
+    In a narrow figure the columns stand below each other, each panel as wide as the figure and about as high for its
+    width as in the wide one; panels share their axes alike. sharex, sharey, ratios: as for `subplots`.
+    """
+    width = mpl.rcParams["figure.figsize"][0]
+    if not is_narrow():
+        figure = Figure(figsize=(width, height), layout="constrained")
+        panels: NDArray[Any] = figure.subplots(n_rows, n_columns, sharex=sharex, sharey=sharey, squeeze=False, **ratios)
+        return figure, panels
+    usual = height * np.array(ratios.get("height_ratios", np.ones(n_rows)), dtype=float)
+    usual /= np.sum(usual) / height
+    own = np.minimum(np.maximum(0.45 * n_columns * usual, np.minimum(usual, _LOW)), np.maximum(usual, _HIGH))
+    heights = np.tile(np.maximum(own, _LEAST), n_columns)
+    figure = Figure(figsize=(width, heights.sum()), layout="constrained")
+    panels = (
+        figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights.tolist()).reshape(n_columns, n_rows).T
+    )
+    for (row, column), panel in np.ndenumerate(panels):
+        for shared, share, first in ((sharex, panel.sharex, (0, column)), (sharey, panel.sharey, (row, 0))):
+            other = panels[0, 0] if shared is True else panels[first]
+            if shared and other is not panel:
+                share(other)
+        if sharex and row < n_rows - 1:
+            panel.tick_params(labelbottom=False)
+    return figure, panels
+
+
+def new_panel(height: float) -> tuple[Figure, Axes]:
+    """A figure of one panel."""
+    figure, panels = new_panels(1, 1, height)
+    return figure, panels[0, 0]
+
+
+def line_style(number: int, n_points: int = 0) -> dict[str, Any]:
+    """Colour, dashes and marker of the line of this number.
+
+    n_points: on the line; where there are many, markers stand on some of them only.
+    """
+    return {
+        "color": COLOURS[number % len(COLOURS)],
+        "linestyle": _DASHES[number % len(_DASHES)],
+        "marker": _MARKERS[number % len(_MARKERS)],
+        "markevery": max(1, n_points // 12),
+        # lines are drawn over those before them, which stay visible around the smaller markers
+        "markersize": 5.4 - 0.6 * min(number, 4),
+    }
+
+
+def add_line(
+    panel: Axes, x: FloatArray, y: FloatArray, error: FloatArray | None = None, *, band: bool = False, **look: Any
+) -> float:
+    """A line with the errors of its values as bars, or as a band; how high it and its errors reach.
+
+    x, y, error (n,): as shown, error NaN, infinite or 0 where there is none to draw. Errors count to the height as far
+    as twice the largest value: those that leave the values too little room are cut.
+    """
+    (line,) = panel.plot(x, y, **look)
+    highest = float(np.nanmax(y, initial=0.0))
+    if error is None:
+        return highest
+    setattr(line, ERROR, error)
+    drawn = np.isfinite(error) & np.isfinite(y) & (error > 0.0)
+    if not drawn.any():
+        return highest
+    # what is worn is not less than nothing
+    at, high = x[drawn], (y + error)[drawn]
+    low = np.where(y[drawn] >= 0.0, np.maximum(y[drawn] - error[drawn], 0.0), y[drawn] - error[drawn])
+    if band:
+        panel.fill_between(at, low, high, color=line.get_color(), alpha=0.18, linewidth=0.0, gid="error")
+    else:
+        sides = np.stack([y[drawn] - low, error[drawn]])
+        bars: dict[str, Any] = {"fmt": "none", "ecolor": line.get_color(), "elinewidth": 1.0, "capsize": 2.5}
+        panel.errorbar(at, y[drawn], yerr=sides, zorder=2.5, **bars)
+    return max(highest, min(float(high.max()), 2.0 * highest))
+
+
+def add_map(panel: Axes, x: ArrayLike, y: ArrayLike, values: NDArray[Any], norm: Normalize, **look: Any) -> None:
+    """Cells (n_y, n_x) between their edges; cells without a value are hatched, so that they are not taken for one."""
+    panel.grid(visible=False)
+    panel.pcolormesh(x, y, np.ma.masked_invalid(values), norm=norm, **look)
+    if np.isnan(values).any():
+        panel.set_facecolor("white")
+        panel.patch.set(hatch="xxx", edgecolor="0.55", linewidth=0.0)
+
+
+def add_colour_bar(figure: Figure, panels: Any, norm: Normalize, label: str, **options: Any) -> None:
+    """The colour bar of maps, dots or faces, below them in a narrow figure. panels, options: as for `colorbar`."""
+    if is_narrow():
+        options = {"location": "bottom", "aspect": 30, "pad": 0.01}
+    figure.colorbar(ScalarMappable(norm), ax=panels, label=label, **options)
+
+
+def add_legend(figure: Figure, handles: Sequence[Artist] | None = None) -> None:
+    """A legend below all panels, where it covers no curve, in as many columns as fit; the figure grows by its height.
+
+    handles: what is named; by default whatever has a label in any panel, each label once, if there are at least two.
+    """
+    found: dict[str, Any] = {str(handle.get_label()): handle for handle in handles or ()}
+    if handles is None:
+        for panel in figure.axes:
+            for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+                found.setdefault(str(label), handle)
+    if len(found) < 2:
+        return
+    room = int(_CHARACTERS * figure.get_figwidth())
+    labels = [textwrap.fill(label, room - _MARK) for label in found]
+    longest = max(len(line) for text in labels for line in text.split("\n")) + _MARK
+    n_rows = math.ceil(len(labels) / max(1, room // longest))
+    n_lines = n_rows + sum(text.count("\n") for text in labels)
+    figure.set_figheight(figure.get_figheight() + _LEGEND_ROW * n_lines)
+    figure.legend(list(found.values()), labels, loc="outside lower center", ncols=math.ceil(len(labels) / n_rows))
+
+
+def set_from_zero(panel: Axes, largest: float) -> None:
+    """Let the vertical axis begin at zero, and end at something where all values are zero."""
+    panel.set_ylim(0.0, 1.06 * largest if largest > 0.0 else 1.0)
+
+
+def label_outer(panels: NDArray[Any]) -> None:
+    """Labels of axes at the left and below only; at the left of all panels of a narrow figure."""
+    for panel in [] if is_narrow() else panels[:, 1:].flat:
+        panel.set_ylabel("")
+    for panel in panels[:-1].flat:
+        panel.set_xlabel("")
+
+
+def set_log(axis: Axis, low: float, high: float, percent: bool = False) -> None:
+    """A logarithmic axis that shows values between these, above zero, with three to six ticks in few digits."""
+    (axis.axes.set_xscale if isinstance(axis, XAxis) else axis.axes.set_yscale)("log")
+    decades = [10.0**power for power in range(math.floor(math.log10(low)) - 1, math.ceil(math.log10(high)) + 2)]
+    if high < 20.0 * low:
+        low, high = 0.9 * low, 1.1 * high
+    for steps in ((1.0,), (1.0, 3.0), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)):
+        ticks = [factor * decade for decade in decades for factor in steps if low <= factor * decade <= high]
+        if len(ticks) >= _FEWEST_TICKS:
+            break
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_locator(FixedLocator(ticks[:: -(-len(ticks) // _MOST_TICKS) or 1]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _show_tick(value, percent)))
+
+
+def _show_tick(value: float, percent: bool) -> str:
+    number = 100.0 * value if percent else value
+    text = f"{number:.4g}" if 1e-3 <= number < 1e4 else show_power(number)
+    return f"{text} %" if percent else text
+
+
+def mark_failed(panel: Axes, positions: FloatArray, failed: NDArray[np.bool_]) -> str:
+    """Crosses on the horizontal axis where points have no result; a sentence about them, empty where there are none.
+
+    positions (n,): along the axis. failed (n_lines, n).
+    """
+    if not failed.any():
+        return ""
+    at = positions[failed.any(axis=0)]
+    look: dict[str, Any] = {"linestyle": "none", "marker": "x", "color": "black", "markersize": 5, "zorder": 5}
+    where = panel.get_xaxis_transform()
+    panel.plot(at, np.zeros(at.size), clip_on=False, label="no result", transform=where, **look)
+    return f"Crosses: at these, {int(failed.sum())} in all, no point has a result"

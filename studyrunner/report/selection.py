@@ -1,0 +1,153 @@
+"""What a figure shows of a result: some combinations of the axes, and an axis, or slow time, to draw over."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from studyrunner.report.panels import FloatArray, line_style, set_log
+from studyrunner.result.units import Scale, scale_for, units_of
+from studyrunner.result.view import Result
+from studyrunner.statistics.samples import SAMPLE
+from studyrunner.system.progress import count
+
+_DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
+_MANY = 60  # points from which markers are small
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Combinations of the axes that a figure shows, with labels.
+
+    sentence: on combinations that are left out; empty where there are none.
+    """
+
+    points: tuple[dict[str, int], ...]
+    labels: tuple[str, ...]
+    sentence: str
+
+    def __iter__(self) -> Iterator[tuple[dict[str, int], str]]:
+        """Combinations with their labels."""
+        return iter(zip(self.points, self.labels, strict=True))
+
+
+def choose(result: Result, free: Collection[str], limit: int, first: tuple[str, ...] = ("scheme", "sweep")) -> Choice:
+    """At most `limit` combinations of the axes that are not `free`; the one of the shown point is among them.
+
+    Where there are more, the axes `first` are split first, then the others in the order of the file, each whole or
+    not at all; the rest stays at the shown point.
+    """
+    order = [name for name in dict.fromkeys((*first, *result.axes)) if name in result.varying and name not in free]
+    shown = {name: index for name, index in result.shown_point().items() if name not in free}
+    split: list[str] = []
+    number = 1
+    for name in order:
+        size = result.dataset.sizes[name]
+        if number * size <= limit:
+            split.append(name)
+            number *= size
+    split.sort(key=result.axes.index)
+    places = itertools.product(*(range(result.dataset.sizes[name]) for name in split))
+    points = tuple({**shown, **dict(zip(split, place, strict=True))} for place in places)
+    labels = tuple(result.describe(point, split) for point in points)
+    sizes = {name: result.dataset.sizes[name] for name in order if name not in split}
+    sizes |= {name: size for name, size in result.fixed.items() if name not in free}
+    fixed = [name for name in result.axes if name in sizes]
+    if not fixed:
+        return Choice(points, labels, "")
+    others = " and ".join(
+        count(sizes[name] - 1, "other sample")
+        if name == SAMPLE
+        else f"{count(sizes[name] - 1, 'other value')} of {name.replace('_', ' ')}"
+        for name in fixed
+    )
+    return Choice(points, labels, f"Shown for {result.describe(shown, fixed)}; the file also holds {others}.")
+
+
+@dataclass(frozen=True)
+class Course:
+    """Numbers of one axis of the study, in rising order.
+
+    axis: its name. index (n,): where each of them stands in the file. values (n,): as shown. label: with the unit.
+    logarithmic: whether to draw it so, as what spans decades is.
+    """
+
+    axis: str
+    index: NDArray[np.intp]
+    values: FloatArray
+    label: str
+    logarithmic: bool
+
+    def read(self, result: Result, name: str, point: Mapping[str, int]) -> FloatArray:
+        """A variable along the course, at a point whose index along it does not matter: (n, what follows the axes)."""
+        where = {axis: place for axis, place in point.items() if axis != self.axis}
+        values = result.read(name).isel(where).transpose(self.axis, ...).values
+        return np.asarray(values, dtype=float)[self.index]
+
+    def along(self, result: Result, flags: NDArray[np.bool_], point: Mapping[str, int]) -> NDArray[np.bool_]:
+        """Flags (axes...) of points along the course (n,)."""
+        index = tuple(slice(None) if name == self.axis else point[name] for name in result.axes)
+        return np.asarray(flags[index][self.index])
+
+    def at(self, result: Result, place: int) -> str:
+        """A place of the course in words."""
+        return result.describe({self.axis: int(self.index[place])}, [self.axis])
+
+    @property
+    def edges(self) -> FloatArray:
+        """Edges (n + 1,) of cells around the values, as shown."""
+        if self.logarithmic:
+            return np.asarray(np.exp(cell_edges(np.log(self.values))))
+        return cell_edges(self.values)
+
+    def line_style(self, number: int) -> dict[str, Any]:
+        """Style of a line over the course: a marker at each point, small where there are many."""
+        found = line_style(number)
+        return found | {"markersize": 0.5 * found["markersize"]} if self.values.size > _MANY else found
+
+    def set_axis(self, panel: Axes) -> None:
+        """Label and scale of a horizontal axis."""
+        panel.set_xlabel(self.label)
+        if self.logarithmic:
+            set_log(panel.xaxis, float(self.values[0]), float(self.values[-1]))
+
+
+def find_course(result: Result, axis: str | None = None) -> Course | None:
+    """The course along an axis, by default along `course_axis`; None where it has one value."""
+    axis = axis or result.course_axis
+    if axis is None or axis not in result.varying:
+        return None
+    values = np.asarray(result.dataset[axis].values, dtype=float)
+    scale = scale_for(units_of(result.dataset[axis]), values)
+    index = np.argsort(values, kind="stable")
+    shown = scale(values[index])
+    text = "excitation frequency" if axis == "frequency" else axis.replace("_", " ")
+    return Course(axis, index, shown, scale.label(text), axis != "frequency" and spans_decades(shown))
+
+
+def spans_decades(rising: FloatArray) -> bool:
+    """Whether rising values are drawn on a logarithmic axis."""
+    return bool(rising[0] > 0.0 and rising[-1] / rising[0] > _DECADES)
+
+
+def cell_edges(positions: FloatArray) -> FloatArray:
+    """Edges (n + 1,) of cells around rising positions (n,), n > 1: halfway between them."""
+    middle = 0.5 * (positions[1:] + positions[:-1])
+    first, last = 2.0 * positions[0] - middle[0], 2.0 * positions[-1] - middle[-1]
+    return np.concatenate([[first], middle, [last]])
+
+
+def slow_time(result: Result, scale: Scale) -> str:
+    """Label of an axis of slow time."""
+    return scale.label("vibration cycles") if result.blocks is None else "missions"
+
+
+def labelled(text: str, label: str) -> str:
+    """A number in words with the combination that it belongs to, if there are several."""
+    return f"{text} ({label})" if label else text
