@@ -20,23 +20,33 @@ from studies.finite_element.elements.kinds import ELEMENT_KINDS
 from studies.finite_element.elements.solid_mesh import Rotation
 from studies.scene_error import SceneError
 
-_EXPORT_FREE = {
-    "calculix": "export with *EQUATION,REMOVE ALL",
-    "abaqus": "export without ties and boundary conditions: remove them in the step of *MATRIX GENERATE",
-    "ansys": "export without constraint equations and displacements: CEDELE and DDELE before the solution",
-    "nastran": "export without SPC and MPC on them",
-}
-_REMOVE_CONTACT = {
-    "calculix": "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair",
-    "abaqus": "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair",
-    "ansys": "remove the contact elements between them",
-    "nastran": "remove the contact between them",
-}
-_KEEP_PRESTRESS = {
-    "calculix": "write *STEP,PERTURBATION",
-    "abaqus": "write *STEP,NLGEOM for the static step",
-    "ansys": "write PSTRES,ON for the static solution",
-    "nastran": "name the static subcase with STATSUB",
+# of each program: to export free nodes, to take contact out, to keep the prestress
+_REMEDIES = {
+    "calculix": (
+        "export with *EQUATION,REMOVE ALL",
+        "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair",
+        "write *STEP,PERTURBATION",
+    ),
+    "abaqus": (
+        "export without ties and boundary conditions: remove them in the step of *MATRIX GENERATE",
+        "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair",
+        "write *STEP,NLGEOM for the static step",
+    ),
+    "ansys": (
+        "export without constraint equations and displacements: CEDELE and DDELE before the solution",
+        "remove the contact elements between them",
+        "write PSTRES,ON for the static solution",
+    ),
+    "nastran": (
+        "export without SPC and MPC on them",
+        "remove the contact between them",
+        "name the static subcase with STATSUB",
+    ),
+    "table": (
+        "export without ties and boundary conditions",
+        "remove the contact between them",
+        "export the prestressed stiffness",
+    ),
 }
 
 _COUPLED = 1e-9
@@ -71,17 +81,7 @@ def check_translations(matrices: Matrices) -> None:
 
 
 def check_nodes_have_dofs(matrices: Matrices, nodes: IntArray, name: str) -> None:
-    """Every node of a surface or set has all three dofs in the matrices.
-
-    Parameters
-    ----------
-    matrices
-        In units of the file.
-    nodes
-        (p,) node numbers.
-    name
-        Of the surface or set, for the message.
-    """
+    """Every node (p,) of a surface or set, by its number, has all three dofs in the matrices. name: for the message."""
     wanted = np.unique(nodes)
     found, counts = np.unique(matrices.node, return_counts=True)
     whole = found[counts == 3]
@@ -93,7 +93,7 @@ def check_nodes_have_dofs(matrices: Matrices, nodes: IntArray, name: str) -> Non
     raise SceneError(
         "matrices",
         f"{name}: {n_missing} of {wanted.size} nodes {some} in {where} (tied or fixed)",
-        _EXPORT_FREE.get(matrices.code, "export without ties and boundary conditions"),
+        _REMEDIES[matrices.code][0],
     )
 
 
@@ -102,16 +102,7 @@ def check_contact_removed(
 ) -> None:
     """The stiffness does not couple the two surfaces of a contact, other than through elements that have nodes of both.
 
-    Parameters
-    ----------
-    deck, matrices
-        In units of the file.
-    nodes
-        Node numbers (p,) and (q,) of the surfaces.
-    names
-        Of the surfaces, for the message.
-    units
-        Of the file.
+    nodes: node numbers (p,) and (q,) of the surfaces. names: of the surfaces, for the message.
     """
     first, second = (np.flatnonzero(np.isin(matrices.node, members)) for members in nodes)
     part = sp.coo_array(matrices.stiffness[first][:, second])
@@ -121,7 +112,7 @@ def check_contact_removed(
     if apart.any():
         largest = abs(part.data[large][apart]).max() * units.stiffness
         found = f"the stiffness couples {names[0]} and {names[1]} ({largest:.1e} N/m)"
-        raise SceneError("matrices", found, _REMOVE_CONTACT.get(matrices.code, "remove the contact between them"))
+        raise SceneError("matrices", found, _REMEDIES[matrices.code][1])
 
 
 def _share_element(deck: Deck, one: IntArray, other: IntArray) -> NDArray[np.bool_]:
@@ -243,21 +234,15 @@ def check_speed(deck: Deck, matrices: Matrices, units: Units) -> Rotation | None
         return rotation
     speed = math.sqrt(rotation.omega_squared)
     found = f"the deck spins at {speed:.6g} rad/s, the stiffness holds {math.sqrt(held):.6g}"
-    remedy = _KEEP_PRESTRESS.get(matrices.code, "export the prestressed stiffness")
+    remedy = _REMEDIES[matrices.code][2]
     raise SceneError("matrices", found, remedy if held == 0 else "give the files of one run")
 
 
 def check_units(deck: Deck, mass: float | None, units: Units) -> None:
     """Tests that mass and extent are those of a body of real material.
 
-    Parameters
-    ----------
-    deck
-        In units of the file.
-    mass
-        Of the model, in units of the file; None where only the density of the deck is known.
-    units
-        Units of the files according to the user.
+    mass: of the model, in units of the file; None where only the density of the deck is known. units: of the files
+    according to the user.
     """
     used = np.unique(np.concatenate([block.nodes.ravel() for block in deck.blocks] or [deck.node_numbers]))
     points = deck.coordinates[deck.rows_of_nodes(used)]

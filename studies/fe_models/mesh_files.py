@@ -14,10 +14,7 @@ from studies.scene_error import SceneError
 def read_mesh_file(path: Path) -> Deck:
     """The mesh of a file by its ending: .inp (CalculiX, Abaqus), .msh (Gmsh), .cdb (ANSYS), or a table of nodes, .csv.
 
-    Raises
-    ------
-    SceneError
-        About "model": another ending, a library that is not installed, or what is wrong in the file.
+    Raises SceneError about "model": another ending, a library that is not installed, or what is wrong in the file.
     """
     suffix = path.suffix.lower()
     if suffix == ".inp":

@@ -7,7 +7,6 @@ from scipy import linalg
 from solver.model import needed_nodal_diameters
 from studies.finite_element.elements.assembly import assemble_mass, centrifugal_load
 from studies.finite_element.elements.solid_mesh import SolidMesh
-from studies.scene_error import SceneError
 from studies.scenes.dovetail_sector import Parameters, build, define_sector
 from tests.studies.static_contact import solve_static_contact
 
@@ -120,19 +119,3 @@ def test_loss_factor_is_exact_at_the_first_frequency(at_rest):
     shape = linear.response[0, N_RELATIVE]
     assert abs(tip) == pytest.approx(shape**2 / (1e-3 * omega**2), rel=1e-3)
     assert 0.01 < abs(tip) < 0.1
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("nodal_diameter", 24),
-        ("flank_length", 0.016),
-        ("flank_top_half_width", 0.02),
-        ("rotation_speed", 1e6),
-    ],
-)
-def test_parameters_that_do_not_go_together(key, value):
-    with pytest.raises(SceneError) as caught:
-        build(Parameters(mesh=1, **{key: value}), 1)
-    assert caught.value.key in Parameters.model_fields
-    assert caught.value.remedy

@@ -9,7 +9,6 @@ from scipy.integrate import solve_ivp
 
 from solver.contact.wear_law import ARCHARD, WearLaw, WearTable
 from studies.scene_answers import WearQuestion, stuck_frequencies
-from studies.scene_error import SceneError
 from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_mesh, scene_parameters
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studies.scenes.dovetail_mesh import build_dovetail_mesh
@@ -169,15 +168,3 @@ def test_a_displacement_without_mass_has_no_frequency():
     values = linalg.eigh(condensed, mass[np.ix_(keep, keep)], eigvals_only=True)
     assert found[:5] == pytest.approx(np.sqrt(values) / (2 * np.pi), rel=1e-10, abs=0.0)
     assert np.isnan(found[5])
-
-
-@pytest.mark.parametrize(
-    ("model", "words"),
-    [
-        (build_scene("sdof_slider", scene_parameters("sdof_slider")(), 1), "nothing moves"),
-        (chain(np.eye(3), np.diag([1.0, 1.0, 0.0])), "nothing holds"),
-    ],
-)
-def test_a_model_without_such_frequencies_says_so(model, words):
-    with pytest.raises(SceneError, match=words):
-        stuck_frequencies(model)

@@ -56,15 +56,6 @@ def test_round_trip_is_bitwise(tmp_path, model):
     assert [path.name for path in tmp_path.iterdir()] == ["scene.h5"]
 
 
-def test_an_unwritable_file_leaves_the_old_one(tmp_path):
-    with pytest.raises(OSError, match="no_such_folder"):
-        write_scene(plain(), tmp_path / "no_such_folder" / "scene.h5")
-    (tmp_path / "folder.h5").mkdir()
-    with pytest.raises(OSError, match="folder"):
-        write_scene(plain(), tmp_path / "folder.h5")
-    assert [path.name for path in tmp_path.iterdir()] == ["folder.h5"]
-
-
 def test_optional_datasets_have_defaults(tmp_path):
     def change(file):
         drop("damping", "contact/gap", "contact/position", "contact/surface", "contact/normal_load")(file)
@@ -107,9 +98,7 @@ def as_indices(path):
 def test_three_pairs_written_columns_first_are_refused(tmp_path):
     path = tmp_path / "scene.h5"
     by_hand(path, of_three_pairs(), turned=True)
-    with pytest.raises(
-        SceneError, match=r"response/dofs: shape \(9, 2\); give shape \(2, 9\): MATLAB and Fortran .*every"
-    ):
+    with pytest.raises(SceneError, match=r"response/dofs: shape \(9, 2\); give shape \(2, 9\): MATLAB and Fortran"):
         read_scene(path)
     for turned in (True, False):
         by_hand(path, of_three_pairs(), turned=turned)
@@ -119,21 +108,8 @@ def test_three_pairs_written_columns_first_are_refused(tmp_path):
     with h5py.File(path, "r+") as file:
         file["contact/dofs"].attrs["rows"] = "pairs"
     assert read_scene(path).contact.dofs.tolist() == np.arange(9).reshape(3, 3).tolist()
-
-
-def test_what_shows_the_order_of_three_pairs(tmp_path):
-    path = tmp_path / "scene.h5"
-    by_hand(path, of_three_pairs())  # two responses of nine displacements
+    by_hand(path, of_three_pairs())  # two responses of nine displacements show the order
     read_scene(path)
-    write_scene(of_three_pairs("square"), path)  # the attribute
-    read_scene(path)
-    by_hand(path, plain())
-    as_indices(path)
-    with h5py.File(path, "r+") as file:
-        # pairs without closing displacement: transposed, one would have no direction at all
-        put("contact/dofs", np.array([[-1, 0, 1], [-1, 2, 3], [-1, 4, 5]]))(file)
-        put("contact/normal_load", np.ones(3))(file)
-    assert read_scene(path).contact.dofs[0].tolist() == [-1, 0, 1]
 
 
 def test_responses_can_be_indices_and_damping_coefficients(tmp_path):

@@ -16,11 +16,6 @@ from tests.studies.fe_models.plates import Plates
 from tests.studyrunner.test_model_studies import message, scene_of
 
 needs_meshio = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio is not installed")
-needs_ansys = pytest.mark.skipif(
-    importlib.util.find_spec("ansys") is None or importlib.util.find_spec("ansys.mapdl.reader") is None,
-    reason="ansys-mapdl-reader is not installed",
-)
-
 STUDY = """
 [study]
 name = "lap"
@@ -79,12 +74,6 @@ def test_gmsh(folder):
     assert "1 elements" not in message("scene.model=lap.msh", by_volume)
     assert "2 elements of lap.msh have none, as element 3" in message("scene.model=lap.msh", by_volume)
     assert "give TIP" in message("scene.model=lap.msh", "scene.load.set=TIPS")
-
-
-@needs_ansys
-def test_cdb(folder):
-    (folder / "lap.cdb").write_text(Plates().cdb())
-    check_same(scene_of("scene.model=lap.cdb"), scene_of())
 
 
 @pytest.mark.parametrize("triangles", ["lower", "both"])

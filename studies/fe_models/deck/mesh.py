@@ -263,46 +263,22 @@ class ContactNodes:
 class Deck:
     """All that is read of a model's mesh file: the model as its steps leave it that do not write matrices.
 
-    Attributes
-    ----------
-    path
-        Name of the file, for messages.
-    node_numbers
-        (n,), ascending.
-    coordinates
-        (n, 3), units of the file.
-    blocks
-        Elements, one block a kind; no element number is in two of them.
-    node_sets, element_sets
-        Ascending numbers by the name of the set; all of them exist.
-    surfaces, materials
-        By name.
-    ties, contact_pairs, sections
-        In the order of the file.
-    cyclic
-        None where the deck is none of a sector.
-    boundaries
-        In the order of the file.
-    transforms, equations, rigid_motions
-        In the order of the file.
-    centrifugal
-        Loads of the last step that has some.
-    forces, pressures, gravity
-        Constant loads of static steps; the acceleration (3,) acts on all elements, None where there is none.
-    unassembled
-        What has a stiffness or a mass that only matrices of another program hold, as "deck.inp, line 7: ...".
-    removed
-        What *MODEL CHANGE takes away, a sentence each; it is not among the rest.
-    n_instances
-        Of parts; where there are several, numbers are not those of the file.
-    skipped
-        Keywords that cannot change the model and were not read, each as "sector.inp, line 7: *KEYWORD".
-    notes
-        What was read in a way that may be asked for, a sentence each.
-    included
-        Files that the deck includes, relative to its folder.
-    contact_nodes
-        Of a table of nodes, which has no elements; None of a mesh.
+    path: name of the file, for messages.
+    node_numbers (n,), coordinates (n, 3): numbers ascending, coordinates in units of the file.
+    blocks: elements, one block a kind; no element number is in two of them.
+    node_sets, element_sets: ascending numbers by the name of the set; all of them exist.
+    surfaces, materials: by name.
+    ties, contact_pairs, sections, boundaries, transforms, equations, rigid_motions: in the order of the file.
+    cyclic: None where the deck is none of a sector.
+    centrifugal: loads of the last step that has some.
+    forces, pressures, gravity: constant loads of static steps; the acceleration (3,) acts on all elements.
+    unassembled: what has a stiffness or a mass that only matrices of another program hold, as "deck.inp, line 7: ...".
+    removed: what *MODEL CHANGE takes away, a sentence each; it is not among the rest.
+    n_instances: of parts; where there are several, numbers are not those of the file.
+    skipped: keywords that cannot change the model and were not read, each as "sector.inp, line 7: *KEYWORD".
+    notes: what was read in a way that may be asked for, a sentence each.
+    included: files that the deck includes, relative to its folder.
+    contact_nodes: of a table of nodes, which has no elements; None of a mesh.
     """
 
     path: str

@@ -18,23 +18,14 @@ _OF_PARTS = ("PART", "ENDPART", "INSTANCE", "ENDINSTANCE")
 def read_deck(path: Path) -> Deck:
     """The model of a deck of CalculiX or Abaqus.
 
-    Parameters
-    ----------
-    path
-        The deck. Files that it includes stand in its folder or below.
+    path: the deck. Files that it includes stand in its folder or below.
 
-    Returns
-    -------
-    Deck
-        In units of the file. Keywords that cannot change the model are named in `skipped`. Numbers of nodes and
-        elements are those of the file. Where the deck has instances, those of the first one are those of its part;
-        of the others they are so many thousands larger as a note says.
+    Returns Deck: In units of the file. Keywords that cannot change the model are named in `skipped`. Numbers of nodes
+    and elements are those of the file. Where the deck has instances, those of the first one are those of its part; of
+    the others they are so many thousands larger as a note says.
 
-    Raises
-    ------
-    SceneError
-        About "model": in one sentence with file and line, where the deck cannot be read, makes no sense, or has a
-        keyword that may change the model and is not read.
+    Raises SceneError about "model": in one sentence with file and line, where the deck cannot be read, makes no sense,
+    or has a keyword that may change the model and is not read.
     """
     reading = _Reading(Draft(path.name))
     for block in read_blocks(path, reading.draft.included):

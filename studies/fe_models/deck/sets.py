@@ -128,18 +128,9 @@ def scope_of(items: Container[Key], instances: Mapping[str, object], reference: 
 class Resolver:
     """Sets as numbers that exist.
 
-    Parameters
-    ----------
-    sets
-        As they are written.
-    existing
-        (n,) all numbers that exist, ascending.
-    offsets
-        Of every scope, what is added to its numbers; those of one scope are smaller than the difference to the next.
-    everything
-        The name that the code gives to all of them.
-    nodes_of
-        Of a reference to a set of elements, its nodes; None for sets of elements.
+    sets: as they are written. existing: (n,) all numbers that exist, ascending. offsets: of every scope, what is added
+    to its numbers; those of one scope are smaller than the difference to the next. everything: the name that the code
+    gives to all of them. nodes_of: of a reference to a set of elements, its nodes; None for sets of elements.
     """
 
     def __init__(

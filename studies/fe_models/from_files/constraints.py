@@ -39,23 +39,11 @@ def find_constraints(
 ) -> Supported:
     """Held displacements, constraints and nodal forces of a deck.
 
-    Parameters
-    ----------
-    deck
-        In units of the file.
-    numbers
-        (n_nodes,): nodes of the model, in any order.
-    clamped
-        (n_nodes, 3): displacements that the study holds in place of the deck's boundary conditions; None of none.
-    units
-        Of the file.
-    cut
-        Rows of nodes on cut faces.
+    deck: in units of the file. numbers (n_nodes,): nodes of the model, in any order. clamped (n_nodes, 3):
+    displacements that the study holds in place of the deck's boundary conditions; None of none. units: of the file.
+    cut: rows of nodes on cut faces.
 
-    Raises
-    ------
-    SceneError
-        Where a displacement depends on others and is held, depends twice, or nodes are missing.
+    Raises SceneError where a displacement depends on others and is held, depends twice, or nodes are missing.
     """
     return _Builder(deck, numbers, units, set(cut.tolist())).build(clamped)
 

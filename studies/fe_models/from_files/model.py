@@ -89,10 +89,7 @@ def load_mesh(files: ModelFiles, parameters: Parameters) -> SolidMesh:
 def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = silent) -> LoadedModel:
     """Reads the files and puts the model together.
 
-    Raises
-    ------
-    SceneError
-        Where a file cannot be read, the study names what is not there, or what was exported is of no use.
+    Raises SceneError where a file cannot be read, the study names what is not there, or what was exported is of no use.
     """
     units = find_units(parameters.units)
     progress(f"reading {files.mesh.name}")

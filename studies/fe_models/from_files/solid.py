@@ -22,10 +22,7 @@ def build_solid_mesh(deck: Deck, parameters: Parameters, units: Units) -> SolidM
     Materials are those of the study, else of the deck; none are needed where the study names matrices. A table of nodes
     has no elements, and all its nodes are there.
 
-    Raises
-    ------
-    SceneError
-        Where the deck has no elements, or some have no material.
+    Raises SceneError where the deck has no elements, or some have no material.
     """
     if deck.contact_nodes is not None:
         return SolidMesh(deck.coordinates * units.length, deck.node_numbers, ())

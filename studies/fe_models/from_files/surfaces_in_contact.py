@@ -42,10 +42,7 @@ def find_surfaces(selections: Selections, parameters: Parameters, units: Units, 
     So do contact pairs that the deck glues and the study does not name. axis: of the cyclic structure, for contacts
     with the next sector.
 
-    Raises
-    ------
-    SceneError
-        Where there is no contact, a name is not known, or a pair has no friction coefficient.
+    Raises SceneError where there is no contact, a name is not known, or a pair has no friction coefficient.
     """
     deck = selections.deck
     ties = [_Definition((tie.dependent, tie.independent), tie.tolerance) for tie in deck.ties if not tie.cyclic]

@@ -72,10 +72,7 @@ class CdbCommands:
 def read_commands(path: Path) -> CdbCommands:
     """What the commands of a file say beside its blocks of nodes, elements and components.
 
-    Raises
-    ------
-    SceneError
-        Where a command that is not acted upon may change the model.
+    Raises SceneError where a command that is not acted upon may change the model.
     """
     kinds: dict[int, int] = {}
     places: dict[int, Place] = {}

@@ -18,19 +18,11 @@ _LONGEST_REASON = 160
 def library_errors(path: Path, library: str, package: str, key: str) -> Iterator[None]:
     """A block that loads a library and has it read a file; what the library prints is not shown.
 
-    Parameters
-    ----------
-    path
-        The file.
-    library, package
-        Name of the module, and of the package that brings it.
-    key
-        What errors are about: "model" or "matrices".
+    path: the file. library, package: name of the module, and of the package that brings it. key: what errors are about:
+    "model" or "matrices".
 
-    Raises
-    ------
-    SceneError
-        Where the file is missing or too large, the library is not installed or does not load, or cannot read the file.
+    Raises SceneError where the file is missing or too large, the library is not installed or does not load, or cannot
+    read the file.
     """
     check_file(path, _LARGEST_FILE, key)
     said = io.StringIO()

@@ -18,10 +18,8 @@ def read_library_mesh(path: Path) -> Deck:
     element numbers count its solid elements, both from 1; a physical group gives a set of its nodes, and one of volumes
     a set of its elements as well. Hexahedra of 8 nodes are read as C3D8I, the project's own.
 
-    Raises
-    ------
-    SceneError
-        About "model": where the extra is missing, or the file cannot be read or has what is not acted upon.
+    Raises SceneError about "model": where the extra is missing, or the file cannot be read or has what is not acted
+    upon.
     """
     if path.suffix.lower() == ".cdb":
         from studies.fe_models.libraries.cdb import read_cdb
@@ -44,10 +42,7 @@ def build_deck(
 ) -> Deck:
     """A deck of node numbers (n,) with coordinates (n, 3), and numbers and nodes of elements by kind.
 
-    Raises
-    ------
-    SceneError
-        Where a number is there twice, a node is missing, or there are no solid elements.
+    Raises SceneError where a number is there twice, a node is missing, or there are no solid elements.
     """
     order = np.argsort(nodes[0], kind="stable")
     numbers, coordinates = nodes[0][order], nodes[1][order]

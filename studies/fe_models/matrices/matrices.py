@@ -104,10 +104,8 @@ def of_table(file: str, matrix: object, labels: IntArray) -> Entries:
 def assemble(parts: Mapping[str, Entries], files: tuple[str, ...], code: str) -> Matrices:
     """The matrices of entries by name: "stiffness" and "mass"; "damping" and "load" may be missing.
 
-    Raises
-    ------
-    SceneError
-        Where an entry is not finite or given twice, a matrix is not symmetric, or rows are held or too many.
+    Raises SceneError where an entry is not finite or given twice, a matrix is not symmetric, or rows are held or too
+    many.
     """
     square = {name: each for name, each in parts.items() if name != "load"}
     for name in ("stiffness", "mass"):

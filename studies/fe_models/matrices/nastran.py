@@ -46,19 +46,20 @@ def read_nastran(path: Path) -> Matrices:
     Raises SceneError about "matrices", in particular for complex matrices, and displacements along other axes.
     """
     check_file(path, LARGEST_FILE, "matrices")
-    columns: dict[str, list[np.ndarray]] = {}
+    columns: dict[str, list[np.ndarray] | None] = {}
     with path.open(encoding="latin-1") as file:
         for number, word, fields in _entries(file):
             if word in ("GRID", "GRDSET"):
                 _check_grid(fields, number, path.name)
-            elif word == "DMIG" and fields[0][:1] in ("K", "M", "B", "P") and not fields[0].startswith("K4"):
+            elif word == "DMIG" and fields[0][:1].upper() in ("K", "M", "B", "P"):
                 try:
                     _take(fields, columns)
                 except ValueError as error:
                     wrong(path.name, f"line {number}, in DMIG {shown(fields[0])}: {shown(str(error))}", _AGAIN)
     parts = {}
-    for name, own in names_of_matrices(columns, path.name).items():
-        table = np.concatenate(columns[own]) if columns[own] else np.empty((0, 5))
+    real = {name: each for name, each in columns.items() if each is not None}
+    for name, own in names_of_matrices(real, path.name).items():
+        table = np.concatenate(real[own]) if real[own] else np.empty((0, 5))
         node, dof, of_column, component = table[:, :4].astype(np.int64).T
         rows = label(node, dof, path.name)
         # a column of forces is the number of its load case
@@ -87,16 +88,23 @@ def _entries(lines: Iterable[str]) -> Iterator[tuple[int, str, list[str]]]:
         yield number, word, fields
 
 
-def _take(fields: list[str], columns: dict[str, list[np.ndarray]]) -> None:
-    """Takes a header, or a column with its entries: rows (m, 5) of node, dof, node and dof of the column, value."""
+def _take(fields: list[str], columns: dict[str, list[np.ndarray] | None]) -> None:
+    """Takes a header, or a column with its entries: rows (m, 5) of node, dof, node and dof of the column, value.
+
+    Complex matrices are None, as forces of a frequency.
+    """
     name, node, component = fields[0].upper(), fields[1], fields[2]
     if node == "0":
-        if fields[3] not in ("1", "2"):
+        complex_ = fields[3] not in ("1", "2")
+        if complex_ and name in ("KAAX", "MAAX"):
             raise ValueError("it is complex")
-        columns.setdefault(name, [])
+        columns.setdefault(name, None if complex_ else [])
         return
     if name not in columns:
         raise ValueError("its header is missing")
+    table_of = columns[name]
+    if table_of is None:
+        return
     at = int(node), int(component or 0)
     table = []
     entries = fields[4:] + [""] * (-len(fields) % 4)
@@ -110,7 +118,7 @@ def _take(fields: list[str], columns: dict[str, list[np.ndarray]]) -> None:
         if not 0 < table[-1][0] < 2**31 or not 0 < at[0] < 2**31:
             raise ValueError(f"it has the node {row}")
     if table:
-        columns[name].append(np.array(table, dtype=np.float64))
+        table_of.append(np.array(table, dtype=np.float64))
 
 
 def _real(text: str) -> float:

@@ -94,10 +94,8 @@ def read_points(block: Block) -> tuple[IntArray, FloatArray]:
 def read_records(block: Block, length: int, what: str) -> IntArray:
     """Records (n, length) of whole numbers, each from the beginning of a line over one or more lines.
 
-    Raises
-    ------
-    SceneError
-        Where a line is none of numbers, or a record is too short or too long. what: of the record, for the message.
+    Raises SceneError where a line is none of numbers, or a record is too short or too long. what: of the record, for
+    the message.
     """
     values = array("q")
     started = 0  # numbers of records before the present one

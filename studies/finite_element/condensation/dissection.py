@@ -64,15 +64,9 @@ class Dissection:
 def dissect(couplings: sparse.csr_matrix, positions: FloatArray | IntArray, kept: BoolArray) -> Dissection:
     """Order and fronts of a mesh.
 
-    Parameters
-    ----------
-    couplings
-        (n, n): which nodes are coupled; symmetric pattern, the values do not matter.
-    positions
-        (n, n_directions): along each direction layers of nodes are looked for. Places in a structured grid, or
-        coordinates.
-    kept
-        (n,): nodes that are never eliminated.
+    couplings (n, n): which nodes are coupled; symmetric pattern, the values do not matter. positions
+    (n, n_directions): along each direction layers of nodes are looked for. Places in a structured grid, or coordinates.
+    kept (n,): nodes that are never eliminated.
     """
     cutter = _Cutter(couplings, positions)
     inner = np.flatnonzero(~kept)

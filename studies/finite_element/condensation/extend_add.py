@@ -16,14 +16,9 @@ def add_lower(
 ) -> None:
     """Adds the lower triangle of a child's part to those of its parent's front; all but the places in Fortran's order.
 
-    Parameters
-    ----------
-    own, below, update
-        (e, e), (f, e), (f, f): the front, what is below it, and what it leaves. Only lower triangles are added to.
-    part
-        (g, g): what the child leaves.
-    places
-        (g / 3,): place of each node of the child's boundary among those of the front and its boundary, ascending.
+    own (e, e), below (f, e), update (f, f): the front, what is below it, and what it leaves. Only lower triangles
+    are added to. part (g, g): what the child leaves. places (g / 3,): place of each node of the child's boundary
+    among those of the front and its boundary, ascending.
     """
     _add(own, below, update, part, places)
 

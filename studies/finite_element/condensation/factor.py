@@ -82,19 +82,10 @@ def factorise(
 ) -> Factor:
     """Factors of a Hermitian form at a phase.
 
-    Parameters
-    ----------
-    form, dissection
-        The form in the order of the dissection.
-    phase
-        Complex, or 1.0 or -1.0.
-    unphased
-        Factors of fronts that do not depend on the phase and what they leave, from an earlier call; filled by this one.
+    form, dissection: the form in the order of the dissection. phase: complex, or 1.0 or -1.0. unphased: factors of
+    fronts that do not depend on the phase and what they leave, from an earlier call; filled by this one.
 
-    Raises
-    ------
-    NotPositiveDefiniteError
-        Where the form is not positive definite on the eliminated nodes.
+    Raises NotPositiveDefiniteError where the form is not positive definite on the eliminated nodes.
     """
     phased = phased_fronts(form, dissection)
     done = {} if unphased is None else unphased

@@ -22,16 +22,8 @@ def lowest_modes(
 
     There are fewer where the structure has fewer, as one with a singular mass.
 
-    Parameters
-    ----------
-    solve
-        Displacements (n, n_columns) under forces.
-    multiply_mass
-        Forces of inertia (n, n_columns) of displacements.
-    start
-        Displacements (n, n_block) to begin with, no force in them.
-    n_modes
-        At least 1.
+    solve: displacements (n, n_columns) under forces. multiply_mass: forces of inertia (n, n_columns) of displacements.
+    start: displacements (n, n_block) to begin with, no force in them. n_modes: at least 1.
     """
     n, n_block = start.shape
     # Vectors in rows, orthonormal with the mass, and their forces of inertia; and the flexibility in their terms.

@@ -71,18 +71,9 @@ def order_form(
 ) -> OrderedForm:
     """Form of the nodes that take part from that of all nodes.
 
-    Parameters
-    ----------
-    matrix
-        (3 n_nodes, 3 n_nodes): symmetric, in blocks of 3.
-    dissection
-        Of the nodes that take part.
-    place
-        (n_nodes,): place, in the order of elimination, of the node that each node moves with; -1 where it is held.
-    turned
-        (n_nodes,): the node moves as `phase * rotation` times its master.
-    rotation
-        (3, 3).
+    matrix (3 n_nodes, 3 n_nodes): symmetric, in blocks of 3. dissection: of the nodes that take part. place
+    (n_nodes,): place, in the order of elimination, of the node that each node moves with; -1 where it is held. turned
+    (n_nodes,): the node moves as `phase * rotation` times its master. rotation (3, 3): by one sector.
     """
     n_places = len(dissection.order)
     # From which place on a row is kept.

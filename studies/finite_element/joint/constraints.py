@@ -114,23 +114,11 @@ def eliminate(
 ) -> tuple[Constraints, BoolArray]:
     """Constraints, and which displacements (n_nodes, 3) are 0 or follow others.
 
-    Parameters
-    ----------
-    dependence
-        Which displacements depend on others.
-    held
-        (n_nodes, 3): displacements that are 0.
-    oblique
-        Projections (3, 3) of nodes on other directions in which they are held.
-    numbers
-        (n_nodes,): of the nodes in the file, for messages.
-    n_with_elements
-        Number of nodes with elements. Motions of the others that move none of these are held.
+    dependence: which displacements depend on others. held (n_nodes, 3): displacements that are 0. oblique: projections
+    (3, 3) of nodes on other directions in which they are held. numbers (n_nodes,): of the nodes in the file, for
+    messages. n_with_elements: number of nodes with elements. Motions of the others that move none of these are held.
 
-    Raises
-    ------
-    SceneError
-        Where a displacement depends twice, on itself, or is held as well.
+    Raises SceneError where a displacement depends twice, on itself, or is held as well.
     """
     size, dependent = held.size, dependence.dependent
     slanted = np.zeros(len(held), dtype=np.bool_)

@@ -25,21 +25,12 @@ def match_nodes(
 ) -> ContactPairs:
     """Pairs of the nodes of the first surface of each contact and the nearest ones of the second.
 
-    Parameters
-    ----------
-    coordinates, numbers
-        (n_nodes, 3), m, and (n_nodes,), of the file.
-    contacts
-        At least one. The second surface stands where its sector has it.
-    given
-        Areas (n_nodes,), m2, normals (n_nodes, 3), unit vectors out of the body, and initial gaps (n_nodes,), m; NaN
-        where there is none. Those of the first surface count. First tangents are as near as possible to the axis, else
-        to z.
+    coordinates (n_nodes, 3): m. numbers (n_nodes,): of the nodes in the file, for messages. contacts: at least one; the
+    second surface stands where its sector has it. given: areas (n_nodes,), m2, normals (n_nodes, 3), unit vectors out
+    of the body, and initial gaps (n_nodes,), m; NaN where there is none; those of the first surface count. axis: of the
+    cyclic structure; the first tangents are as near to it as possible, else to z.
 
-    Raises
-    ------
-    SceneError
-        Where a node has no area or normal, or finds no node that it meets.
+    Raises SceneError where a node has no area or normal, or finds no node that it meets.
     """
     along = np.array([0.0, 0.0, 1.0]) if axis is None else axis.axis
     area, normals, gap = given

@@ -283,19 +283,11 @@ def order_structure(
 ) -> OrderedStructure:
     """Order of elimination.
 
-    Parameters
-    ----------
-    supports, pairs, ties
-        As `consistent_supports`, `pairs_of_sector` and `ties_of_structure` give them; ties are glued for good.
-    coupled
-        (n_nodes, n_nodes): which nodes are coupled; the values do not matter.
-    positions
-        (n_nodes, n_directions): coordinates, or places in a structured grid; cuts run across these directions.
+    supports, pairs, ties: as `consistent_supports`, `pairs_of_sector` and `ties_of_structure` give them; ties are glued
+    for good. coupled (n_nodes, n_nodes): which nodes are coupled; the values do not matter. positions
+    (n_nodes, n_directions): coordinates, or places in a structured grid; cuts run across these directions.
 
-    Raises
-    ------
-    SceneError
-        Where nothing but the nodes of the pairs moves.
+    Raises SceneError where nothing but the nodes of the pairs moves.
     """
     master = supports.master
     free = np.flatnonzero(master == np.arange(supports.n_nodes))

@@ -111,25 +111,12 @@ def build_contact_pairs(
 ) -> ContactPairs:
     """Pairs of all surfaces, those of the first ones first, each by its moving nodes in ascending order.
 
-    Parameters
-    ----------
-    coordinates
-        (n_nodes, 3), m.
-    numbers
-        (n_nodes,): of the nodes in the file, for messages.
-    contacts
-        At least one.
-    along
-        (3,): the first tangents are the projections of this direction where it does not stand on the surface; else
-        of the axis of coordinates that lies flattest on it.
-    axis
-        Of the cyclic structure, for contacts between sectors.
+    coordinates (n_nodes, 3): m. numbers (n_nodes,): of the nodes in the file, for messages. contacts: at least one.
+    along (3,): the first tangents are the projections of this direction where it does not stand on the surface; else
+    of the axis of coordinates that lies flattest on it. axis: of the cyclic structure, for contacts between sectors.
 
-    Raises
-    ------
-    SceneError
-        Where nodes find no point of the other surface, do not face it, or find it behind their own body, and where
-        nodes belong to two pairs.
+    Raises SceneError where nodes find no point of the other surface, do not face it, or find it behind their own body,
+    and where nodes belong to two pairs.
     """
     parts = [_pair(coordinates, numbers, contact, place, along, axis) for place, contact in enumerate(contacts)]
     return join_pairs(parts, numbers)

@@ -60,30 +60,9 @@ class Plates:
             lines.append(" ".join(map(str, (number, kind, 2, tag, tag, *nodes))))
         return "\n".join([*lines, "$EndElements"]) + "\n"
 
-    def cdb(self):
-        """Of ANSYS, as CDWRITE writes it: SOLID185, the sets as components."""
-        n, elements = self.mesh.n_nodes, np.concatenate([group.nodes + 1 for group in self.mesh.groups])
-        lines = ["/PREP7", "ET,        1,185", f"NBLOCK,6,SOLID,{n:10d},{n:10d}", "(3i9,6e21.13e3)"]
-        for number, point in enumerate(self.mesh.coordinates, 1):
-            lines.append(f"{number:9d}{0:9d}{0:9d}{''.join(f'{x:21.13E}' for x in point)}")
-        lines += ["N,R5.3,LOC,       -1,", f"EBLOCK,19,SOLID,{len(elements):10d},{len(elements):10d}", "(19i9)"]
-        for number, nodes in enumerate(elements, 1):
-            lines.append("".join(f"{value:9d}" for value in (1, 1, 1, 1, 0, 0, 0, 0, 8, 0, number, *nodes)))
-        lines.append(f"{-1:9d}")
-        for name, numbers in self.numbers.items():
-            lines += [component(name, numbers)]
-        return "\n".join([*lines, "FINISH"]) + "\n"
-
     def system(self):
         """Stiffness and mass as this project assembles them, dense, by name; node and dof of the rows."""
         n = self.mesh.n_nodes
         stiffness, mass = assemble_stiffness(self.mesh), assemble_mass(self.mesh)
         rows = np.stack([np.repeat(self.mesh.numbers, 3), np.tile([1, 2, 3], n)], axis=1)
         return {"stiffness": stiffness.toarray(), "mass": mass.toarray()}, rows
-
-
-def component(name, numbers):
-    """A component of nodes as CDWRITE writes it."""
-    lines = [f"CMBLOCK,{name:8},NODE,{len(numbers):8d}", "(8i10)"]
-    lines += ["".join(f"{n:10d}" for n in numbers[at : at + 8]) for at in range(0, len(numbers), 8)]
-    return "\n".join(lines)

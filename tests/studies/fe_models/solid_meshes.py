@@ -4,7 +4,6 @@ import subprocess
 from itertools import pairwise
 
 import numpy as np
-from scipy import sparse
 
 from studies.finite_element.elements.kinds import ELEMENT_KINDS
 from studies.finite_element.elements.solid_mesh import ElementGroup, Material, SolidMesh
@@ -108,15 +107,3 @@ def run_ccx(folder, lines, name="job"):
     done = subprocess.run(["ccx", "-i", name], cwd=folder, capture_output=True, text=True, timeout=600)
     if done.returncode != 0 or "*ERROR" in done.stdout:
         raise RuntimeError(done.stdout[-2000:] + done.stderr[-500:])
-
-
-def read_export(folder, name="job"):
-    """Stiffness and mass (n, n) that CalculiX wrote, n counting dofs in the order of its `.dof` file."""
-    matrices = []
-    for ending in ("sti", "mas"):
-        table = np.loadtxt(folder / f"{name}.{ending}", ndmin=2)
-        row, column = (table[:, :2].astype(int) - 1).T
-        n = len((folder / f"{name}.dof").read_text().split())
-        upper = sparse.csr_matrix((table[:, 2], (row, column)), shape=(n, n))
-        matrices.append((upper + sparse.triu(upper, 1).T).tocsr())
-    return matrices

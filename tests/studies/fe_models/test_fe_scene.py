@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy import linalg, sparse
+from scipy import linalg
 
 from studies.fe_models.from_files.check import describe_rest
 from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness, spin_softening
@@ -202,60 +202,6 @@ def test_the_force_at_rest_of_bars_that_overlap(friction):
 )
 def test_the_force_at_rest_of_bars_that_are_loaded(lift, load, sentence):
     assert describe_rest(bars(lift, load), 0.3) == sentence
-
-
-def test_ties_are_glued_for_good():
-    model, joint = plates()
-    first, second = joint.contacts[0].first, joint.contacts[0].second
-    third, c = block("C3D8", (2, 3, 1), lambda points: points * [0.05, 0.03, 0.004] + [0.05, 0.0, 0.008])
-    mesh = joined(model.mesh, third)
-    z = mesh.coordinates[:, 2]
-    top = np.arange(mesh.n_nodes) >= model.mesh.n_nodes
-    above = surface_of_faces(mesh, "ABOVE", *faces_where(mesh, top & (np.abs(z - 0.008) < 1e-9)))
-    below = surface_of_faces(mesh, "BELOW", *faces_where(mesh, ~top & (np.abs(z - 0.008) < 1e-9)))
-    held = np.concatenate([joint.held, np.zeros((len(c), 3), dtype=bool)])
-    tied = JointDefinition(
-        (ContactSurfaces(first, second),), held, joint.load, joint.responses, ties=(ContactSurfaces(above, below),)
-    )
-    scene = build_fe_scene(MeshModel(mesh), tied, ReductionOptions(n_modes=6), 1)
-    both = JointDefinition(
-        (ContactSurfaces(first, second), ContactSurfaces(above, below)), held, joint.load, joint.responses
-    )
-    other = build_fe_scene(MeshModel(mesh), both, ReductionOptions(n_modes=6), 1)
-    assert scene.model.contact.n_contact < other.model.contact.n_contact
-    # glued all alike; the other has the tie as contact pairs
-    assert np.allclose(scene.summary.glued_frequencies[0], other.summary.glued_frequencies[0], rtol=1e-9)
-
-
-def test_matrices_with_nodes_that_have_no_place():
-    """Inner nodes of elements: condensed or not, the reduced model is the same but for their inertia."""
-    model, joint = plates("C3D8", "C3D8")
-    stiffness, mass = assemble_stiffness(model.mesh), assemble_mass(model.mesh)
-    n = model.mesh.n_nodes
-    plain = MatrixModel(model.coordinates, model.numbers, stiffness, mass)
-    # a node on springs to two others, without mass
-    spring = 3e7 * np.eye(3)
-    more = sparse.lil_matrix((3 * n + 3, 3 * n + 3))
-    more[: 3 * n, : 3 * n] = stiffness
-    for sign_a, a in ((1, n), (-1, 5), (-1, 6)):
-        for sign_b, b in ((1, n), (-1, 5), (-1, 6)):
-            more[3 * a : 3 * a + 3, 3 * b : 3 * b + 3] += sign_a * sign_b * spring
-    # the inner node follows the sum of both without force: nothing is left of the springs
-    inner = MatrixModel(
-        np.vstack([model.coordinates, np.full((1, 3), np.nan)]),
-        np.append(model.numbers, 10**6),
-        more.tocsr(),
-        sparse.block_diag([mass, sparse.csr_matrix((3, 3))], format="csr"),
-        Rotation(1e4, np.zeros(3), Z),
-    )
-    held = np.vstack([joint.held, np.zeros((1, 3), dtype=bool)])
-    wider = JointDefinition(joint.contacts, held, joint.load, joint.responses)
-    options = ReductionOptions(n_modes=5)
-    ours = build_fe_scene(inner, wider, options, 1)
-    reference = build_fe_scene(plain, joint, options, 1)
-    assert np.allclose(ours.summary.glued_frequencies[0], reference.summary.glued_frequencies[0], rtol=1e-9)
-    assert ours.summary.mass == pytest.approx(reference.summary.mass, rel=1e-12)
-    assert np.isfinite(ours.model.linear[0].load_static).all()
 
 
 @pytest.mark.parametrize("small", [0, 900])
