@@ -24,9 +24,9 @@ from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import in_rows, packable
-from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
+from solver.results.verdict import first_cut_off
 from solver.settings import Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case

@@ -15,9 +15,8 @@ from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable, unpack
-from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState, WearHistory
-from solver.results.verdict import judge, last_error
+from solver.results.verdict import first_cut_off, judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
 from solver.wear.course import unknown_course
