@@ -11,6 +11,7 @@ from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.scene import reduce_model
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
+from studies.scene_file import read_scene, write_scene
 from tests.studies.fe_models.matrix_files import REDUCED
 from tests.studies.fe_models.reduced import D, N, Sector
 
@@ -104,9 +105,10 @@ def test_tables_that_do_not_fit_are_named(tmp_path):
         model_of(tmp_path)
 
 
-def test_a_model_in_python_is_the_same():
-    """`build_model` of the matrices at each nodal diameter."""
+def test_a_scene_file_and_a_model_in_python_are_the_same(tmp_path):
+    """Of the matrices at each nodal diameter: groups `nd/<k>`, and tables of `build_model`."""
     scene = sector().scene
+    write_scene(scene, tmp_path / "scene.h5")
     given = {name: {k: getattr(each, name) for k, each in scene.linear.items()} for name in ("mass", "damping")}
     stiffness = {k: each.stiffness for k, each in scene.linear.items()}
     more = {
@@ -116,9 +118,11 @@ def test_a_model_in_python_is_the_same():
     }  # fmt: skip
     place = scene.contact.dofs, scene.contact.area
     model = build_model(given["mass"], given["damping"], stiffness, *place, **more)
-    for k, each in scene.linear.items():
-        for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
-            np.testing.assert_array_equal(getattr(model.linear[k], name), getattr(each, name))
+    for found in (model, read_scene(tmp_path / "scene.h5", 3)):
+        assert (found.n_sectors, found.nodal_diameter) == (N, D)
+        for k, each in scene.linear.items():
+            for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
+                np.testing.assert_array_equal(getattr(found.linear[k], name), getattr(each, name))
     for wrong, sentence in (
         ({0: stiffness[0]}, "stiffness: give the matrix of nodal diameter 2"),
         ({**stiffness, D: stiffness[D] + np.triu(stiffness[D])}, "stiffness: give a Hermitian matrix"),
