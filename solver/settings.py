@@ -38,6 +38,7 @@ TARGETS: tuple[Quantity, ...] = get_args(Quantity)
 """Quantities of a target."""
 
 
+@packable
 @dataclass(frozen=True)
 class WearTarget:
     """Wear at which a history ends.

@@ -25,9 +25,10 @@ from solver.settings import (
     WearTarget,
 )
 from solver.structure.joint import friction_of_pairs
-from solver.wear.final_state.find import find_final_state
+from solver.wear.control import steps_of
 from solver.wear.history import integrate_wear
 from solver.wear.solutions import SlowTime
+from solver.wear.wearing_joint import Fixed, Following
 
 
 def march_wear(
@@ -67,13 +68,11 @@ def march_wear(
     wear_coefficient
         k_w of Eq. (2), 1/Pa; with the law "energy" the energy wear coefficient.
     cycles
-        Ascending cycle counts at which the history is reported, or the last count alone. The history ends at the last
-        count. It begins at 0; a missing 0 is added. With inf the history ends where wear has come to an end, see
-        `outputs`.
+        Ascending cycle counts at which the history is reported, or the last count alone. A missing 0 is added. With inf
+        the history ends where wear has come to an end, see `outputs`.
     scheme, step
         "adaptive" chooses its steps by `settings.rtol`. "implicit" and "explicit" take steps of `step` cycles, Eqs.
-        (23), (24). "final" seeks the final state, in which nothing wears any more, if possible without integration over
-        the slow time; it needs `cycles` = inf, and `final_method` of the history names the method.
+        (23), (24). "final" is "adaptive" to the final state, in which nothing wears any more; it needs `cycles` = inf.
     sweep
         Way to the unworn state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
     settings
@@ -83,19 +82,17 @@ def march_wear(
     until
         Wear at which the history ends before the last of `cycles`; `cycles_to_target` of the history is its count.
     outputs, final_share
-        For `cycles` = inf. outputs: number of reported states, spaced evenly in worn volume and cycles; the history has
-        their counts. final_share: the history ends where the wear rate of each pair is below this share of its own
-        largest wear rate.
+        For `cycles` = inf. outputs: number of reported states, spaced evenly in worn volume and cycles. final_share:
+        the history ends where the wear rate of each pair is below this share of its own largest wear rate.
     wear_depth
         (n_contact,), m, of a joint that is worn before: opens the pairs as a gap does. Depths and volumes of the
-        history count from there. Unworn if not given.
+        history count from there.
     between
         Range of a frequency that is followed, Hz: (lowest, highest). The history begins at the first resonance that the
-        sweep meets in the range, and `excitation_frequency` of the history is the frequency at each count. "resonance"
-        is phase resonance: in the first harmonic, the vibration is in quadrature with the excitation, `F^H x` has no
-        real part. "peak" is the largest amplitude of the first response in its first harmonic, over the frequency at
-        constant wear depth. Under strong damping both differ: for one degree of freedom with the damping ratio zeta the
-        peak lies lower by a factor sqrt(1 - 2 zeta^2).
+        sweep meets in the range. "resonance" is phase resonance: in the first harmonic, the vibration is in quadrature
+        with the excitation, `F^H x` has no real part. "peak" is the largest amplitude of the first response in its
+        first harmonic, over the frequency at constant wear depth. Under strong damping both differ: for one degree of
+        freedom with the damping ratio zeta the peak lies lower by a factor sqrt(1 - 2 zeta^2).
 
     Raises
     ------
@@ -137,10 +134,10 @@ def march_wear(
     wearing_work(law, model.contact, friction_of_pairs(model, friction))
     _, start = next(follow_branch(model, friction, load, follow or np.array([at]), sweep, settings))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
-    stepping: Scheme = "adaptive" if scheme == "final" else scheme
-    asked = SlowTime(per_pressure, stepping, read_at, length, law=law, until=until, follow=follow)
-    solve = find_final_state if scheme == "final" else integrate_wear
-    return solve(model, friction, settings, start, asked)
+    steps = steps_of(scheme, length, settings.rtol)
+    where = Fixed() if follow is None else Following(follow)
+    asked = SlowTime(per_pressure, steps, read_at, law=law, until=until, where=where)
+    return integrate_wear(model, friction, settings, start, asked)
 
 
 def _check_frequency(

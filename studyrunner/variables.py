@@ -197,15 +197,6 @@ KEPT = {
     "step_limit": Variable(
         (), "1", "predicted largest stable step of the explicit scheme at cycle 0, cycles", comment="inf where none."
     ),
-    "final_method": Variable(
-        (),
-        "1",
-        "how the scheme final has found the final state",
-        "int8",
-        ("none", "active_set", "march"),
-        comment="none: another scheme. active_set: without slow time, so that outputs between the unworn and the final"
-        " state are empty. march: on the slow time scale, message says why.",
-    ),
     "message": Variable((), "1", "further facts on how the point ended", "U240"),
 }
 """Those that every result holds."""

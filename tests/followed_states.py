@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.error_estimate import Estimate
 from solver.continuation.phase_lag import excitation_product
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, final_history
@@ -20,12 +19,11 @@ from solver.settings import FollowedFrequency, SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
 from solver.wear.check import Checked, FullCheck
-from solver.wear.control import Given
+from solver.wear.control import Given, WearLine
+from solver.wear.course import Course
 from solver.wear.integrate import Integration
-from solver.wear.output import DenseOutput
 from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
-from solver.wear.where import Following
+from solver.wear.wearing_joint import Following, WearingJoint
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ def followed_states(
     ((_, start),) = follow_branch(model, 0.5, load, follow, "up", settings)
     assert start.state is not None, start.message
     case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
-    work = WearingJoint.of(case, start.state, wear_coefficient, where=Following(follow))
+    work = WearingJoint(case, start, wear_coefficient, where=Following(follow))
     states, errors, check = [], [], FullCheck()
 
     def recorded(work: WearingJoint, state: WearState) -> Checked | Failure:
@@ -63,14 +61,8 @@ def followed_states(
             errors.append(checked[1].excitation_frequency_error)
         return checked
 
-    output = DenseOutput(work.area, smooth=False)
-    steps = Given(work, "implicit", float(cycles[1] - cycles[0]), float(cycles[-1]))
-    integration = Integration(steps, recorded, output, lambda *_: None, 1e4, float(cycles[-1]))
-    estimate = Estimate(start.response_error, start.wear_rate_error)
-    first = work.begin(start.state, start.resolution, estimate, accurate=True)
-    begun = integration.begin(first)
-    assert isinstance(begun, WearState), begun
-    integration.run(begun)
+    line = WearLine(work, Given(float(cycles[1] - cycles[0])), float(cycles[-1]))
+    Integration(line, recorded, lambda *_: None, 1e4).begin(work.begin, Course(work.area, False, cycles))
     return FollowedStates(work, tuple(states), tuple(errors))
 
 

@@ -14,13 +14,12 @@ from solver.model import ComplexArray, FloatArray
 
 @dataclass(frozen=True)
 class HistoryError:
-    """Estimated errors of a history at its counts; inf where nothing confirms it.
+    """Estimated errors of a history at its counts; inf where nothing confirms it, NaN beyond the end of the history.
 
     worn_volume (n_output,): relative; 0 where nothing has worn.
     wear_depth (n_output, n_contact): m.
     response, wear_rate (n_output,): relative, of the state at a count.
     frequency (n_output,): of the excitation, Hz.
-    All are NaN beyond the end of the history.
     """
 
     worn_volume: FloatArray
@@ -31,39 +30,12 @@ class HistoryError:
 
 
 @dataclass(frozen=True)
-class Met:
-    """Difference of a history and its reference solution at all counts where both were compared.
-
-    cycles (n,): ascending counts.
-    differences (n, ...): of the worn volume, m3, the depths, m, or a relative difference; NaN beyond the end of the
-        reference solution.
-    """
-
-    cycles: FloatArray
-    differences: FloatArray
-
-    def largest_before(self, counts: FloatArray) -> FloatArray:
-        """Largest difference (n_output, ...) from `crossing_window` times each count up to this count; 0 if none.
-
-        Two histories in which an event happens at different counts cross each other. At the crossing their difference
-        is small and is no measure of the error.
-        """
-        known = np.isfinite(self.differences).all(axis=tuple(range(1, self.differences.ndim)))
-        at, differences = self.cycles[known], self.differences[known]
-        first = np.searchsorted(at, ACCURACY.crossing_window * counts, "left")
-        last = np.searchsorted(at, counts, "right")
-        return np.array([
-            differences[one:other].max(axis=0, initial=0.0) for one, other in zip(first, last, strict=True)
-        ])  # fmt: skip
-
-
-@dataclass(frozen=True)
 class Both:
     """Values of a history and of its reference solution at equal counts.
 
     counts (n,): ascending.
-    fine, reference: values by name as from `solver.wear.output.DenseOutput.read`; the reference has NaN beyond its end,
-        and nothing where there is none.
+    fine, reference: values by name as from `solver.wear.course.Course.read`; the reference has NaN beyond its end, and
+        nothing where there is none.
     follows: whether the frequency of the excitation follows the structure.
     """
 
@@ -89,11 +61,10 @@ def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
     area
         (n_contact,), m2.
     """
-    counts, fine = outputs.counts, outputs.fine
-    safety = ACCURACY.history_safety
+    counts, fine, safety = outputs.counts, outputs.fine, ACCURACY.history_safety
 
     def crossing(differences: FloatArray) -> FloatArray:
-        return safety * Met(steps.counts, differences).largest_before(counts)
+        return safety * largest_before(steps.counts, differences, counts)
 
     depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
     difference, apart = safety * _depth_change(outputs), _depth_change(steps)
@@ -105,7 +76,7 @@ def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
     error = np.fmax(error, from_start + fine["local"])
     reached = np.isfinite(volume)
     unknown = reached & ~np.isfinite(difference).all(axis=1)
-    relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
+    relative = _over(error, volume)
     relative[unknown & (volume > 0.0)] = np.inf
     relative[~reached] = np.nan
     # no pair is known better than the volume: one that agrees with the reference solution does so by chance. Without
@@ -115,16 +86,15 @@ def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
         of_pairs = np.fmax(np.fmax(difference, crossing(apart)), np.where(depth > 0.0, of_pair[:, None] * depth, 0.0))
     of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
     of_pairs[~reached] = np.nan
-    # an unworn state has errors of its own, from states with more harmonics
-    unworn = (counts == 0.0) | (volume <= 0.0)
-    response, rate = (
-        np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], larger)))
-        for name, larger in (
-            ("response_error", np.fmax(safety * _response_change(outputs), crossing(_response_change(steps)))),
-            ("wear_rate_error", np.fmax(safety * _rate_change(outputs), crossing(_rate_change(steps)))),
-        )
-    )
+
+    def of_state(name: str, of_outputs: FloatArray, of_steps: FloatArray) -> FloatArray:
+        larger = np.where(unknown, np.inf, np.fmax(fine[name], np.fmax(safety * of_outputs, crossing(of_steps))))
+        # an unworn state has errors of its own, from states with more harmonics
+        return np.where((counts == 0.0) | (volume <= 0.0), fine[name], larger)
+
+    response = of_state("response_error", _response_change(outputs), _response_change(steps))
     response = np.fmax(response, _change_within(volume, error, steps, area))
+    rate = of_state("wear_rate_error", _rate_change(outputs), _rate_change(steps))
     # beyond the end of the history nothing is known, not even an error
     response, rate = (np.where(reached, each, np.nan) for each in (response, rate))
     return HistoryError(relative, of_pairs, response, rate, _frequency_error(outputs, safety, 0.0))
@@ -141,7 +111,7 @@ def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray
     error = apart @ area + adaptive.worn_volume * other
     reached = np.isfinite(volume)
     unknown = reached & ~np.isfinite(error)
-    relative = np.divide(error, volume, out=np.zeros_like(volume), where=volume > 0.0)
+    relative = _over(error, volume)
     relative[unknown & (volume > 0.0)] = np.inf
     of_pairs = np.where(unknown[:, None], np.where(depth > 0.0, np.inf, 0.0), apart + adaptive.wear_depth)
     relative[~reached], of_pairs[~reached] = np.nan, np.nan
@@ -167,6 +137,23 @@ def _frequency_error(both: Both, safety: float, known: FloatArray | float) -> Fl
     return np.where(np.isfinite(both.fine["wear_rate"]) & np.isnan(whole), np.inf, whole)
 
 
+def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
+    """Largest difference (n_output, ...) from `crossing_window` times each count up to this count; 0 if none.
+
+    Two histories in which an event happens at different counts cross each other. At the crossing their difference is
+    small and is no measure of the error.
+
+    cycles (n,): ascending counts at which both were compared.
+    differences (n, ...): of any quantity; NaN beyond the end of the reference solution.
+    counts (n_output,): at which the error is asked for.
+    """
+    known = np.isfinite(differences).all(axis=tuple(range(1, differences.ndim)))
+    at, differences = cycles[known], differences[known]
+    first = np.searchsorted(at, ACCURACY.crossing_window * counts, "left")
+    last = np.searchsorted(at, counts, "right")
+    return np.array([differences[one:other].max(axis=0, initial=0.0) for one, other in zip(first, last, strict=True)])
+
+
 def _change_within(volume: FloatArray, error: FloatArray, steps: Both, area: FloatArray) -> FloatArray:
     """Relative change (n,) of the response while the worn volume passes the values within its error.
 
@@ -177,18 +164,18 @@ def _change_within(volume: FloatArray, error: FloatArray, steps: Both, area: Flo
     worn, response = steps.fine["wear_depth"] @ area, steps.fine["response"]
     known = np.isfinite(worn)
     worn, response = worn[known], response[known]
+    found = np.zeros_like(volume)
     if worn.size < 2:
-        return np.zeros_like(volume)
+        return found
 
     def at(value: FloatArray) -> ComplexArray:
         return np.array([np.interp(value, worn, each) for each in response.T])
 
-    found = np.zeros_like(volume)
     for place in np.flatnonzero(np.isfinite(error)):
         low, high = volume[place] - error[place], volume[place] + error[place]
         passed = response[(worn > low) & (worn < high)].T
-        moved = np.hstack([at(np.array([low, high])), passed]) - at(volume[place : place + 1])
-        size = np.linalg.norm(at(volume[place : place + 1]))
+        here = at(volume[place : place + 1])
+        moved, size = np.hstack([at(np.array([low, high])), passed]) - here, np.linalg.norm(here)
         if size > 0.0:
             found[place] = np.linalg.norm(moved, axis=0).max() / size
     return found
@@ -218,15 +205,18 @@ def _depth_change(both: Both) -> FloatArray:
 
 def _response_change(both: Both) -> FloatArray:
     """Relative difference (n,) of the responses: the larger one of first harmonic and peak."""
-    found = np.zeros(len(both.counts))
-    for name in ("response", "response_peak"):
-        size = np.linalg.norm(both.fine[name], axis=1)
-        apart = np.linalg.norm(both.fine[name] - both.other(name), axis=1)
-        found = np.fmax(found, np.divide(apart, size, out=np.zeros_like(size), where=size > 0.0))
-    return found
+    one, other = (
+        _over(np.linalg.norm(both.fine[name] - both.other(name), axis=1), np.linalg.norm(both.fine[name], axis=1))
+        for name in ("response", "response_peak")
+    )
+    return np.fmax(one, other)
 
 
 def _rate_change(both: Both) -> FloatArray:
     """Relative difference (n,) of the wear rates."""
-    rate, other = both.fine["wear_rate"], both.other("wear_rate")
-    return np.asarray(np.divide(np.abs(rate - other), rate, out=np.zeros_like(rate), where=rate > 0.0))
+    return _over(np.abs(both.fine["wear_rate"] - both.other("wear_rate")), both.fine["wear_rate"])
+
+
+def _over(part: FloatArray, whole: FloatArray) -> FloatArray:
+    """Ratio (n,) of two quantities, 0 where the second is not above 0."""
+    return np.asarray(np.divide(part, whole, out=np.zeros_like(whole), where=whole > 0.0))

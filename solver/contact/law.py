@@ -183,7 +183,7 @@ class ContactLaw:
         1 / eps for elastic pairs; for inertial pairs exactly as in the steps of the march.
         """
         penalty, masses, orders = self.penalty, self.penalty.inertial, np.array(self.basis.orders, np.float64)
-        found = np.repeat(1.0 / penalty.stiffness[:, :, None].astype(complex), orders.size + 1, axis=2)
+        found: ComplexArray = np.repeat((1.0 + 0.0j) / penalty.stiffness[:, :, None], orders.size + 1, axis=2)
         if masses.any() and orders.size:
             angle = np.pi * orders / self.basis.n_samples
             mass, drag, mean = (part[masses, None] for part in (penalty.mass, penalty.drag, penalty.mean))

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.options import ACCURACY
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
@@ -30,8 +29,10 @@ from solver.results.state_report import periodic_state
 from solver.settings import Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
+from solver.wear.control import Adaptive
+from solver.wear.integrate import Ended
 from solver.wear.rate_slope import rate_slope
-from solver.wear.solutions import Ended, Like, SlowTime, Solutions
+from solver.wear.solutions import Like, SlowTime, Solutions
 from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
 
@@ -163,14 +164,14 @@ class BlockCase:
         friction, mission = self.block.friction_coefficient, self.mission
         assert start.state is not None
         case = build_case(self.model, friction, start.penalty_omega, self.settings, start.resolution)
-        return WearingJoint.of(case, start.state, mission.wear_coefficient, mission.law.begun_at(self.depth))
+        return WearingJoint(case, start, mission.wear_coefficient, mission.law.begun_at(self.depth))
 
     def begin(self, start: StartState) -> tuple[WearingJoint, WearState]:
         """The joint at the depth before the block, and a state as its first one."""
         work = self.work(start)
         assert start.state is not None
         # the limit of the explicit step is not asked for
-        return work, work.begin(start.state, start.resolution, NOTHING, accurate=True, step_limit=np.inf)
+        return work, work.begin(np.inf)
 
 
 def run_block(case: BlockCase) -> BlockRun | Failure:
@@ -180,13 +181,13 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         return Failure(start.outcome, start.message)
     law, (_, cycles) = case.mission.law.begun_at(case.depth), case.block.steady
     work, counts = case.work(start), np.array([0.0, cycles])
-    asked = SlowTime(work.wear_coefficient, "adaptive", counts, law=law, ends_at_last=True)
+    asked = SlowTime(work.wear_coefficient, Adaptive(work.case.settings.rtol), counts, law=law, ends_at_last=True)
     solutions = Solutions(work.case, start, asked)
     ended = solutions.history(stable_end=case.every) if case.like is None else solutions.follow(case.like, counts)
     state = ended.state
     if state is None or ended.failure.outcome is not Outcome.CONVERGED:
         return ended.failure
-    values = solutions.output_of(ended).read(counts)
+    values = ended.course.read(counts)
     depth, at = values["wear_depth"], state.point.evaluation
     volume, slope = float(depth[-1] @ work.area), None
     if case.with_slope:
@@ -206,7 +207,7 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         inaccurate=state.worst.largest if state.inaccurate_from <= cycles else 0.0,
         held=state.held_from <= cycles,
         cut_off=not math.isnan(first_cut_off(case.model.contact, counts, values["mean_pressure"], depth)),
-        like=Like(ended.output.course.resolutions, state.step_limit, ended.iterations),
+        like=Like(ended.course.resolutions, state.step_limit, ended.iterations),
         last=_last(ended, start) if case.is_continued else None,
         begun=begun,
         iterations=start.newton_iterations + ended.iterations,

@@ -24,6 +24,6 @@ def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: Float
 
 
 def describe_cut_off(cycle: float) -> str:
-    """Sentence with the first count of a cut off contact; cycle: inf for a final state found without slow time."""
-    when = "in the final state" if math.isinf(cycle) else f"at cycle {in_digits(cycle)}" + (" already" if cycle else "")
+    """Sentence with the first count of a cut off contact."""
+    when = f"at cycle {in_digits(cycle)}" + (" already" if cycle else "")
     return f"pairs at the edge of the modelled contact carry load or have worn {when}"

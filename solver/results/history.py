@@ -75,48 +75,37 @@ class WearHistory(PresentedHistory):
     At output counts that were not reached, real values are NaN and whole numbers 0.
 
     - cycles (n_output,): cycle counts.
-    - worn_volume (n_output,): m3.
-    - wear_rate (n_output,): m3 per cycle.
-    - wear_depth (n_output, n_contact): m.
-    - mean_pressure (n_output, n_contact): Pa.
-    - slip_range (n_output, n_contact): m.
-    - open_fraction (n_output, n_contact): fraction of the period.
+    - worn_volume (n_output,), m3; wear_rate (n_output,), m3 per cycle; wear_depth (n_output, n_contact), m.
+    - mean_pressure, Pa, slip_range, m, open_fraction (n_output, n_contact): of a period.
     - response (n_output, n_response): complex first harmonic, m.
-    - response_mean (n_output, n_response): mean over a period, m.
-    - response_peak (n_output, n_response): m.
-    - excitation_frequency (n_output,): frequency of the excitation, Hz; one value where the frequency follows nothing.
-    - excitation_frequency_error (n_output,): its estimated absolute error, Hz; 0 for a given frequency.
-    - last_cycle: count up to which the point was computed, whatever ended the history; NaN where there is no state.
+    - response_mean, response_peak (n_output, n_response): mean and largest magnitude over a period, m.
     - loop_displacement, loop_force (n_output, n_loops, n_phase, 3): m and N, fretting loops of the chosen pairs, see
       `solver.results.loops.contact_loops`.
-    - jump_cycle: first cycle count at which the branch was lost, NaN if never.
-    - cycles_to_target: count at which the target of the wear was reached, NaN if never or without a target. The history
-      ends with the step that reaches the target.
-    - cycles_to_target_error: its estimated error, cycles; NaN where the target was never reached.
+    - excitation_frequency, excitation_frequency_error (n_output,): frequency of the excitation and its estimated error,
+      Hz; the error of a given frequency is 0.
     - worn_volume_error (n_output,): estimated relative error of the worn volume by steps and their propagation,
       harmonics, samples and start state; 0 where nothing has worn.
     - wear_depth_error (n_output, n_contact): estimated error of the depths by these causes, m.
     - error_estimate: `worn_volume_error` at the last count that was reached; NaN where nothing has worn at this count
       and the joint wears.
+    - reference_volume (n_output,): m3, worn volume of the reference solution; NaN beyond the end of this solution.
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
       certificate of the states, all relative; NaN where not estimated.
     - stable (n_output,): bool.
     - harmonics_used, samples_used (n_output,): int, 0 where there is no state.
-    - run_time: CPU seconds of the computing thread, start state included.
-    - branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
-    - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.rate_slope`); inf if
-      there is no limit.
-    - final_method: method by which the scheme "final" has found the final state: "active_set" or "march"; empty for the
-      other schemes. A final state of an active set has the count inf, and no state between the unworn one and the
-      final one is known.
+    - last_cycle: count up to which the point was computed, whatever ended the history; NaN where there is no state.
+    - jump_cycle: first cycle count at which the branch was lost, NaN if never.
+    - cycles_to_target, cycles_to_target_error: count at which the target of the wear was reached, and its estimated
+      error, cycles; NaN if never or without a target. The history ends with the step that reaches the target.
     - cut_off_cycle: first count at which a pair at an edge of the modelled contact (`ContactInterface.edge`) carries
       load or has worn, NaN if never.
-    - reference_volume (n_output,): m3, worn volume of the reference solution; NaN beyond the end of this solution.
-    - inaccurate_from: count from which on harmonics and samples do not bring the error of a state below rtol, inf if
-      never.
-    - inaccurate_in: name of the inaccurate result.
-    - inaccurate_error: largest error from `inaccurate_from` on.
+    - inaccurate_from, inaccurate_in, inaccurate_error: count from which on harmonics and samples do not bring the error
+      of a state below rtol, inf if never; name of the result, and its largest error from there on.
     - held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
+    - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.rate_slope`); inf if
+      there is no limit.
+    - run_time: CPU seconds of the computing thread, start state included.
+    - branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
     - message: addition to the outcome: an unexpected error, the cycle from which on a condition is violated, the error
       reached; empty where there is nothing to add.
     """
@@ -136,7 +125,6 @@ class WearHistory(PresentedHistory):
     response_peak: FloatArray
     loop_displacement: FloatArray
     loop_force: FloatArray
-    jump_cycle: float
     error_estimate: float
     newton_iterations: int
     run_time: float
@@ -153,12 +141,12 @@ class WearHistory(PresentedHistory):
     worn_volume_error: FloatArray
     wear_depth_error: FloatArray
     last_cycle: float = math.nan
+    jump_cycle: float = math.nan
     cycles_to_target: float = math.nan
     cycles_to_target_error: float = math.nan
     branch: int = 0
     fold_frequency: float = math.nan
     step_limit: float = math.inf
-    final_method: str = ""
     cut_off_cycle: float = math.nan
     message: str = ""
     excitation_frequency: FloatArray = field(default_factory=lambda: np.array([math.nan]))

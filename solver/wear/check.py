@@ -19,7 +19,7 @@ from solver.settings import NEGLIGIBLE, Resolution
 from solver.stability.floquet import find_instability
 from solver.wear.jump import creeps, free_slide
 from solver.wear.state import Choice, WearState
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.wearing_joint import Following, WearingJoint
 
 LEFT_OUT_GROWN = 1.5
 """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
@@ -51,8 +51,8 @@ class FullCheck:
             return checked
         state, report = checked
         state = _note_accuracy(state)
-        joint, at = work.at(state), state.point.evaluation
-        if state.hold is not None and creeps(joint, state.hold, at):
+        at = state.point.evaluation
+        if state.hold is not None and creeps(work.at(state), state.hold, at):
             return Failure(Outcome.ADRIFT)
         if _vibrates_otherwise(state):
             if (unstable := _multipliers(work, state, every=False)) is not None:
@@ -74,8 +74,10 @@ class FullCheck:
         if not certificate.holds(work.case.settings.tolerance):
             return Failure(Outcome.CERTIFICATE_FAILED)
         report = report_state(joint, at, certificate, self.loops, with_resonance=self.with_resonance)
-        error = work.where.error(chosen, estimate.response, work.case.settings.rtol)
-        return chosen, replace(report, excitation_frequency_error=error)
+        if isinstance(work.where, Following):
+            error = work.where.error(chosen, estimate.response, work.case.settings.rtol)
+            report = replace(report, excitation_frequency_error=error)
+        return chosen, report
 
 
 @dataclass(frozen=True)
@@ -92,25 +94,22 @@ class PlainCheck:
     def __call__(self, work: WearingJoint, state: WearState) -> Checked | Failure:
         """The state with the harmonics wanted at its count, or unchanged where no such state is found."""
         wanted = [resolution for count, resolution in self.resolutions if count <= state.cycle][-1]
-        state = with_harmonics(work, state, wanted) or state
+        state = _with_harmonics(work, state, wanted)
         joint, at = work.at(state), state.point.evaluation
         return state, report_state(joint, at, NOT_CERTIFIED, with_resonance=self.with_resonance)
 
 
-def with_harmonics(work: WearingJoint, state: WearState, resolution: Resolution) -> WearState | None:
-    """The state solved with other harmonics and samples; None where it is not found.
-
-    A frequency that is followed is that of these harmonics.
-    """
-    if resolution == state.resolution:
+def _with_harmonics(work: WearingJoint, state: WearState, wanted: Resolution) -> WearState:
+    """The state solved with other harmonics and samples, at the frequency that is then followed; else as it is."""
+    if wanted == state.resolution:
         return state
     work.at(state)
-    old, case = work.case, work.case.at(resolution)
-    point = work.run.move(old, case.joint(state.omega, work.excitation_amplitude), state.point)
+    joint = work.case.at(wanted).joint(state.omega, work.excitation_amplitude)
+    point = work.run.move(work.case, joint, state.point)
     if point is None:
-        return None
-    state_there = work.at_followed(replace(state, point=point, resolution=resolution, change=None))
-    return None if isinstance(state_there, Failure) else state_there
+        return state
+    found = work.at_followed(replace(state, point=point, resolution=wanted))
+    return state if isinstance(found, Failure) else found
 
 
 def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
@@ -135,37 +134,33 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
     return now < ACCURACY.kept_fraction**2 * choice.left_out
 
 
+def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
+    """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
+    work.at(state)
+    refined = refine(work.case, state.omega, work.excitation_amplitude, state.point, work.run)
+    resolution = refined.case.resolution
+    choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
+    return work.at_followed(replace(state, point=refined.point, resolution=resolution, choice=choice))
+
+
+def _note_accuracy(state: WearState) -> WearState:
+    """The state with the count from which on its harmonics do not suffice, and with the largest error since."""
+    estimate, worst = state.choice.estimate, state.worst
+    # NaN for given harmonics and samples, where no state with others was found for a comparison
+    known = not np.isnan(estimate.largest)
+    if state.choice.accurate and known:
+        return state
+    if not estimate.largest < worst.largest:
+        worst = estimate if known else UNKNOWN
+    return replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
+
+
 def _vibrates_otherwise(state: WearState) -> bool:
     """Whether the vibration differs from the vibration of the last stability check."""
     if state.judged_h is None or state.judged_h.shape != state.point.evaluation.predicted_h.shape:
         return True
     before, now = state.judged_h[:, 1:], state.point.evaluation.predicted_h[:, 1:]
     return float(np.linalg.norm(now - before)) > ACCURACY.vibration_recheck * float(np.linalg.norm(before))
-
-
-def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
-    """The state with harmonics and samples chosen anew; a failure where the frequency then follows nothing."""
-    work.at(state)
-    refined = refine(
-        work.case, state.omega, work.excitation_amplitude, state.point, work.run, usual_work=work.usual_work
-    )
-    resolution = refined.case.resolution
-    choice = Choice(left_out(resolution.orders, refined.point.evaluation), refined.estimate, refined.accurate)
-    change = state.change if resolution == state.resolution else None
-    return work.at_followed(replace(state, point=refined.point, resolution=resolution, choice=choice, change=change))
-
-
-def _note_accuracy(state: WearState) -> WearState:
-    """The state with the count from which on its harmonics do not suffice, and with the largest error since."""
-    estimate = state.choice.estimate
-    # NaN for given harmonics and samples, where no state with others was found for a comparison
-    known = not np.isnan(estimate.largest)
-    if state.choice.accurate and known:
-        return state
-    worst = state.worst
-    if not estimate.largest < worst.largest:
-        worst = estimate if known else UNKNOWN
-    return replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
 
 
 def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failure | None:

@@ -1,9 +1,9 @@
-"""One wear history: integration over the slow time, comparison with the reference solution, outcome."""
+"""Wear histories from one start state: integration, errors by comparison with other solutions, outcome."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from solver.accuracy.history_error import Both, HistoryError, error_of_given_steps, history_error
 from solver.accuracy.target_error import error_of_wear, target_error
+from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable, unpack
@@ -19,8 +20,10 @@ from solver.results.history import StartState, WearHistory
 from solver.results.verdict import judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
-from solver.wear.output import DenseOutput, no_output
-from solver.wear.solutions import Ended, Saved, SlowTime, Solutions
+from solver.wear.course import unknown_course
+from solver.wear.integrate import Ended
+from solver.wear.interpolation import TargetSearch
+from solver.wear.solutions import Saved, SlowTime, Solutions
 from solver.wear.state import WearState
 
 ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
@@ -58,7 +61,7 @@ def integrate_together(
     model, friction_coefficient, settings, start
         The case, and the unworn state at the start of the histories.
     asked
-        Scheme and steps of each history; they differ in nothing else but their counts up to one last count.
+        Steps of each history; they differ in nothing else but their counts up to one last count.
     keep
         Called from time to time with the progress.
     resume
@@ -66,14 +69,18 @@ def integrate_together(
         are equal to the last bit, except `run_time`.
     """
     if start.state is None:
-        yield from (without_state(model, start, each) for each in asked)
+        for each in asked:
+            nothing = Ended(None, Failure(start.outcome, start.message), unknown_course(model, len(each.loops)), 0)
+            yield _assembled(model, start, each, (Done("", nothing, None, 0.0),))
         return
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution)
     integrations = _Integrations(case, start, keep, Progress() if resume is None else unpack(resume))
     for each in asked:
-        history = integrations.assembled(each)
+        history = _assembled(model, start, each, integrations.of(each))
+        rows = known_rows(history)
+        history = replace(history, error_estimate=last_error(history, rows, history.last_cycle))
         if history.outcome is Outcome.CONVERGED:
-            outcome, message = judge(history, known_rows(history), settings.rtol)
+            outcome, message = judge(history, rows, settings.rtol)
             history = replace(history, outcome=outcome, message=message)
         yield history
 
@@ -124,197 +131,135 @@ class _Integrations:
     def __init__(
         self, case: Case, start: StartState, keep: Callable[[Packed], None] | None, progress: Progress
     ) -> None:
-        self._case, self._start, self._keep = case, start, keep
+        self._case, self._start, self._keep, self._resumed = case, start, keep, progress
         self._done = {done.name: done for done in progress.done}
-        self._resumed = progress
 
-    def assembled(self, asked: SlowTime) -> WearHistory:
-        """A history with its errors, not judged yet."""
-        start, model = self._start, self._case.model
+    def of(self, asked: SlowTime) -> tuple[Done, ...]:
+        """A history, and the adaptive history with which one with given steps is compared."""
         done = self._integrated(asked)
-        if (state := done.fine.state) is None:
-            broken = replace(
-                start,
-                outcome=done.fine.failure.outcome,
-                message=done.fine.failure.message,
-                newton_iterations=start.newton_iterations + done.iterations,
-            )
-            return without_state(model, broken, asked)
-        adaptive = done
-        if asked.scheme != "adaptive" and _is_compared(asked, done.fine):
-            reached = min(done.fine.output.course.ends[-1], asked.end)
-            adaptive = self._integrated(asked.adaptive_to(reached), done.seconds)
-        both = () if adaptive is done else (adaptive,)
-        adaptive = done if adaptive.fine.state is None else adaptive
-        failed = next((each.fine.failure for each in both if each.fine.failure.outcome in ENDS_ALL), done.fine.failure)
-        history = _assembled(self._solutions(asked), done.fine, state, adaptive)
-        history = replace(
-            history,
-            outcome=failed.outcome,
-            message=failed.message,
-            newton_iterations=start.newton_iterations + sum(each.iterations for each in (done, *both)),
-            run_time=start.run_time + sum(each.seconds for each in (done, *both)),
-        )
-        return replace(history, error_estimate=last_error(history, known_rows(history), history.last_cycle))
+        if asked.adaptive or not _is_compared(asked, done.fine):
+            return (done,)
+        reached = min(done.fine.course.ends[-1], asked.end)
+        return done, self._integrated(asked.adaptive_to(reached, self._case.settings.rtol), done.seconds)
 
     def _integrated(self, asked: SlowTime, spent: float = 0.0) -> Done:
         """A history with its reference solution; spent: CPU seconds of its time limit that are gone."""
         if asked.name not in self._done:
-            solutions = self._solutions(asked, spent)
+            saved = self._resumed.saved if self._resumed.name == asked.name else None
+            solutions = Solutions(self._case, self._start, asked, lambda saved: self._save(asked.name, saved), saved)
+            solutions.began -= spent
             fine, reference = solutions.history(), None
-            if asked.scheme == "adaptive" and _is_compared(asked, fine):
-                reference = solutions.reference(fine)
+            if fine.state is None:
+                fine = replace(fine, course=unknown_course(self._case.model, len(asked.loops)))
+            if asked.adaptive and _is_compared(asked, fine):
+                reference = solutions.reference(fine, _counts(asked, fine))
                 if reference.failure.outcome in ENDS_ALL:
                     fine = replace(fine, failure=reference.failure)
             self._done[asked.name] = Done(asked.name, fine, reference, solutions.spent - spent)
         return self._done[asked.name]
 
-    def _solutions(self, asked: SlowTime, spent: float = 0.0) -> Solutions:
-        resumed = self._resumed.saved if self._resumed.name == asked.name else None
-
-        def save(saved: Saved) -> None:
-            if self._keep is not None:
-                # what its time limit has ended is not complete
-                done = (each for each in self._done.values() if each.fine.failure.outcome not in ENDS_ALL)
-                self._keep(pack(Progress(tuple(done), asked.name, saved)))
-
-        solutions = Solutions(self._case, self._start, asked, save, resumed)
-        solutions.began -= spent
-        return solutions
+    def _save(self, name: str, saved: Saved) -> None:
+        if self._keep is not None:
+            # what its time limit has ended is not complete
+            done = (each for each in self._done.values() if each.fine.failure.outcome not in ENDS_ALL)
+            self._keep(pack(Progress(tuple(done), name, saved)))
 
 
 def _is_compared(asked: SlowTime, fine: Ended) -> bool:
     """Whether a history is compared with another one: without a step the errors of the start state suffice."""
-    steps = len(fine.output.course.ends) > 1 or asked.follow is not None
+    steps = len(fine.course.ends) > 1 or asked.where.follows
     return fine.state is not None and steps and fine.failure.outcome not in ENDS_ALL
 
 
-def reported(own: Mapping[str, Any]) -> dict[str, Any]:
-    """The values from `DenseOutput.read` that a result has."""
-    return {name: value for name, value in own.items() if name not in ("local", "depth_rate")}
+def _counts(asked: SlowTime, fine: Ended) -> FloatArray:
+    """Counts (n_output,) at which a history is read."""
+    if not isinstance(asked.cycles, ToTheEnd):
+        return asked.cycles
+    return np.zeros(asked.cycles.n_outputs) if fine.state is None else fine.course.even_counts(asked.cycles.n_outputs)
 
 
-def of_state(state: WearState) -> dict[str, Any]:
-    """What the last state of a history says of the whole history."""
-    return {
-        "step_limit": state.step_limit if state.step_limit > 0.0 else math.inf,
-        "inaccurate_from": state.inaccurate_from,
-        "inaccurate_in": "wear rate" if state.worst.wear_rate >= state.worst.response else "response",
-        "inaccurate_error": state.worst.largest,
-        "held_from": math.inf if math.isnan(state.held_from) else state.held_from,
-    }
+def _compare(integrated: tuple[Done, ...], counts: FloatArray, follows: bool) -> tuple[Both, HistoryError]:
+    """A history beside what it is compared with at ascending counts, and its errors there.
 
-
-@dataclass(frozen=True)
-class _Compared:
-    """A history and what its errors follow from.
-
-    output: of the history. other: of its reference solution, or of the adaptive history where its steps are given; None
-    where there is none. adaptive: this adaptive history; None where the history is adaptive itself.
-    follows: whether the frequency of the excitation follows the structure.
+    integrated: as from `_Integrations.of`. follows: whether the frequency of the excitation follows the structure.
     """
 
-    output: DenseOutput
-    other: DenseOutput | None
-    follows: bool
-    adaptive: _Compared | None = None
+    def at(fine: Ended, other: Ended | None, counts: FloatArray) -> Both:
+        there = other.course.read(counts) if other is not None and other.course.nodes else {}
+        return Both(counts, fine.course.read(counts), there, follows)
 
-    def at(self, counts: FloatArray) -> Both:
-        """Both solutions at ascending counts."""
-        return Both(counts, self.output.read(counts), self.other.read(counts) if self.other else {}, self.follows)
-
-    def errors(self, counts: FloatArray) -> HistoryError:
-        """Errors of the history at ascending counts."""
-        area = self.output.area
-        if self.adaptive is not None:
-            return error_of_given_steps(self.at(counts), self.adaptive.errors(counts), area)
-        ends = self.output.taken.cycles
-        steps = Both(ends, self.output.values(), self.other.read(ends) if self.other else {})
-        return history_error(self.at(counts), steps, area)
+    history, adaptive = integrated[0].fine, integrated[-1]
+    if adaptive.fine.state is None:
+        adaptive = integrated[0]
+    area, course = history.course.area, adaptive.fine.course
+    both, steps = (at(adaptive.fine, adaptive.reference, each) for each in (counts, course.cycles))
+    error = history_error(both, steps, area)
+    if adaptive is integrated[0]:
+        return both, error
+    both = at(history, adaptive.fine, counts)
+    return both, error_of_given_steps(both, error, area)
 
 
-def _compared(solutions: Solutions, fine: Ended, adaptive: Done) -> _Compared:
-    """A history with the adaptive history with which it is compared, which it may be itself."""
-
-    def smooth(ended: Ended | None) -> DenseOutput | None:
-        return None if ended is None else solutions.output_of_reference(ended)
-
-    follows, output, other = solutions.asked.follow is not None, solutions.output_of(fine), smooth(adaptive.reference)
-    if adaptive.fine is fine or (own := smooth(adaptive.fine)) is None:
-        return _Compared(output, other, follows)
-    return _Compared(output, own, follows, _Compared(own, other, follows))
-
-
-def _assembled(solutions: Solutions, fine: Ended, state: WearState, adaptive: Done) -> WearHistory:
-    """The result, from the outputs of a history, with its last state, and of the adaptive history."""
-    start, asked, model = solutions.start, solutions.asked, solutions.case.model
-    counts, area, compared = solutions.counts(fine), model.contact.area, _compared(solutions, fine, adaptive)
-    both, error = compared.at(counts), compared.errors(counts)
-    own, target = both.fine, fine.output.reached
+def _assembled(model: ReducedModel, start: StartState, asked: SlowTime, integrated: tuple[Done, ...]) -> WearHistory:
+    """The result, not judged yet; integrated: the history, and the adaptive one where its steps are given."""
+    fine, area, counts = integrated[0].fine, model.contact.area, _counts(asked, integrated[0].fine)
+    failures = (each.fine.failure for each in integrated[1:] if each.fine.failure.outcome in ENDS_ALL)
+    failure, state = next(failures, fine.failure), fine.state
+    both, error = _compare(integrated, counts, asked.where.follows)
+    own, target = both.fine, fine.course.reached
     ends_at_target = target <= asked.end
     return WearHistory(
-        **reported(own)
+        **{name: value for name, value in own.items() if name not in ("local", "depth_rate")}
         | {
             "response_error": error.response,
             "wear_rate_error": error.wear_rate,
             "worn_volume_error": error.worn_volume,
             "wear_depth_error": error.wear_depth,
             "excitation_frequency_error": error.frequency,
-        },
-        **of_state(state),
-        outcome=fine.failure.outcome,
-        message=fine.failure.message,
+        }
+        | ({} if state is None else _of_state(state, asked.end)),
+        outcome=failure.outcome,
+        message=failure.message,
         cycles=counts,
         worn_volume=own["wear_depth"] @ area,
         reference_volume=both.other("wear_depth") @ area,
         error_estimate=math.nan,
-        newton_iterations=0,
-        run_time=0.0,
-        last_cycle=min(fine.output.course.ends[-1], float(counts[-1])),
+        newton_iterations=start.newton_iterations + sum(each.iterations for each in integrated),
+        run_time=start.run_time + sum(each.seconds for each in integrated),
+        last_cycle=math.nan if state is None else min(fine.course.ends[-1], float(counts[-1])),
         branch=start.branch,
         fold_frequency=start.fold_frequency,
-        # adaptive steps go beyond the last count
-        jump_cycle=state.jump_cycle if state.jump_cycle <= asked.end else math.nan,
         cycles_to_target=target if ends_at_target else math.nan,
-        cycles_to_target_error=_target_error(compared, asked) if ends_at_target else math.nan,
+        cycles_to_target_error=_target_error(integrated, asked) if ends_at_target else math.nan,
         cut_off_cycle=first_cut_off(model.contact, counts, own["mean_pressure"], own["wear_depth"]),
     )
 
 
-def _target_error(compared: _Compared, asked: SlowTime) -> float:
+def _of_state(state: WearState, end: float) -> dict[str, Any]:
+    """What the last state of a history says of the whole history up to its last count."""
+    return {
+        "step_limit": state.step_limit if state.step_limit > 0.0 else math.inf,
+        "inaccurate_from": state.inaccurate_from,
+        "inaccurate_in": "wear rate" if state.worst.wear_rate >= state.worst.response else "response",
+        "inaccurate_error": state.worst.largest,
+        "held_from": math.inf if math.isnan(state.held_from) else state.held_from,
+        # adaptive steps go beyond the last count
+        "jump_cycle": state.jump_cycle if state.jump_cycle <= end else math.nan,
+    }
+
+
+def _target_error(integrated: tuple[Done, ...], asked: SlowTime) -> float:
     """Estimated error, cycles, of the count at which a history has reached its target."""
-    output, other = compared.output, compared.other
-    if other is None or asked.until is None:
+    course, until = integrated[0].fine.course, asked.until
+    other = integrated[-1].reference if len(integrated) == 1 else integrated[-1].fine
+    if other is None or until is None:
         return math.inf
-    at, quantity, area = output.taken.reached, asked.until.quantity, output.area
-    counts = np.array([0.0, at])
-    own, error = output.read(counts), compared.errors(counts)
-    depth = own["wear_depth"][1]
-    known_to = error_of_wear(quantity, depth, error.wear_depth[1], float(error.worn_volume[1] * (depth @ area)))
-    deepest = np.arange(area.size) == depth.argmax()
-    weights = deepest if quantity == "wear_depth" else area
-    rate = min(float(rates @ weights) for rates in (own["depth_rate"][1], output.taken.nodes[-1].rate))
-    return target_error(at, other.target_count(), known_to, rate) + output.target_within()
-
-
-def without_state(model: ReducedModel, start: StartState, asked: SlowTime) -> WearHistory:
-    """History of a point without a valid start state: NaN everywhere."""
-    counts = np.zeros(asked.cycles.n_outputs) if isinstance(asked.cycles, ToTheEnd) else asked.cycles
-    own = no_output(counts.size, model.contact.n_contact, len(model.response_names), len(asked.loops))
-    nothing = own["wear_rate"]
-    return WearHistory(
-        **reported(own),
-        outcome=start.outcome,
-        message=start.message,
-        cycles=counts,
-        worn_volume=nothing,
-        worn_volume_error=nothing,
-        wear_depth_error=own["wear_depth"],
-        reference_volume=nothing,
-        error_estimate=math.nan,
-        jump_cycle=math.nan,
-        newton_iterations=start.newton_iterations,
-        run_time=start.run_time,
-        branch=start.branch,
-        fold_frequency=start.fold_frequency,
-    )
+    at, area = course.reached, course.area
+    both, error = _compare(integrated, np.array([0.0, at]), asked.where.follows)
+    depth = both.fine["wear_depth"][1]
+    known_to = error_of_wear(until.quantity, depth, error.wear_depth[1], float(error.worn_volume[1] * (depth @ area)))
+    weights = np.arange(area.size) == depth.argmax() if until.quantity == "wear_depth" else area
+    rate = min(float(rates @ weights) for rates in (both.fine["depth_rate"][1], course.nodes[-1].rate))
+    count = TargetSearch(until, area, smooth=True).count(other.course.nodes)
+    by_resonance = TargetSearch(until, area, course.smooth).by_resonance(course.nodes, at)
+    return target_error(at, count, known_to, rate) + course.reached_within + by_resonance

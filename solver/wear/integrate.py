@@ -1,4 +1,4 @@
-"""The loop over the slow time: step, check, output, save, until the history ends.
+"""The loop over the slow time: step, check, store, save, until the history ends.
 
 A history ends at a last count, at a target, where nothing wears any more, or where wear goes on without end. In a
 steady state every pair that slips carries no force. The slowest pair determines how fast a history approaches this
@@ -20,13 +20,13 @@ from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.state import Failure
 from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, describe_error
-from solver.packing import in_rows
+from solver.packing import in_rows, packable
 from solver.settings import ROUND_OFF
 from solver.wear.check import Checked
-from solver.wear.control import Steps, one_step
-from solver.wear.output import DenseOutput
+from solver.wear.control import WearLine
+from solver.wear.course import Course
 from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.wearing_joint import Following, WearingJoint
 
 T = TypeVar("T")
 
@@ -50,6 +50,23 @@ AS_ASKED = Failure(Outcome.CONVERGED)
 """The regular end of a history."""
 
 
+@packable
+@dataclass(frozen=True)
+class Ended:
+    """A finished integration.
+
+    state: last state; None where there is no first state.
+    failure: reason of the end; the outcome CONVERGED for a regular end.
+    course: all steps.
+    iterations: Newton iterations spent.
+    """
+
+    state: WearState | None
+    failure: Failure
+    course: Course
+    iterations: int
+
+
 def guarded(compute: Callable[[], T]) -> T | Failure:
     """Result of a computation, or its error as a failure."""
     try:
@@ -65,75 +82,81 @@ def guarded(compute: Callable[[], T]) -> T | Failure:
 
 @dataclass(frozen=True)
 class Integration:
-    """An integration over the slow time, and its parts.
+    """An integration over the slow time.
 
-    steps: lengths and scheme of the steps of the joint.
+    line: the joint and its steps.
     check: gives a state with its report, or the reason of its rejection.
-    output: stores the states.
-    save: called from time to time with the state and the number of steps so far, from which the integration goes on.
+    save: called from time to time with the state and the course, from which the integration goes on.
     most_iterations: most Newton iterations, in addition to `near_iterations` for each step.
-    end: last count; inf for a history to the steady state.
-    share: `settings.ToTheEnd.final_share` of such a history.
+    share: `settings.ToTheEnd.final_share` of a history to the end of wear.
     """
 
-    steps: Steps
+    line: WearLine
     check: Callable[[WearingJoint, WearState], Checked | Failure]
-    output: DenseOutput
-    save: Callable[[WearState, int], None]
+    save: Callable[[WearState, Course], None]
     most_iterations: float
-    end: float
     share: float = 0.0
 
-    def begin(self, state: WearState) -> WearState | Failure:
-        """Check and store the first state."""
-        first = self.steps.work.at_followed(state)
-        stored = first if isinstance(first, Failure) else self._stored(first, 0.0)
-        return stored if isinstance(stored, Failure) else self.steps.begin(stored)
+    def begin(self, first: Callable[[], WearState], course: Course) -> Ended:
+        """Integrate from the first state to the end; course: without steps."""
+        begun = guarded(lambda: self._first(first(), course))
+        if isinstance(begun, Failure):
+            return Ended(None, begun, course, self.line.work.run.budget.iterations)
+        return self.go_on(*begun)
 
-    def run(self, state: WearState, n_steps: int = 0) -> tuple[WearState, Failure]:
-        """Integrate from a state after some steps to the end: last state and reason of the end."""
-        work, budget = self.steps.work, self.steps.work.run.budget
+    def go_on(self, state: WearState, course: Course) -> Ended:
+        """Integrate from a state behind the steps of a course to the end."""
+        work, budget = self.line.work, self.line.work.run.budget
         saved = budget.iterations
-        while (ended := self._ended(state)) is None:
-            n_steps += 1
-            if budget.iterations > self.most_iterations + NEAR_ITERATIONS * n_steps:
-                return state, Failure(Outcome.MARCH_FAILED)
-            after = guarded(partial(self._one, state))
+        while (ended := self._ended(state, course)) is None:
+            if budget.iterations > self.most_iterations + NEAR_ITERATIONS * len(course.ends):
+                ended = Failure(Outcome.MARCH_FAILED)
+                break
+            after = guarded(partial(self._step, state, course))
             if isinstance(after, Failure):
-                return state, after
-            state = after
+                ended = after
+                break
+            state, course = after
             if budget.iterations >= saved + ITERATIONS_PER_SAVE:
                 # done in every history, so that an interrupted one gives equal numbers
                 state, saved = in_rows(state), budget.iterations
                 work.drop_factor()
-                self.save(state, n_steps)
-        return state, ended
+                self.save(state, course)
+        if ended.outcome is Outcome.CONVERGED and state.cycle < course.end < math.inf and not state.wears:
+            # nothing wears any more: the state holds for all later counts
+            course = course.after(course.end, course.nodes[-1].report, course.nodes[-1].rate, 0.0)
+        return Ended(state, ended, course, budget.iterations)
 
-    def _one(self, state: WearState) -> WearState | Failure:
-        work, step = self.steps.work, one_step(self.steps, state)
+    def _first(self, state: WearState, course: Course) -> tuple[WearState, Course] | Failure:
+        found = self.line.work.at_followed(state)
+        stored = found if isinstance(found, Failure) else self._stored(found, course, 0.0)
+        return stored if isinstance(stored, Failure) else (self.line.begin(stored[0]), stored[1])
+
+    def _step(self, state: WearState, course: Course) -> tuple[WearState, Course] | Failure:
+        step, where = self.line.step(state), self.line.work.where
         if isinstance(step, Failure):
             return step
-        return work.where.out_of_range(step.state) or self._stored(step.state, step.volume_error(work.area))
+        failure = where.out_of_range(step.state) if isinstance(where, Following) else None
+        return failure or self._stored(step.state, course, step.error)
 
-    def _stored(self, state: WearState, error: float) -> WearState | Failure:
-        """Check a state and store it in the output; error: local error of its step, m3."""
-        checked = self.check(self.steps.work, state)
+    def _stored(self, state: WearState, course: Course, error: float) -> tuple[WearState, Course] | Failure:
+        """Check a state and store it; error: local error of its step, m3."""
+        work, checked = self.line.work, self.check(self.line.work, state)
         if isinstance(checked, Failure):
             return checked
         state, report = checked
-        self.output.add(state.cycle, report, self.steps.work.rate(state.point.evaluation), error)
-        return state
+        return state, course.after(state.cycle, report, work.rate(state.point.evaluation), error)
 
-    def _ended(self, state: WearState) -> Failure | None:
+    def _ended(self, state: WearState, course: Course) -> Failure | None:
         """Why the history ends at a state: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on."""
-        if self.output.reached_target or not state.wears or state.cycle >= self.end * (1.0 - 1e-12):
+        if course.reached_target or not state.wears or state.cycle >= course.end * (1.0 - 1e-12):
             return AS_ASKED
-        if self.end < math.inf:
+        if course.end < math.inf:
             return None
         if is_over(state, self.share):
             return AS_ASKED
-        rate, n_steps = float(state.rates[-1]), len(self.output.taken.course.ends) - 1
-        if is_steady(self.steps.work, state, self.output):
+        rate, n_steps = float(state.rates[-1]), len(course.ends) - 1
+        if is_steady(self.line.work, state, course):
             steady = f"from cycle {state.cycle:.4g} on they wear at a steady rate of {rate:.6g} m3 a cycle"
             return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
         if n_steps >= STEPS_TO_THE_END or state.cycle > LONGEST_HISTORY:
@@ -149,7 +172,7 @@ def is_over(state: WearState, share: float) -> bool:
     return bool((rates <= share * np.maximum(largest, floor)).all())
 
 
-def is_steady(work: WearingJoint, state: WearState, output: DenseOutput) -> bool:
+def is_steady(work: WearingJoint, state: WearState, course: Course) -> bool:
     """Whether wear goes on without end.
 
     Every pair that carries load slips, and the wear rate is constant although the wear is deep enough to act back.
@@ -159,8 +182,7 @@ def is_steady(work: WearingJoint, state: WearState, output: DenseOutput) -> bool
     pressed = normal > ROUND_OFF * float(normal.max(initial=0.0))
     if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():
         return False
-    values = output.values()
-    volumes, rates = values["wear_depth"] @ work.area, values["wear_rate"]
+    volumes, rates = course.volumes, np.array([node.rate @ work.area for node in course.nodes])
     # over the last nine tenths of the worn volume, to the accuracy of a rate
     first = max(int(np.searchsorted(volumes, 0.1 * volumes[-1], "right")) - 1, 0)
     varies = np.abs(rates[first:] - rates[-1]) > work.case.settings.rtol * rates[-1]

@@ -12,35 +12,36 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from solver.model import FloatArray
 from solver.settings import WearTarget
 
 if TYPE_CHECKING:
-    from solver.wear.output import Node
+    from solver.wear.course import Node
 
 
 def depth_within(
     fraction: FloatArray,
-    length: float,
+    length: ArrayLike,
     before: tuple[FloatArray, FloatArray],
     after: tuple[FloatArray, FloatArray],
     smooth: bool,
 ) -> FloatArray:
-    """Worn depth (n, n_contact), m, at fractions (n,) of a step: linear, or a cubic Hermite polynomial.
+    """Worn depth (n, n_contact), m, at fractions (n,) of a step each: linear, or a cubic Hermite polynomial.
 
     The slopes of the cubic are limited so that the depth never falls: a cubic is monotone where both slopes are at most
     three times the mean slope (Fritsch and Carlson 1980).
 
-    length: of the step, cycles.
-    before, after: depth, m, and wear rate, m per cycle, both (n_contact,), at the ends of the step.
+    length: of the step, or (n,) of the steps, cycles.
+    before, after: depth, m, and wear rate, m per cycle, both (n_contact,) or (n, n_contact), at the ends of the step.
     smooth: True for the cubic.
     """
-    s = fraction[:, None]
+    s, cycles = fraction[:, None], np.reshape(length, (-1, 1))
     grown = after[0] - before[0]
-    if not smooth or length <= 0.0:
+    if not smooth:
         return np.asarray(before[0] + s * grown)
-    first, last = (np.minimum(rate * length, 3.0 * grown) for rate in (before[1], after[1]))
+    first, last = (np.minimum(rate * cycles, 3.0 * grown) for rate in (before[1], after[1]))
     bent = (1.0 - s) ** 2 * s * first - s**2 * (1.0 - s) * last
     return np.asarray(before[0] + s**2 * (3.0 - 2.0 * s) * grown + bent)
 
@@ -68,18 +69,14 @@ class TargetSearch:
         The resonance is a parabola in the worn volume through both ends of the step and the end before, or straight.
         """
         start, end = nodes[-2:]
-        wanted = self.target.value
-        if self._shifts:
-            if not abs(_shift(end, nodes)) >= wanted:
-                return math.nan
-            wanted = self._volume_at_shift(nodes, straight=straight)
-        if self._worn(end) < wanted:
+        wanted = self._volume_at_shift(nodes, straight=straight) if self._shifts else self.target.value
+        if self._worn(end.report.wear_depth) < wanted:
             return math.nan
         length = end.cycle - start.cycle
         ends = [(node.report.wear_depth, node.rate) for node in (start, end)]
 
         def worn_at(fraction: float) -> float:
-            return self._worn_to(depth_within(np.array([fraction]), length, ends[0], ends[1], self.smooth)[0])
+            return self._worn(depth_within(np.array([fraction]), length, ends[0], ends[1], self.smooth)[0])
 
         return start.cycle + fraction_where(wanted, worn_at) * length
 
@@ -92,7 +89,9 @@ class TargetSearch:
                 return found
         if len(nodes) < 2:
             return math.inf
-        first, last = (abs(_shift(node, nodes)) if self._shifts else self._worn(node) for node in nodes[-2:])
+        first, last = (
+            abs(_shift(node, nodes)) if self._shifts else self._worn(node.report.wear_depth) for node in nodes[-2:]
+        )
         grown, length = last - first, nodes[-1].cycle - nodes[-2].cycle
         return nodes[-1].cycle + (self.target.value - last) * length / grown if grown > 0.0 else math.inf
 
@@ -103,7 +102,7 @@ class TargetSearch:
         if not self._shifts:
             return 0.0
         start, end = next(step for step in pairwise(nodes) if reached <= step[1].cycle)
-        shifted = abs(end.report.resonance - start.report.resonance) / nodes[0].report.resonance
+        shifted = abs(_shift(end, nodes) - _shift(start, nodes))
         error = max(node.report.resonance_error for node in (nodes[0], end))
         return error * (end.cycle - start.cycle) / shifted if shifted > 0.0 else math.inf
 
@@ -112,10 +111,12 @@ class TargetSearch:
         return self.target.quantity == "frequency_shift"
 
     def _volume_at_shift(self, nodes: Sequence[Node], *, straight: bool) -> float:
-        """Worn volume, m3, at which the resonance has shifted to the target, within a step whose end has reached it."""
+        """Worn volume, m3, at which the resonance has shifted to the target in the last step; inf where it has not."""
         wanted, way = self.target.value, math.copysign(1.0, _shift(nodes[-1], nodes))
-        *before, volume, end_volume = (self._worn(node) for node in nodes[-3:])
+        *before, volume, end_volume = (float(node.report.wear_depth @ self.area) for node in nodes[-3:])
         *earlier, shift, end_shift = (way * _shift(node, nodes) for node in nodes[-3:])
+        if not end_shift >= wanted:
+            return math.inf
         if not end_shift > shift:
             return volume
         slope = (end_volume - volume) / (end_shift - shift)
@@ -127,14 +128,9 @@ class TargetSearch:
         found = line + bend * (wanted - shift) * (wanted - end_shift)
         return found if volume < found < end_volume else line
 
-    def _worn(self, node: Node) -> float:
-        return self._worn_to(node.report.wear_depth)
-
-    def _worn_to(self, depth: FloatArray) -> float:
-        """Wear to compare with the target, from depths (n_contact,), m: the largest depth, m, or the volume, m3."""
-        if self.target.quantity == "wear_depth":
-            return float(depth.max(initial=0.0))
-        return float(depth @ self.area)
+    def _worn(self, depth: FloatArray) -> float:
+        """Largest of the depths (n_contact,), m, or else their volume, m3, of which a resonance is a function."""
+        return float(depth.max(initial=0.0) if self.target.quantity == "wear_depth" else depth @ self.area)
 
 
 def _shift(node: Node, nodes: Sequence[Node]) -> float:

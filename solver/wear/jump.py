@@ -1,19 +1,13 @@
 """A jump: from the end of the branch of the vibration to a stable state a little beyond, while the joint wears.
 
-Two things end a branch. Where it folds, the vibration goes on in a state of another branch. Where the joint begins to
-slide as a whole, its mean position gets a soft hold in the direction without stiffness:
+Where a branch folds, the vibration goes on in a state of another branch. Where the joint begins to slide as a whole,
+its mean position gets a soft hold in the direction without stiffness:
 
 Only friction holds a root along a prismatic slot. Where every pair slips at some time of the period, nothing determines
-the mean position along the slot: the Jacobian is singular, and the mean friction along the slot has to be zero.
-
-- In a symmetric joint the mean friction is zero.
-- Pairs with unequal wear, even by 1e-5 of their depth, leave a small force g (dovetail, friction 0.3, 1 N: up to 2e-6
-  of the friction F). Strictly, no periodic state exists: the root creeps. The force turns the directions of slip by
-  g / F. So the root moves by about g / F of its slip path in a period, here 1e-12 m, and motion and wear change by
-  g / F at most.
-
-So a soft spring holds the mean position from there on. Its force is the force g that drives the creep. Where g / F is
-no longer negligible there is no periodic state, and the outcome is ADRIFT.
+the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean force g along the
+slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Strictly, the root creeps by about g / F of its slip
+path in a period, here 1e-12 m, and motion and wear change by g / F at most. So a soft spring holds the mean position
+from there on. Where g / F is no longer negligible there is no periodic state, and the outcome is ADRIFT.
 """
 
 from __future__ import annotations
@@ -26,7 +20,7 @@ from solver.contact.coulomb import STICK
 from solver.continuation.natural import follow_naturally
 from solver.continuation.transient import SEARCH_ITERATIONS, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import BalanceAt, Failure, State, final_history, vibration_change
+from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
 from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.results.verdict import HELD_FORCE
@@ -46,26 +40,29 @@ def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -
     work.run.budget.limit = work.run.budget.iterations + SEARCH_ITERATIONS
     reached = _held(work, state, worn) or _on_another_branch(work, state, worn)
     work.run.budget.limit = float("inf")
-    if isinstance(reached, Failure):
-        return reached
-    return work.noted(replace(reached, cycle=cycle, change=None, previous=None))
+    return reached if isinstance(reached, Failure) else work.noted(replace(reached, cycle=cycle, previous=None))
 
 
 def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | None:
-    """The state with a hold of the mean position; None where the joint does not slide as a whole, or where the
-    vibration changes: then a branch has ended.
-    """
+    """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends."""
     at = state.point.evaluation
     hold = None if state.hold is not None else free_slide(work.at(state), at)
     if hold is None:
         return None
-    joint = work.case.held(hold).joint(state.omega, work.excitation_amplitude)
-    found = _at_depth(work, joint, state.point, worn)
-    if found is None or creeps(joint, hold, found.evaluation):
+    joint, before = work.case.held(hold).joint(state.omega, work.excitation_amplitude), state.depth
+
+    def balance_at(fraction: float, history: FloatArray) -> Balance:
+        return Balance(joint, history, before + fraction * (worn - before))
+
+    start = replace(state.point, parameter=0.0)
+    found, arrived = follow_naturally(balance_at, start, 1.0, work.run, keep_history=True)
+    there = found.evaluation
+    if not arrived or not work.is_stable(joint, there) or creeps(joint, hold, there):
         return None
-    if vibration_change(at, found.evaluation) > OTHER_BRANCH:
+    if vibration_change(at, there) > OTHER_BRANCH:
         return None
-    return replace(state, point=found, hold=hold, held_from=state.cycle)
+    point = State(there, final_history(balance_at(1.0, start.history), there))
+    return replace(state, point=point, hold=hold, held_from=state.cycle)
 
 
 def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
@@ -82,25 +79,6 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
     if vibration_change(last.evaluation, found.evaluation) > OTHER_BRANCH:
         state = replace(state, jump_cycle=float(np.fmin(state.jump_cycle, state.cycle)))
     return replace(state, point=found)
-
-
-def _at_depth(work: WearingJoint, joint: Joint, state: State, worn: FloatArray) -> State | None:
-    """The stable state at other depths (n_contact,), m, to which a state leads; None where there is none."""
-    balance_at = held_wear(joint, state.evaluation.wear_depth, worn)
-    start = replace(state, parameter=0.0)
-    found, arrived = follow_naturally(balance_at, start, 1.0, work.run, keep_history=True)
-    if not arrived or not work.is_stable(joint, found.evaluation):
-        return None
-    return State(found.evaluation, final_history(balance_at(1.0, start.history), found.evaluation))
-
-
-def held_wear(joint: Joint, before: FloatArray, after: FloatArray) -> BalanceAt:
-    """Balance at given depths (n_contact,), m, linear from `before` to `after` over a fraction from 0 to 1."""
-
-    def balance_at(fraction: float, history: FloatArray) -> Balance:
-        return Balance(joint, history, before + fraction * (after - before))
-
-    return balance_at
 
 
 def free_slide(joint: Joint, at: Evaluation) -> Hold | None:

@@ -6,15 +6,13 @@ the rates follow the motion as dg = G dp. A table of factors adds its own deriva
 Explicit limit: the wear rate falls where wear takes load off a pair. An explicit Euler step, Eq. (20), multiplies a
 disturbance of W by 1 + h dg/dW. It grows where h exceeds 2 / mu, with mu the largest positive eigenvalue of -dg/dW.
 
-Largest meaningful step: uniform wear brings the parts closer, nonuniform wear takes load off a pair. A step is rejected
-where its wear would move many times all normal forces at once. An explicit step then uses a wear rate that the pairs
-have lost during the step, an implicit step a rate that they only have at its end. The moved fraction of the normal
-forces is that of the linear static structure, with free tangents of pairs that slip: it does not depend on the
-vibration, which may change arbitrarily at the end of a branch, and is zero where wear does not act back on the joint.
+Largest meaningful step: a step is rejected where its wear would move many times all normal forces at once, those of
+the linear static structure with free tangents of pairs that slip.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +24,7 @@ from solver.model import BoolArray, FloatArray
 from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
 from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
+from solver.outcome import in_digits
 from solver.structure.joint import Joint
 
 LARGEST_MOVED_LOAD = 10.0
@@ -34,13 +33,7 @@ worn volume is a sufficient warning (27 % with 0.6)."""
 
 
 def rate_changes(
-    joint: Joint,
-    at: Evaluation,
-    gain: FloatArray,
-    wearing: WearingWork,
-    depths: FloatArray,
-    run: Run,
-    rtol: float = FORCING,
+    joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, depths: FloatArray, run: Run
 ) -> FloatArray:
     """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths.
 
@@ -48,7 +41,7 @@ def rate_changes(
     gain (n_contact,): growth of the depth over wearing work in one cycle, m/J.
     wearing: part of the slip work that wears.
     depths (k, n_contact): changes of the depths, m.
-    run, rtol: solves with the Jacobian of the state, and their relative residual.
+    run: solves with the Jacobian of the state, to the relative residual of a Newton direction.
     """
     balance = Balance(joint, at.history, at.wear_depth)
     growth = replace(balance, wear_gain=gain, wearing=replace(wearing, depth_held=True)).linearise(at).growth_tangent
@@ -59,7 +52,7 @@ def rate_changes(
     if acting.any():
         rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
         rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
-        steps = run.solver.solve_all(balance.linearise(at), rights, rtol)
+        steps = run.solver.solve_all(balance.linearise(at), rights, FORCING)
         moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
         found[acting] += (growth * moved).sum(axis=2)
     return found
@@ -80,9 +73,8 @@ def rate_slope(
 def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, run: Run) -> float:
     """Largest stable explicit step of Eq. (20) at a state, cycles; inf where the wear rate of no pair falls.
 
-    The eigenvalues come from Arnoldi's method with at most `SIGN_PRODUCTS` solves. A complex eigenvalue counts where
-    its real part is larger than its imaginary part. Arguments as in `rate_changes`; that the wearing work depends on
-    the depth itself is neglected.
+    The eigenvalues come from Arnoldi's method. A complex one counts where its real part is larger than its imaginary
+    part. Arguments as in `rate_changes`; that the wearing work depends on the depth itself is neglected.
     """
     wears, held = gain * wearing.work(*worn_by(at)) > 0.0, replace(wearing, depth_held=True)
 
@@ -92,21 +84,20 @@ def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing:
     # depths of pairs whose rates follow no depth do not matter
     start = product(np.where(wears, np.random.default_rng(0).normal(size=wears.size), 0.0))
     if not np.isfinite(start).all() or not start.any():
-        return float("inf")
+        return math.inf
     values = ritz_values(product, start, min(SIGN_PRODUCTS, int(np.count_nonzero(wears))))[0]
     falling = values.real[np.isfinite(values) & (values.real > np.abs(values.imag))]
     # a value below the round-off of the largest one is zero
     fastest = float(falling.max(initial=0.0))
-    return 2.0 / fastest if fastest > 1e-12 * float(np.abs(values).max(initial=0.0)) else float("inf")
+    return 2.0 / fastest if fastest > 1e-12 * float(np.abs(values).max(initial=0.0)) else math.inf
 
 
 def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, free_tangents: bool = True) -> float:
-    """Change of the mean normal forces by wear, relative to these forces, both as norms.
+    """Change of the mean normal forces by wear to depths (n_contact,), m, relative to these forces, both as norms.
 
     Pairs that are open throughout the period carry no force.
 
     before: state at the start of the step.
-    wear_depth (n_contact,): depth at the end of the step, m.
     free_tangents: whether the tangents of pairs that slip are free; if not, the result is a bound, which is cheaper.
     """
     pair, component = joint.component_index // 3, joint.component_index % 3
@@ -137,7 +128,8 @@ def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: fl
         return None
     # a hundredth of the limit; a usual step of the dovetail root moves 0.001 to 0.01 of the normal forces
     advised = length * LARGEST_MOVED_LOAD / 100.0 / fraction
+    on, times, most = in_digits(length, 3), in_digits(fraction, 2), in_digits(advised, 2)
     return (
-        f"wearing on for {length:.3g} cycles at once from cycle {cycle:.6g} on moves {fraction:.2g} times the"
-        f" normal forces of the joint: at most {advised:.2g} cycles at once would do"
+        f"wearing on for {on} cycles at once from cycle {in_digits(cycle)} on moves {times} times the normal forces"
+        f" of the joint: at most {most} cycles at once would do"
     )

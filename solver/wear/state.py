@@ -1,4 +1,4 @@
-"""The state of a wearing joint: data at the start and the end of a step, from which a history goes on."""
+"""The state of a wearing joint, from which a history goes on."""
 
 from __future__ import annotations
 
@@ -33,25 +33,39 @@ class Choice:
 
 @packable
 @dataclass(frozen=True)
+class LastStep:
+    """The last step, for BDF2 and for the extrapolation to the next state.
+
+    length: cycles.
+    depth (n_contact,), m, predicted_h (n_rel, 2H+1), N, omega, rad/s, resolution: at its start.
+    """
+
+    length: float
+    depth: FloatArray
+    predicted_h: FloatArray
+    omega: float
+    resolution: Resolution
+
+
+@packable
+@dataclass(frozen=True)
 class WearState:
     """A wearing joint at one cycle count; the next step depends on this state only.
 
     cycle: cycle count.
     omega: angular frequency of the excitation, rad/s.
-    lag: phase lag of the vibration where the frequency is followed, rad (`solver.continuation.phase_lag`).
-    half_width: change of a followed frequency over the change of the phase lag, rad/s; 0 for a given frequency.
-    point: periodic state, its worn depth (`point.evaluation.wear_depth`) and the tangential history for the next one.
+    point: periodic state, its worn depth and the tangential history for the next state.
     resolution: harmonics and samples of the periodic state.
     choice: last choice of the resolution.
     rates, largest_rates (n_contact + 1,): wear rates of the pairs and, as the last entry, of all together, and their
         largest values so far, m3 per cycle; NaN and zero before the first state.
     most_rate: wear rate if every pair slipped as far as it moves, m3 per cycle; rates far below are round-off.
     step_limit: largest stable explicit step at the first state that wears, cycles; NaN as long as nothing wears.
-    change: length of the last step, cycles, and changes of predicted force (n_rel, 2H+1), N, and frequency, rad/s, in
-        this step, for the extrapolation to the next state; None after a jump and after a change of the harmonics.
-    previous: length of the last step, cycles, and depth at its start (n_contact,), m, for BDF2; None after a jump.
-    length, first_length: lengths of the next step, planned by the last one, and of the first step, cycles.
+    previous: the last step; None at the first state and after a jump.
+    length, first_length: largest length of the next step, and length of the first adaptive step, cycles.
     judged_h (n_rel, 2H+1): predicted force at the last stability check, N; None before.
+    lag: phase lag of the vibration where the frequency is followed, rad (`solver.continuation.phase_lag`).
+    half_width: change of a followed frequency over the change of the phase lag, rad/s; 0 for a given frequency.
     hold: soft hold of the mean position of a joint that slides as a whole; None for none.
     held_from: count from which on the joint is held, NaN if never.
     jump_cycle: count of the first jump to another branch, NaN if none.
@@ -67,18 +81,17 @@ class WearState:
     rates: FloatArray
     largest_rates: FloatArray
     most_rate: float = 0.0
-    step_limit: float = float("nan")
-    change: tuple[float, FloatArray, float] | None = None
-    previous: tuple[float, FloatArray] | None = None
+    step_limit: float = math.nan
+    previous: LastStep | None = None
     length: float = 0.0
     first_length: float = 0.0
     judged_h: FloatArray | None = None
     lag: float = 0.5 * math.pi
     half_width: float = 0.0
     hold: Hold | None = None
-    held_from: float = float("nan")
-    jump_cycle: float = float("nan")
-    inaccurate_from: float = float("inf")
+    held_from: float = math.nan
+    jump_cycle: float = math.nan
+    inaccurate_from: float = math.inf
     worst: Estimate = NOTHING
 
     @property
@@ -87,21 +100,6 @@ class WearState:
         return self.point.evaluation.wear_depth
 
     @property
-    def least_rate(self) -> float:
-        """Wear rate below which a joint sticks, m3 per cycle."""
-        return _NO_WEAR * self.most_rate
-
-    @property
     def wears(self) -> bool:
         """Whether the wear rate is above the round-off of the slip by the static load."""
-        return bool(self.rates[-1] > self.least_rate)
-
-
-@dataclass(frozen=True)
-class Reached:
-    """End of a step: its periodic state; omega, lag and half_width as in `WearState`."""
-
-    point: State
-    omega: float
-    lag: float
-    half_width: float
+        return bool(self.rates[-1] > _NO_WEAR * self.most_rate)

@@ -6,10 +6,10 @@
 
     W_(n+1) = W_n + w^2 / (1 + 2 w) (W_n - W_(n-1)) + (1 + w) / (1 + 2 w) h_n g(W_(n+1)),
 
-  which is an implicit Euler step from a depth that is already worn and with a shorter h. It is L-stable for equal steps
-  and zero-stable as long as w < 1 + sqrt(2); both factors are positive, so that wear never falls. The local error
-  follows from the difference to an explicit formula of the same order (Hairer, Norsett, Wanner, Solving Ordinary
-  Differential Equations I, III.5; Gresho, Lee, Sani 1980):
+  an implicit Euler step from a depth that is already worn and with a shorter h. It is L-stable for equal steps and
+  zero-stable for w < 1 + sqrt(2); both factors are positive, so that wear never falls. The local error follows from the
+  difference to an explicit formula of the same order (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations
+  I, III.5; Gresho, Lee, Sani 1980):
 
     P = W_n + (1 + w) h_n g_n - w^2 (W_n - W_(n-1)),      e = c / (c + c_P) (W_(n+1) - P),
     c = (1 + w)^2 / (6 w (1 + 2 w)),      c_P = (1 + 1 / w) / 6.
@@ -17,14 +17,13 @@
   The first step, and the first step behind a jump, is an implicit Euler step. The error of an Euler step is its
   difference to the trapezoidal rule.
 
-Friction on the slow time scale: a pair that does not wear may slide all the same. The wear of other pairs changes its
-force, and at its friction limit it slides a little in each cycle, to a place that depends on the way. A balance alone
-marches the law from the history before the step straight to the last period of the step: one slide for the whole way.
-This is an error of first order in the step that the local error of the depths does not show (dovetail, 16 pairs,
-212.6 Hz, `rtol` 1e-2: 1.8 % of the worn volume, with the way in parts 0.4 %). So the predicted force goes along a
-straight line from the state before towards the extrapolated state, and the law is marched at each part of the line
-until the period repeats. The last part is left to the balance: with the whole line, pairs may keep the history of a way
-that the joint did not go (48 pairs, 211.5 Hz: 1.667 mm3, another branch, for 2.284 mm3; 2.261 by time integration).
+Friction on the slow time scale: the wear of other pairs changes the force of a pair, which slides a little in each
+cycle at its friction limit, to a place that depends on the way. A balance alone takes one slide for the whole way, an
+error of first order in the step that the local error does not show (dovetail, 16 pairs, 212.6 Hz, `rtol` 1e-2: 1.8 %
+of the worn volume, with the way in parts 0.4 %). So the law is applied at parts of a straight line from the predicted
+force towards the extrapolated one, at each until the period repeats. The last part is left to the balance: with the
+whole line, pairs may keep the history of a way that the joint did not go (48 pairs, 211.5 Hz: 1.667 mm3, another
+branch, for 2.284 mm3; 2.261 by time integration).
 """
 
 from __future__ import annotations
@@ -50,14 +49,10 @@ nine harmonics, `rtol` 1e-2: 1.795, 1.813, 1.819, 1.819, 1.822 mm3 with 1, 8, 32
 
 @dataclass(frozen=True)
 class Step:
-    """A step: its end, and the estimated local error of the depth (n_contact,) with its sign, m."""
+    """A step: its end, and its estimated local error as worn volume, m3."""
 
     state: WearState
-    error: FloatArray
-
-    def volume_error(self, area: FloatArray) -> float:
-        """Estimated local error, as worn volume, m3; area (n_contact,): m2."""
-        return float(np.abs(self.error) @ area)
+    error: float = 0.0
 
 
 def attempt_step(work: WearingJoint, state: WearState, length: float, scheme: Scheme) -> Step | None:
@@ -66,7 +61,7 @@ def attempt_step(work: WearingJoint, state: WearState, length: float, scheme: Sc
     base, implicit = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
     w, grown = 0.0, np.zeros_like(depth)
     if scheme == "adaptive" and state.previous is not None:
-        w, grown = length / state.previous[0], depth - state.previous[1]
+        w, grown = length / state.previous.length, depth - state.previous.depth
         base = depth + w**2 / (1.0 + 2.0 * w) * grown
         implicit = (1.0 + w) / (1.0 + 2.0 * w) * length
     balance = Balance(joint, state.point.history, base, work.gain(implicit), work.wearing)
@@ -74,13 +69,12 @@ def attempt_step(work: WearingJoint, state: WearState, length: float, scheme: Sc
     end = work.where.solve(work.case, balance, start, state, work.run)
     if end is None:
         return None
-    new = end.point.evaluation
-    error = 0.5 * length * (work.rate(new) - rate)
+    error = 0.5 * length * (work.rate(end.point.evaluation) - rate)
     if w > 0.0:
         explicit = depth + (1.0 + w) * length * rate - w**2 * grown
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
-        error = own / (own + other) * (new.wear_depth - explicit)
-    return Step(work.accepted(state, end, length), error)
+        error = own / (own + other) * (end.depth - explicit)
+    return Step(work.accepted(state, end, length), float(np.abs(error) @ work.area))
 
 
 def predicted(work: WearingJoint, state: WearState, balance: Balance, length: float) -> tuple[FloatArray, Balance]:
@@ -88,13 +82,13 @@ def predicted(work: WearingJoint, state: WearState, balance: Balance, length: fl
 
     Extrapolated from the last step; those of the state where this residual is lower.
     """
-    now = state.point.evaluation.predicted_h
-    if state.change is None:
+    now, last = state.point.evaluation.predicted_h, state.previous
+    if last is None or last.resolution != state.resolution:
         return now, balance
-    before, change, faster = state.change
-    ahead, there = now + (length / before) * change, balance
+    further, there = length / last.length, balance
+    ahead = now + further * (now - last.predicted_h)
     if work.where.follows:
-        omega = state.omega + (length / before) * faster
+        omega = state.omega + further * (state.omega - last.omega)
         there = replace(balance, joint=work.case.joint(omega, work.excitation_amplitude))
     found = there.evaluate(ahead)
     if found.scaled_residual() > balance.evaluate(now).scaled_residual():
@@ -105,7 +99,7 @@ def predicted(work: WearingJoint, state: WearState, balance: Balance, length: fl
 def history_along(joint: Joint, state: WearState, ahead: Marched) -> FloatArray:
     """Tangential history (n_contact, 2), m, for the balance at the end of a step.
 
-    state: at the start of the step. ahead: at its end, extrapolated, marched from the history that `state` leaves.
+    state: at the start of the step. ahead: at its end, extrapolated, from the history that `state` leaves.
     """
     before = state.point.evaluation
     # a pair that sticks with one history at both ends sticks everywhere between: its force lies on a straight line

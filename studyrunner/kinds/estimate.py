@@ -38,9 +38,6 @@ ADAPTIVE_STEPS = 40
 STEPS_TO_THE_END = 100
 """Steps of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)."""
 
-ITERATIONS_TO_A_FINAL_STATE = 50
-"""Newton iterations of the scheme "final" without integration (4 to 35 pairs: 15 to 60)."""
-
 ITERATIONS_AN_ADAPTIVE_STEP = 7
 """Newton iterations of one adaptive step near the resonance (36 and 48 pairs: 4 to 13), with refused steps and the
 reference solution."""
@@ -108,9 +105,7 @@ def iterations_of_histories(steps: Sequence[tuple[str, float]], cycles: float) -
     """
     if cycles == 0.0:
         return ITERATIONS_A_STEP
-    if steps[0][0] == "final":
-        return ITERATIONS_TO_A_FINAL_STATE
-    given = [step for scheme, step in steps if scheme != "adaptive"]
+    given = [step for scheme, step in steps if scheme not in ("adaptive", "final")]
     n_steps = sum(max(1, math.ceil(cycles / step)) if cycles < math.inf else STEPS_TO_THE_END for step in given)
     adaptive = ADAPTIVE_STEPS if cycles < math.inf else STEPS_TO_THE_END
     return ITERATIONS_AN_ADAPTIVE_STEP * adaptive + ITERATIONS_A_STEP * n_steps

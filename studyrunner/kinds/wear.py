@@ -266,21 +266,19 @@ class History(JointTask):
 
     def integrate(self, model: ReducedModel, integrated: tuple[Integrated, ...], keep: Keep) -> Iterator[WearHistory]:
         """Integrated histories, at all counts at which one of the others is read."""
-        from solver.wear.final_state.find import find_final_state
         from solver.wear.history import integrate_together
 
         if self.start is None:
             raise TypeError(f"task without a start state: {self}")
         asked = [self._asked(each) for each in integrated]
-        final = integrated[0].scheme == "final" and isinstance(asked[0].cycles, ToTheEnd)
-        given = model, self.joint.friction_coefficient, self.settings, unpack(self.start)
-        if final:
-            return iter((find_final_state(*given, asked[0], keep, self.resume),))
-        return integrate_together(*given, asked, keep, self.resume)
+        friction = self.joint.friction_coefficient
+        return integrate_together(model, friction, self.settings, unpack(self.start), asked, keep, self.resume)
 
     def _asked(self, integrated: Integrated) -> SlowTime:
         """What the solver integrates."""
+        from solver.wear.control import steps_of
         from solver.wear.solutions import SlowTime
+        from solver.wear.wearing_joint import Fixed, Following
 
         counts: NDArray[np.float64] | ToTheEnd
         if self.to_the_end is not None and not integrated.unworn:
@@ -289,17 +287,14 @@ class History(JointTask):
             # a history begins at cycle 0, whether that count is kept or not
             read = (integrated.counts(self.cycles, scaled) for scaled in integrated.histories)
             counts = np.unique([0.0, *itertools.chain.from_iterable(read)])
-        scheme = "adaptive" if integrated.scheme == "final" else integrated.scheme
         return SlowTime(
             integrated.wear_coefficient,
-            cast("Literal['explicit', 'implicit', 'adaptive']", scheme),
+            steps_of(integrated.scheme, integrated.step, self.settings.rtol, integrated.largest_depth),
             counts,
-            integrated.step,
-            largest_depth=integrated.largest_depth,
             law=self.law,
             until=self.until,
             loops=self.loops,
-            follow=self.follow,
+            where=Fixed() if self.follow is None else Following(self.follow),
         )
 
     def describe(self, place: int) -> str:

@@ -162,7 +162,7 @@ class _Planner:
         together: dict[object, list[Integrated]] = {}
         for alike in tasks:
             each = self._integrated(study, alike, of_value)
-            alone = each.unworn or each.scheme == "final" or not study.solver.shortcuts
+            alone = each.unworn or not study.solver.shortcuts
             together.setdefault(alike if alone else each.wear_coefficient, []).append(each)
         for integrated in together.values():
             for begin in range(0, len(integrated), MOST_TOGETHER):

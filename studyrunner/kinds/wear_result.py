@@ -18,7 +18,6 @@ from studyrunner.percent import describe_reach, show_count
 from studyrunner.variables import KEPT
 
 _ROUND_OFF = 1e-10
-_METHODS = KEPT["final_method"].flags
 
 
 def build_result(task: History, integrated: Integrated, history: WearHistory, place: int = 0) -> PointResult:
@@ -36,8 +35,6 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
     counts = history.cycles if endless else np.array(integrated.counts(task.cycles, scaled))
     rows = np.arange(counts.size) if endless else np.searchsorted(history.cycles, counts)
     reached = counts <= (1.0 + _ROUND_OFF) * history.last_cycle
-    if endless and history.final_method == "active_set":
-        reached = np.isfinite(history.worn_volume)
     known = rows[reached]
     jump = history.jump_cycle
     if place:
@@ -74,7 +71,6 @@ def build_result(task: History, integrated: Integrated, history: WearHistory, pl
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(depths.max(initial=0.0)) if known.size else math.nan,
-        "final_method": _METHODS.index(history.final_method or "none"),
         "message": message or _of_target(task, history, known, target, life_error, whole=whole),
     }
     of_task = {name: getattr(history, name) for name in KEPT if name not in of_its_own}

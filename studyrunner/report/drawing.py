@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import textwrap
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -85,9 +86,11 @@ class Drawing:
             with values.open("w", newline="", encoding="utf-8") as file:
                 csv.writer(file).writerows([("panel", "series", "x", "x value", "y", "y value", "value"), *rows])
         with style():
-            narrow = self.narrow()
+            wide, narrow = _save(self.figure, folder / self.name), self.narrow()
             fit_into_column(narrow)
-            return _save(self.figure, folder / self.name), _save(narrow, folder / f"{self.name}_column")
+            # names of any length may leave its panels no room
+            with warnings.catch_warnings(action="ignore", category=UserWarning):
+                return wide, _save(narrow, folder / f"{self.name}_column")
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.outcome import COMPLETE, Outcome
 from solver.settings import SolverSettings
-from solver.wear.output import CERTIFIED
+from solver.wear.course import CERTIFIED
 from tests.benchmarks.frame import Table, arguments, measure
 from tests.random_scenes import RandomScene, random_scene
 from tests.solver.models import branch_states, march_wear

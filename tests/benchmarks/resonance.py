@@ -16,7 +16,9 @@ from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.settings import FOLLOWED, Followed, FollowedFrequency, SolverSettings
 from solver.structure.joint import build_case
+from solver.wear.control import Adaptive, Given
 from solver.wear.solutions import SlowTime, Solutions
+from solver.wear.wearing_joint import FIXED, Following
 from studies import build_scene
 from tests.benchmarks.frame import Table, arguments, measure
 from tests.followed_states import at_maximum, followed_states, in_quadrature, responses_around
@@ -56,18 +58,18 @@ def cost(name: str, model: ReducedModel, load: float, between: tuple[float, floa
     at = np.array([followed.state.omega / (2.0 * np.pi)])
     ((_, fixed),) = follow_branch(model, FRICTION, load, at, "up", settings)
     table = Table(name, "CPU s", "over fixed", "steps", "ms a step", "over fixed", "iterations")
-    for scheme, length in (("adaptive", np.inf), ("implicit", step)):
+    for rule in (Adaptive(settings.rtol), Given(step)):
         first = None
         for word, start in (("fixed", fixed), *((word, followed) for word in FOLLOWED)):
-            follow = None if word == "fixed" else FollowedFrequency(word, *between)
-            asked = SlowTime(WEAR, scheme, np.array([0.0, cycles]), length, follow=follow)
+            where = FIXED if word == "fixed" else Following(FollowedFrequency(word, *between))
+            asked = SlowTime(WEAR, rule, np.array([0.0, cycles]), where=where)
             case = build_case(model, FRICTION, start.penalty_omega, settings, start.resolution)
             runs = [measure(lambda: Solutions(case, start, asked).history()) for _ in range(4)]  # noqa: B023
-            whole, n_steps = min(run.seconds for run in runs), len(runs[0].result.output.course.ends) - 1
+            whole, n_steps = min(run.seconds for run in runs), len(runs[0].result.course.ends) - 1
             each = 1e3 * whole / n_steps
             first = first or (whole, each)
             numbers = (whole, whole / first[0], n_steps, each, each / first[1], runs[0].iterations)
-            table.row(f"{scheme}, {word}", *numbers)
+            table.row(f"{rule.scheme}, {word}", *numbers)
 
 
 def main() -> None:

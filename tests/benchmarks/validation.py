@@ -2,7 +2,6 @@
 
 A: a cylinder in partial slip, worn to the end (Ciavarella and Hills). B: a sphere, the same (method of dimensionality
 reduction). C: a cylinder in gross slip, measured and computed by McColl, Ding and Leen, Wear 256 (2004) 1114.
-E: the final state by the scheme "final" against that of a history to the end, and what both take.
 """
 
 from collections.abc import Callable
@@ -34,17 +33,6 @@ MCCOLL = {1000: (0.378, 0.0526), 5000: (1.131, 0.2610), 10_000: (1.815, 0.5215),
 """Cycles: depth of the flat, um, of a finite-element code (another one has 0.2 to 1.3 % less), and its worn area, 1e-3
 mm2."""
 FLAT, CYLINDER = 2.9e-14, 1.9e-14  # 1/Pa
-FINAL = {
-    "A, 60 strips": ("cylinder_on_flat", {"strips": 60}, 0.6, 20.0, 1.0, WEAR),
-    "A, 100 strips": ("cylinder_on_flat", {"strips": 100}, 0.6, 20.0, 1.0, WEAR),
-    "B, 10 x 10 patches": ("sphere_on_flat", {"patches": 10}, 0.6, 20.0, 1.0, WEAR),
-    "slider": ("sdof_slider", {}, 0.5, 160.0, 10.0, 1.1e-11),
-    "dovetail, mesh 1, 209 Hz": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 0.5, 1.1e-11),
-    "dovetail, mesh 1, 209 Hz, 4 N": ("dovetail_sector", {"mesh": 1}, 0.5, 209.0, 4.0, 1.1e-11),
-    "dovetail, mesh 1, 212.5 Hz": ("dovetail_sector", {"mesh": 1}, 0.5, 212.5, 0.5, 1.1e-11),
-    "dovetail, mesh 1, 212.8 Hz": ("dovetail_sector", {"mesh": 1}, 0.5, 212.8, 0.5, 1.1e-11),
-}
-"""Scene, parameters, friction, Hz, N, 1/Pa."""
 Continuum = tuple[float, float]
 """Largest depth, m, and volume, m3, of the closed form."""
 
@@ -126,30 +114,13 @@ def gross_slip(strips: int = 60) -> None:
         table.row(f"{cycles}", own, own / depth, worn, worn / area, float(history.worn_volume_error[place]))
 
 
-def final_states() -> None:
-    """The final state at once and by a history to the end."""
-    table = Table("E", "method", "pairs", "depth apart", "CPU s", "to the end")
-    for label, (name, parameters, friction, frequency, force, per_pressure) in FINAL.items():
-        model, settings = build_scene(name, **parameters), SolverSettings(harmonics=5, samples=64)
-        asked = {"sweep": "ramp", "settings": settings}
-        point = (model, frequency, force, friction, per_pressure, np.inf)
-        # the first one compiles
-        found = [measure(lambda: march_wear(*point, scheme="final", **asked)) for _ in range(2)][1]  # noqa: B023
-        there = measure(lambda: march_wear(*point, **asked))  # noqa: B023
-        depths = [each.result.wear_depth[-1] for each in (found, there)]
-        apart = float(np.abs(depths[0] - depths[1]).max() / max(depths[1].max(), 1e-300))
-        n_worn = np.count_nonzero(depths[0])
-        table.row(label, found.result.final_method, n_worn, apart, found.seconds, there.seconds)
-
-
 def main() -> None:
     """Prints the chosen tables."""
-    given = arguments(__doc__, ("A", "B", "C", "E"))
+    given = arguments(__doc__, ("A", "B", "C"))
     rows: dict[str, Callable[[], None]] = {
         "A": lambda: limits("A", cylinder, (50, 100, 200)),
         "B": lambda: limits("B", sphere, (10, 20)),
         "C": gross_slip,
-        "E": final_states,
     }
     for letter in given.chosen:
         rows[letter]()

@@ -21,6 +21,7 @@ from solver.results.history import PeriodicState, StartState, WearHistory
 from solver.results.state_report import periodic_state
 from solver.settings import Resolution, Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.structure.joint import Case, Joint, build_case
+from solver.wear.control import steps_of
 from solver.wear.history import integrate_wear
 from solver.wear.solutions import SlowTime
 from studies.scenes import build_scene, scene_parameters
@@ -234,12 +235,13 @@ def march_wear(
     cycles: FloatArray | ToTheEnd,
     settings: SolverSettings,
     *,
+    largest_depth: float | None = None,
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
     **asked: Any,
 ) -> WearHistory:
     """The history from a start state; asked: what else `SlowTime` has."""
-    wanted = SlowTime(wear_coefficient, scheme, cycles, step, **asked)
+    wanted = SlowTime(wear_coefficient, steps_of(scheme, step, settings.rtol, largest_depth), cycles, **asked)
     return integrate_wear(model, friction_coefficient, settings, start, wanted, keep, resume)
 
 

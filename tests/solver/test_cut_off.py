@@ -48,7 +48,6 @@ def test_load_or_wear_at_the_edge_is_found_at_its_first_count():
 def test_it_is_said_from_which_count_on():
     assert describe_cut_off(2000.0).endswith("at cycle 2000 already")
     assert describe_cut_off(0.0).endswith("at cycle 0")
-    assert describe_cut_off(math.inf).endswith("in the final state")
 
 
 @pytest.mark.parametrize(
@@ -88,13 +87,3 @@ def test_a_scar_that_grows_out_of_its_pairs_is_no_result():
     # it was computed to its end, and is kept
     assert cut.last_cycle == 4000.0
     assert np.isfinite(cut.worn_volume).all()
-
-
-def test_a_final_state_without_slow_time_is_cut_off_as_well():
-    # partial slip would wear up to 1.17 of the unworn contact
-    model = build_scene("cylinder_on_flat", strips=40, half_width=1.08 * A_LINE)
-    found = march_wear(model, 20.0, 1.0, 0.6, 1e-13, math.inf, scheme="final", sweep="ramp", settings=SETTINGS)
-    assert found.final_method == "active_set"
-    assert found.outcome is Outcome.CONTACT_CUT_OFF
-    assert found.cut_off_cycle == math.inf
-    assert found.message == describe_cut_off(math.inf)

@@ -8,37 +8,21 @@ from solver.results.history import StartState
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from solver.wear import step
+from solver.wear.control import Adaptive
 from solver.wear.solutions import SlowTime, Solutions
 from solver.wear_history import march_wear
-from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, scene
-
-WEAR = 1.1e-11
-AREA = 1e-4
-
-
-def exact_volume(cycles: float, wear: float) -> float:
-    """Worn volume of the default slider at 160 Hz and 10 N, by Den Hartog, m3."""
-    depth = slider_wear_depth(
-        np.array([0.0, cycles]),
-        wear_coefficient=wear,
-        area=AREA,
-        friction_coefficient=0.5,
-        normal_load=10.0,
-        normal_stiffness=1e5,
-        amplitude=lambda limit: slider_amplitude(0.1, 0.0, 1.6e5, 10.0, limit, 2.0 * np.pi * 160.0),
-    )
-    return float(depth[-1]) * AREA
+from tests.solver.worn_slider import WEAR, exact_depths_of_motion
 
 
 def steps_and_volume(scene_name: str, start: StartState, settings: SolverSettings, cycles: float) -> tuple[int, float]:
     """Number of steps and worn volume, m3, of an adaptive history without its reference solution."""
     model = scene(scene_name, 13, **({"mesh": 1} if scene_name == "dovetail_sector" else {}))
     case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
-    solutions = Solutions(case, start, SlowTime(WEAR, "adaptive", np.array([0.0, cycles])))
+    solutions = Solutions(case, start, SlowTime(WEAR, Adaptive(settings.rtol), np.array([0.0, cycles])))
     ended = solutions.history()
-    depth = solutions.output_of(ended).read(np.array([cycles]))["wear_depth"]
-    return len(ended.output.course.ends), float((depth @ model.contact.area)[0])
+    depth = ended.course.read(np.array([cycles]))["wear_depth"]
+    return len(ended.course.ends), float((depth @ model.contact.area)[0])
 
 
 def dovetail_start(frequency: float) -> StartState:
@@ -99,6 +83,6 @@ def test_the_error_of_a_history_covers_and_does_not_alarm(wear, cycles, outputs,
     """Also for a count at the beginning of a long step, and where start state and steps have similar errors."""
     counts = np.linspace(0.0, cycles, outputs)
     history = march_wear(scene("sdof_slider", 21), 160.0, 10.0, 0.5, wear, counts, settings=SolverSettings(rtol=rtol))
-    true = abs(float(history.worn_volume[-1]) / exact_volume(cycles, wear) - 1.0)
+    true = abs(float(history.wear_depth[-1, 0] / exact_depths_of_motion(np.array([0.0, cycles]), wear)[-1]) - 1.0)
     assert history.outcome is Outcome.CONVERGED
     assert true <= history.error_estimate <= 2.0 * rtol

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from solver.continuation.static_state import solve_static_state
+from solver.harmonic_balance.dlft import Balance
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.rate_slope import LARGEST_MOVED_LOAD, moved_fraction, too_long
-from tests.solver.models import branch_states, dovetail, march_wear
+from solver.wear.rate_slope import LARGEST_MOVED_LOAD, moved_fraction, rate_slope, too_long
+from solver.wear.wearing_joint import WearingJoint
+from tests.solver.models import branch_states, dovetail, march_wear, scene
 
 OMEGA = 2.0 * np.pi * 212.5
 FRICTION = 0.5
@@ -48,7 +50,7 @@ def test_the_reason_names_the_step_and_one_that_would_do():
     assert too_long(joint, at, 0.9 * LARGEST_MOVED_LOAD / unit * one, 3000.0, 1000.0) is None
     said = too_long(joint, at, 20.0 / unit * one, 3000.0, 1000.0)
     assert said is not None
-    assert "1e+03 cycles at once from cycle 3000 on moves 20 times" in said
+    assert "1000 cycles at once from cycle 3000 on moves 20 times" in said
     assert "at most 5 cycles" in said
 
 
@@ -66,6 +68,27 @@ def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long_and_the_step_th
     advised = float(refused.message.split("at most ")[1].split()[0])
     assert 1e-4 < advised < 1e-2
     assert worn("explicit", advised, 20.0 * advised * np.array([0.0, 1.0])).outcome is Outcome.CONVERGED
+
+
+def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
+    model = scene("cylinder_on_flat", 3, strips=24)
+    (start,) = branch_states(model, 0.6, 1.0, [2.0 * np.pi * 20.0], COARSE, "ramp")
+    case = build_case(model, 0.6, start.penalty_omega, COARSE, start.resolution)
+    work = WearingJoint(case, start, AREA)
+    state = work.begin()
+    joint, at = work.at(state), state.point.evaluation
+    gain, slips = work.gain(1.0), at.slip_work > 0.0
+    slopes = rate_slope(joint, at, gain, work.wearing, slips, Run(1e-13))
+    step = 1e-5 * float((gain * at.slip_work).max() / np.abs(slopes).max())
+    for pair in np.flatnonzero(slips):
+        rates = []
+        for sign in (1.0, -1.0):
+            depth = at.wear_depth + sign * step * np.eye(slips.size)[pair]
+            solved = Run(1e-13).solve(Balance(joint, at.history, depth), at.predicted_h)
+            rates.append(gain * solved.evaluation.slip_work)
+        wanted = (rates[0] - rates[1]) / (2.0 * step)
+        # as exact as a Newton direction
+        assert slopes[:, pair] == pytest.approx(wanted, abs=1e-2 * np.abs(wanted).max())
 
 
 def seesaw():

@@ -14,25 +14,21 @@ from solver.packing import in_rows, pack, unpack
 from solver.settings import Scheme, SolverSettings
 from solver.wear import control
 from solver.wear.check import chosen_for_another
-from solver.wear.control import Adaptive, Given, Growing, LargestDepth, one_step
+from solver.wear.control import Adaptive, Given, LargestDepth, WearLine
 from solver.wear.state import Choice
 from solver.wear.step import Step
-from tests.solver.worn_slider import AREA, END, WEAR, begun
+from tests.solver.worn_slider import AREA, END, begun
 
 SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit")
 
 
-def planned(kind, *given):
-    """Steps of a joint."""
-    return lambda work: kind(work, *given)
-
-
-def steps_of(plan, n_steps, wear=WEAR):
+def steps_of(rule, n_steps, end=np.inf):
     """The unworn state and those behind each of the first steps, and the steps."""
-    work, state = begun(wear)
-    states, steps = [plan(work).begin(state)], []
+    work, state = begun()
+    line = WearLine(work, rule, end)
+    states, steps = [line.begin(state)], []
     for _ in range(n_steps):
-        step = one_step(plan(work), states[-1])
+        step = line.step(states[-1])
         assert isinstance(step, Step)
         steps.append(step)
         states.append(step.state)
@@ -60,7 +56,7 @@ def bdf2_depth(length, before, grown, depth, rate):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_given_step_follows_its_own_equation(scheme):
-    states, steps = steps_of(planned(Given, scheme, 4000.0, END), 3)
+    states, steps = steps_of(Given(4000.0, scheme), 3, END)
     assert counts(states).tolist() == [0.0, 4000.0, 8000.0, 12000.0]
     rate = rates(states)
     # W + h g(W) if explicit, W_new = W + h g(W_new) if implicit
@@ -68,17 +64,17 @@ def test_a_given_step_follows_its_own_equation(scheme):
     assert np.diff(depths(states)) == pytest.approx(4000.0 * taken, rel=1e-9)
     # the difference to the trapezoidal rule
     expected = 0.5 * 4000.0 * np.abs(np.diff(rate)) * AREA
-    assert [step.volume_error(np.array([AREA])) for step in steps] == pytest.approx(expected, rel=1e-9)
+    assert [step.error for step in steps] == pytest.approx(expected, rel=1e-9)
 
 
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
     # Eq. (22): one pair, so each step wears just that depth
-    states, _ = steps_of(planned(LargestDepth, "explicit", 1.0, END, 2e-6), 4)
+    states, _ = steps_of(LargestDepth(2e-6), 4, END)
     assert np.diff(depths(states)) == pytest.approx(np.full(4, 2e-6), rel=1e-9)
 
 
 def test_without_an_end_each_step_wears_as_much_as_the_first_and_is_at_most_twice_the_last():
-    states, _ = steps_of(planned(Growing, "implicit", 2e4, np.inf), 12)
+    states, _ = steps_of(Given(2e4), 12)
     lengths, rate = np.diff(counts(states)), rates(states)
     slower = np.maximum.accumulate(rate) / rate
     allowed = np.concatenate([[2e4], LARGEST_STEP_RATIO * lengths[:-1]])
@@ -88,15 +84,15 @@ def test_without_an_end_each_step_wears_as_much_as_the_first_and_is_at_most_twic
 
 def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     rtol = 1e-2
-    states, steps = steps_of(planned(Adaptive, rtol), 12)
+    states, steps = steps_of(Adaptive(rtol), 12)
     at, worn = counts(states), depths(states) * AREA
     lengths = np.diff(at)
     for place, step in enumerate(steps):
         at_mean_rate = worn[place + 1] * lengths[place] / at[place + 1]
         allowed = control.STEP_ERROR_FRACTION * rtol * max(worn[place + 1] - worn[place], at_mean_rate)
-        assert step.volume_error(np.array([AREA])) <= allowed
+        assert step.error <= allowed
     assert (lengths[1:] <= LARGEST_STEP_RATIO * lengths[:-1] * (1.0 + 1e-12)).all()
-    assert (steps_of(planned(Adaptive, 1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
+    assert (steps_of(Adaptive(1e-4), 12)[0][-1]).cycle < 0.5 * at[-1]
 
 
 def failing(monkeypatch, fails):
@@ -112,14 +108,14 @@ def failing(monkeypatch, fails):
 
 
 def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch):
-    first = steps_of(planned(Adaptive, 1e-2), 0)[0][0].length
+    first = steps_of(Adaptive(1e-2), 0)[0][0].length
     with monkeypatch.context() as patch:
         tried, _ = failing(patch, lambda n, _, scheme: scheme == "adaptive" and n == 1)
-        states, _ = steps_of(planned(Adaptive, 1e-2), 1)
+        states, _ = steps_of(Adaptive(1e-2), 1)
     assert tried[:2] == [first, SMALLEST_STEP_RATIO * first]
     assert counts(states)[1] == tried[-1]
     failing(monkeypatch, lambda _, __, scheme: scheme == "adaptive")
-    states, _ = steps_of(planned(Adaptive, 1e-2), 1)
+    states, _ = steps_of(Adaptive(1e-2), 1)
     length = counts(states)[1]
     assert length == pytest.approx(control.SHORTEST_SLOW_STEP * first, rel=2e-3)
     assert depths(states)[1] == pytest.approx(length * rates(states)[1], rel=1e-6)
@@ -127,38 +123,41 @@ def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monk
 
 @pytest.mark.parametrize(("found_from", "end", "doublings"), [(3.0, np.inf, 2), (3.0, 3.5, None), (40.0, np.inf, None)])
 def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeypatch, found_from, end, doublings):
-    work, state = begun(WEAR)
-    first = Adaptive(work, 1e-2).begin(state)
+    work, state = begun()
+    first = WearLine(work, Adaptive(1e-2), np.inf).begin(state)
     shortest, euler = control.SHORTEST_SLOW_STEP * first.length, list[float]()
 
     def fails(_, length, scheme):
         return scheme != "adaptive" or not euler or length <= found_from * shortest
 
     tried, euler = failing(monkeypatch, fails)
-    monkeypatch.setattr(control, "step_in_parts", lambda *_: None)
     monkeypatch.setattr(control, "jump", lambda *_: Failure(Outcome.MARCH_FAILED))
-    step = one_step(Adaptive(work, 1e-2, end=end * shortest), first)
+    step = WearLine(work, Adaptive(1e-2), end * shortest).step(first)
     if doublings is None:
         assert step == Failure(Outcome.MARCH_FAILED)
     else:
         assert isinstance(step, Step)
         assert tried[-2:] == [2.0 * shortest, 4.0 * shortest]
         assert step.state.cycle == 2.0**doublings * shortest
-        assert step.volume_error(work.area) > 0.0
+        assert step.error > 0.0
 
 
-def test_a_given_step_that_is_not_found_is_taken_in_parts(monkeypatch):
-    whole, _ = steps_of(planned(Given, "implicit", 4000.0, END), 2)
-    monkeypatch.setattr(control, "attempt_step", lambda *_: None)
-    parts, _ = steps_of(planned(Given, "implicit", 4000.0, END), 2)
-    assert counts(parts).tolist() == counts(whole).tolist()
-    assert depths(parts) == pytest.approx(depths(whole), rel=1e-7)
+def test_a_given_step_that_is_not_found_is_shortened_and_grows_again(monkeypatch):
+    own, tried = control.attempt_step, list[float]()
+
+    def attempt(work, state, length, scheme):
+        tried.append(length)
+        return None if len(tried) == 1 else own(work, state, length, scheme)
+
+    monkeypatch.setattr(control, "attempt_step", attempt)
+    steps_of(Given(4000.0), 4, END)
+    assert tried == [4000.0, 1000.0, 2000.0, 4000.0, 4000.0]
 
 
 def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
     # no error is refused, so that steps grow as they may
     monkeypatch.setattr(control, "STEP_ERROR_FRACTION", 1e9)
-    states, _ = steps_of(planned(Adaptive, 1e-2), 3)
+    states, _ = steps_of(Adaptive(1e-2), 3)
     depth, rate, h = depths(states), rates(states), np.diff(counts(states))
     assert depth[1] == pytest.approx(h[0] * rate[1], rel=1e-9)
     for n in (1, 2):
@@ -166,19 +165,15 @@ def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
         assert depth[n + 1] == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    "plan",
-    [planned(Given, "explicit", 4000.0, END), planned(Growing, "implicit", 4000.0, np.inf), planned(Adaptive, 1e-2)],
-    ids=["explicit", "implicit", "adaptive"],
-)
-def test_a_state_is_data_that_survives_being_kept(plan):
+@pytest.mark.parametrize("rule", [Given(4000.0, "explicit"), Given(4000.0), Adaptive(1e-2)])
+def test_a_state_is_data_that_survives_being_kept(rule):
     """The step from an unpacked state is equal to the last bit, in a joint that has computed nothing before."""
-    kept = in_rows(steps_of(plan, 3)[0][-1])
+    kept = in_rows(steps_of(rule, 3)[0][-1])
 
     def next_of(state):
         work, _ = begun()
         work.drop_factor()
-        step = one_step(plan(work), state)
+        step = WearLine(work, rule, np.inf).step(state)
         assert isinstance(step, Step)
         return step.state
 

@@ -1,6 +1,5 @@
 """Histories until nothing wears any more: where they end, what they keep, and joints that wear without end."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,8 +10,6 @@ from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings, ToTheEnd, WearTarget
-from solver.wear.final_state.find import find_final_state
-from solver.wear.solutions import SlowTime
 from studies import build_scene
 from tests.solver.models import march_wear
 from tests.studies.half_space_twin import limit_depth
@@ -22,9 +19,9 @@ STRIPS, PER_PRESSURE = 12, 1e-13
 
 
 @cache
-def unworn():
-    """A cylinder in partial slip."""
-    model = build_scene("cylinder_on_flat", strips=STRIPS)
+def unworn(scene="cylinder_on_flat", **size):
+    """A body in partial slip."""
+    model = build_scene(scene, **(size or {"strips": STRIPS}))
     ((_, start),) = follow_branch(model, 0.6, 1.0, np.array([20.0]), "ramp", COARSE)
     return model, start
 
@@ -34,13 +31,18 @@ def worn(cycles, scheme="adaptive", **more):
     return march_wear(model, 0.6, start, PER_PRESSURE, 1000.0, scheme, cycles, COARSE, **more)
 
 
+def check_limit(model, found):
+    """Which pairs slip decides the final depths; those between which pressure moves are at least 2e-4 exact."""
+    limit = limit_depth(model, found.slip_range[-1] == 0.0)
+    assert limit.max() > 0.0
+    assert np.abs(found.wear_depth[-1] - limit).max() < 2e-4 * limit.max()
+
+
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
 def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme):
     found = worn(ToTheEnd(9), scheme)
     assert found.outcome is Outcome.CONVERGED
-    limit = limit_depth(unworn()[0], found.slip_range[0] == 0.0)
-    assert limit.max() > 0.0
-    assert np.abs(found.wear_depth[-1] - limit).max() < 2e-4 * limit.max()
+    check_limit(unworn()[0], found)
     assert found.wear_rate[-1] < 1e-4 * found.wear_rate.max()
     assert found.last_cycle == found.cycles[-1]
     # as far from one output to the next in volume and cycles together, each over the whole
@@ -48,6 +50,14 @@ def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme):
     assert np.diff(way) == pytest.approx(np.full(8, 0.25), rel=1e-6)
     assert found.cycles[0] == 0.0
     assert (np.diff(found.cycles) > 0.0).all()
+
+
+@pytest.mark.slow
+def test_a_sphere_ends_in_the_limit_state_of_its_patches():
+    model, start = unworn("sphere_on_flat", patches=8)
+    found = march_wear(model, 0.6, start, PER_PRESSURE, 1.0, "adaptive", ToTheEnd(2), COARSE)
+    assert found.outcome is Outcome.CONVERGED
+    check_limit(model, found)
 
 
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
@@ -109,18 +119,7 @@ def test_what_cannot_be_marched_to_the_end_is_told():
     model = build_scene("sdof_slider")
     with pytest.raises(ValueError, match="explicit scheme cannot grow"):
         march_from_model(model, 160.0, 10.0, 0.5, 1e-11, np.inf, scheme="explicit", step=10.0)
+    with pytest.raises(ValueError, match="goes with cycles = inf"):
+        march_from_model(model, 160.0, 10.0, 0.5, 1e-11, 1e5, scheme="final")
     with pytest.raises(ValueError, match="outputs = 1: give at least 2"):
         march_from_model(model, 160.0, 10.0, 0.5, 1e-11, np.inf, outputs=1)
-
-
-def test_without_a_start_state_there_is_nothing():
-    model, start = unworn()
-    failed = replace(start, outcome=Outcome.START_FAILED, state=None)
-    for found in (
-        march_wear(model, 0.6, failed, PER_PRESSURE, 1000.0, "adaptive", ToTheEnd(3), COARSE),
-        find_final_state(model, 0.6, COARSE, failed, SlowTime(PER_PRESSURE, "adaptive", ToTheEnd(3))),
-    ):
-        assert found.outcome is Outcome.START_FAILED
-        assert found.worn_volume.shape == (3,)
-        assert np.isnan(found.worn_volume).all()
-        assert np.isnan(found.last_cycle)

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from solver.accuracy.error_estimate import NOTHING
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
@@ -14,6 +13,7 @@ from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
 from solver.wear.state import WearState
 from solver.wear.wearing_joint import WearingJoint
+from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, march_wear, scene
 
 OMEGA = 2 * np.pi * 160.0
@@ -51,10 +51,22 @@ def march(
 def begun(wear: float = WEAR) -> tuple[WearingJoint, WearState]:
     """The wearing slider and its unworn state."""
     model, start = slider_start(COARSE)
-    assert start.state is not None
     case = build_case(model, FRICTION, start.penalty_omega, COARSE, start.resolution)
-    work = WearingJoint.of(case, start.state, wear)
-    return work, work.begin(start.state, start.resolution, NOTHING, accurate=True)
+    work = WearingJoint(case, start, wear)
+    return work, work.begin()
+
+
+def exact_depths_of_motion(cycles: FloatArray, wear: float = WEAR) -> FloatArray:
+    """Depths (n,), m, for the exact motion, by Den Hartog."""
+    return slider_wear_depth(
+        cycles,
+        wear_coefficient=wear,
+        area=AREA,
+        friction_coefficient=FRICTION,
+        normal_load=10.0,
+        normal_stiffness=1e5,
+        amplitude=lambda limit: slider_amplitude(0.1, 0.0, 1.6e5, FORCE, limit, OMEGA),
+    )
 
 
 @lru_cache

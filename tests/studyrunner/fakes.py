@@ -74,7 +74,7 @@ def fake_history(task: History, facts: SceneFacts = FACTS, seconds: float = 0.0,
         if ASKED[name].flags:
             values[name] = values[name] >= 0.0
         values[name] = values[name].astype(ASKED[name].dtype)
-    totals = dict.fromkeys(("outcome", "final_method", "branch"), 0)
+    totals = dict.fromkeys(("outcome", "branch"), 0)
     totals |= dict.fromkeys(("jump_cycle", "cycles_to_target", "cycles_to_target_error", "fold_frequency"), np.nan)
     totals |= {"step_limit": np.inf, "last_cycle": task.cycles[-1], "newton_iterations": round(fingerprint)}
     totals |= {"run_time": pause, "error_estimate": 0.01, "largest_wear_depth": 1e-6, "message": ""}

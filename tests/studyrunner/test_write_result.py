@@ -73,7 +73,7 @@ CONTRACT = {
         (("cycle",), "1", "residual penetration tension cone_violation energy_error response_error wear_rate_error"),
         (("cycle",), "1", "worn_volume_error harmonics_used samples_used stable"),
         ((), "1", "cycles_to_target cycles_to_target_error"),
-        ((), "1", "outcome jump_cycle final_method newton_iterations error_estimate branch"),
+        ((), "1", "outcome jump_cycle newton_iterations error_estimate branch"),
         ((), "1", "last_cycle step_limit message"),
         ((), "s", "run_time"),
         ((), "Hz", "fold_frequency"),

@@ -259,10 +259,9 @@ def draw_deciding_input(result: Result, statistics: xr.Dataset) -> Drawn:
     shown, left_out = _choose(result, last)
     scale = scale_for("m3", result.worn)
     figure, panels = _panel_grid(shown, 3.0)
-    highest, groups = 0.0, []
-    for panel, (point, label, found) in zip(panels.flat, shown, strict=True):
+    highest = 0.0
+    for panel, (point, _, found) in zip(panels.flat, shown, strict=True):
         highest = max(highest, _draw_dots(panel, result, point, found, scale))
-        groups += [_tell_groups(found, label, scale)]
         panel.set_ylabel(scale.label(f"worn volume {result.when(-1)}"))
     for row in range(len(panels)):
         label_outer(panels[row : row + 1])
@@ -272,7 +271,6 @@ def draw_deciding_input(result: Result, statistics: xr.Dataset) -> Drawn:
     return figure, as_sentences(
         *(unknown or ["Over the input that decides most of it alone"]),
         "Bars: numerical error of the sample" if np.isfinite(result.errors).any() else "",
-        *groups,
         "Crosses: samples that ended early, at what was worn by then" if (result.held & ~result.computed).any() else "",
         left_out,
     )
@@ -315,14 +313,3 @@ def _draw_dots(panel: Axes, result: Result, point: Point, found: xr.Dataset, sca
     panel.set_xlabel(across.label(words))
     largest = float(np.nanmax(worn, initial=0.0))
     return min(largest + float(np.max(wrong[told], initial=0.0)), 1.5 * largest)
-
-
-def _tell_groups(point: xr.Dataset, label: str, scale: Scale) -> str:
-    """Where samples fall into two groups: how many are in each, and the pair that tells them apart."""
-    n_lower, n_upper = (int(number) for number in point["group_size"].values)
-    if not n_upper:
-        return ""
-    lower, upper = (scale.show(float(end)) for end in point["group_gap"].values)
-    where, contact = f" at {label}" if label else "", int(point["deciding_contact"])
-    text = f"Two groups{where}: {count(n_lower, 'sample')} up to {lower}, {n_upper} from {upper}"
-    return text if contact < 0 else f"{text}; the wear depth of pair {contact} tells them apart"

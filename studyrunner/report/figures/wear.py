@@ -25,7 +25,7 @@ from studyrunner.report.panels import (
 )
 from studyrunner.report.selection import Choice, Course, cell_edges, choose, find_course, labelled, slow_time
 from studyrunner.result.certainty import show_error
-from studyrunner.result.units import Scale, scale_for, show_cycles, show_number
+from studyrunner.result.units import Scale, scale_for, show_number
 from studyrunner.result.view import NO_VOLUME, Result, as_sentences
 from studyrunner.system.progress import count
 
@@ -78,7 +78,6 @@ def draw_history(result: Result) -> Drawn:
     return figure, as_sentences(
         f"Worn {when}: {', '.join(ends)}" if wears else "Nothing is worn at the counts kept",
         _BANDS if result.has("worn_volume_error") and wears else "",
-        _tell_early(result, shown),
         choice.sentence,
     )
 
@@ -99,16 +98,6 @@ def _mark_events(
     if result.has("exact_worn_volume"):
         exact = result.at("exact_worn_volume", point).values
         panel.plot(cycles(counts), scale(exact), color="0.5", linewidth=4, alpha=0.4, zorder=1, label="exact")
-
-
-def _tell_early(result: Result, point: Mapping[str, int]) -> str:
-    """Where and how the history of a point ended early; empty where it did not."""
-    place = tuple(point[name] for name in result.axes)
-    if result.computed[place] or not result.held[place]:
-        return ""
-    ending = result.endings[int(result.dataset["outcome"].values[place])]
-    last = show_cycles(float(result.last_cycle[place]), result.counted)
-    return f"Ended early, at {last}: {ending.word.replace('_', ' ')}"
 
 
 def _tell_error(result: Result, point: Mapping[str, int]) -> str:

@@ -70,7 +70,7 @@ def test_a_result_of_version_0_4_is_opened_and_reported(tmp_path):
     """It holds fewer variables, and its outcomes have no sentences."""
     made = build_file(loops=(0, 1), failed=(3,))
     since = ("last_cycle", "error_estimate", "worn_volume_error", "largest_wear_depth", "wear_depth_error", "message")
-    since += ("final_method", "response_error", "wear_rate_error", "cycles_to_target", "cycles_to_target_error")
+    since += ("response_error", "wear_rate_error", "cycles_to_target", "cycles_to_target_error")
     old = made.drop_vars([name for name in since if name in made])
     words = made["outcome"].attrs["flag_meanings"].split()[:14]
     old["outcome"].attrs = {"flag_values": np.arange(14, dtype=np.int8), "flag_meanings": " ".join(words)}

@@ -6,8 +6,8 @@ import pytest
 from solver.accuracy.certificate import Certificate
 from solver.results.state_report import StateReport
 from solver.settings import Resolution, WearTarget
-from solver.wear import output as output_module
-from solver.wear.output import CERTIFIED, INTERPOLATED, DenseOutput
+from solver.wear import course as course_module
+from solver.wear.course import CERTIFIED, INTERPOLATED, Course
 
 AREA = np.array([1.0, 3.0])
 LOOP = np.ones((1, 128, 3))
@@ -31,11 +31,12 @@ def report(depth, value, resolution=RESOLUTIONS[0], **more):
 
 def taken(counts, smooth=False, n_steps=3, **more):
     """Steps of 10 cycles; the first pair wears as t^2, the second one nothing."""
-    output = DenseOutput(AREA, smooth, np.array(counts or (), float), **more)
+    course = Course(AREA, smooth, np.array(counts or (), float), **more)
     for n in range(n_steps + 1):
         at = 10.0 * n
-        output.add(at, report([at**2, 0.0], float(n), RESOLUTIONS[n // 2 % 2]), np.array([2.0 * at, 0.0]), 0.5)
-    return output
+        state = report([at**2, 0.0], float(n), RESOLUTIONS[n // 2 % 2])
+        course = course.after(at, state, np.array([2.0 * at, 0.0]), 0.5)
+    return course
 
 
 def test_between_the_ends_of_a_given_step_all_is_linear():
@@ -43,9 +44,8 @@ def test_between_the_ends_of_a_given_step_all_is_linear():
     assert found["wear_depth"][:, 0] == pytest.approx([0.0, 40.0, 100.0, 650.0])
     assert found["wear_rate"] == pytest.approx([0.0, 8.0, 20.0, 50.0])
     for name in INTERPOLATED:
-        if name != "wear_depth":
-            values = np.abs(found[name].reshape(4, -1))
-            assert values == pytest.approx(np.repeat([[0.0], [0.4], [1.0], [2.5]], values.shape[1], axis=1)), name
+        values = np.abs(found[name].reshape(4, -1))
+        assert values == pytest.approx(np.repeat([[0.0], [0.4], [1.0], [2.5]], values.shape[1], axis=1)), name
 
 
 def test_what_holds_at_both_ends_of_a_step_holds_between():
@@ -70,67 +70,68 @@ def test_within_an_adaptive_step_the_depth_is_a_cubic_and_all_else_linear_in_the
 
 
 def test_a_cubic_never_falls_however_steep_its_ends_are():
-    output = DenseOutput(AREA, smooth=True)
-    output.add(0.0, report([0.0, 0.0], 0.0), np.array([100.0, 0.0]), 0.0)
-    output.add(10.0, report([1.0, 1.0], 1.0), np.array([0.0, 100.0]), 0.0)
-    depth = output.read(np.linspace(0.0, 10.0, 101))["wear_depth"]
+    course = Course(AREA, smooth=True).after(0.0, report([0.0, 0.0], 0.0), np.array([100.0, 0.0]), 0.0)
+    course = course.after(10.0, report([1.0, 1.0], 1.0), np.array([0.0, 100.0]), 0.0)
+    depth = course.read(np.linspace(0.0, 10.0, 101))["wear_depth"]
     assert (np.diff(depth, axis=0) >= 0.0).all()
     assert depth[-1].tolist() == [1.0, 1.0]
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-@pytest.mark.parametrize(("quantity", "wanted"), [("wear_depth", 500.0), ("worn_volume", 500.0)])
-def test_a_target_is_found_within_the_step_that_reaches_it(quantity, wanted, smooth):
-    output = taken(None, smooth, target=WearTarget(quantity, wanted))
-    assert output.reached_target
+@pytest.mark.parametrize("quantity", ["wear_depth", "worn_volume"])
+def test_a_target_is_found_within_the_step_that_reaches_it(quantity, smooth):
     exact = np.sqrt(500.0) if smooth else 20.0 + 10.0 * (500.0 - 400.0) / 500.0
-    assert output.taken.reached == pytest.approx(exact, rel=1e-9)
     # later steps do not move it
-    assert taken(None, smooth, 6, target=WearTarget(quantity, wanted)).taken.reached == output.taken.reached
+    for n_steps in (3, 6):
+        course = taken(None, smooth, n_steps, target=WearTarget(quantity, 500.0))
+        assert course.reached == pytest.approx(exact, rel=1e-9)
     assert not taken(None, smooth, target=WearTarget(quantity, 1e4)).reached_target
 
 
+def shifting(resonances, wanted):
+    """A course of steps of 10 cycles, in each of which every pair wears by 1."""
+    course = Course(AREA, smooth=False, target=WearTarget("frequency_shift", wanted))
+    for n, resonance in enumerate(resonances):
+        course = course.after(10.0 * n, report([n, n], 0.0, resonance=resonance), np.ones(2), 0.0)
+    return course
+
+
 def test_a_shift_of_the_resonance_is_found_as_a_function_of_the_worn_volume():
-    output = DenseOutput(AREA, smooth=False, target=WearTarget("frequency_shift", 0.02))
-    for n, resonance in enumerate((100.0, 101.0, 97.0)):
-        output.add(10.0 * n, report([n, n], 0.0, resonance=resonance), np.ones(2), 0.0)
     # by 1 % up, then by 3 % down
-    assert output.taken.reached == pytest.approx(17.5)
-    assert output.taken.reached_within == 0.0
+    course = shifting((100.0, 101.0, 97.0), 0.02)
+    assert (course.reached, course.reached_within) == (pytest.approx(17.5), 0.0)
     # a parabola through the end before and both ends of the step
-    output = DenseOutput(AREA, smooth=False, target=WearTarget("frequency_shift", 0.06))
-    for n in range(4):
-        output.add(10.0 * n, report([n, n], 0.0, resonance=100.0 + 10.0 * (n / 3.0) ** 0.5), np.ones(2), 0.0)
-    ends = [0.0, 10.0, 20.0]
-    shifts = [0.1 * (end / 30.0) ** 0.5 for end in ends]
-    assert output.taken.reached == pytest.approx(np.polyval(np.polyfit(shifts, ends, 2), 0.06))
-    assert output.taken.reached_within == pytest.approx(np.interp(0.06, shifts, ends) - output.taken.reached)
+    ends = np.array([0.0, 10.0, 20.0, 30.0])
+    shifts = 0.1 * (ends / 30.0) ** 0.5
+    course = shifting(100.0 * (1.0 + shifts), 0.06)
+    assert course.reached == pytest.approx(np.polyval(np.polyfit(shifts[:3], ends[:3], 2), 0.06))
+    assert course.reached_within == pytest.approx(np.interp(0.06, shifts, ends) - course.reached)
 
 
 def test_even_counts_are_as_far_from_each_other_in_volume_and_cycles_together():
     for smooth in (False, True):
-        output = taken(None, smooth)
-        counts = output.even_counts(7)
+        course = taken(None, smooth)
+        counts = course.even_counts(7)
         assert counts[0] == 0.0
         assert counts[-1] == 30.0
-        volumes = output.read(counts)["wear_depth"] @ AREA
+        volumes = course.read(counts)["wear_depth"] @ AREA
         assert np.diff(counts / 30.0 + volumes / volumes[-1]) == pytest.approx(np.full(6, 2.0 / 6.0), rel=1e-9)
     to_target = taken(None, target=WearTarget("wear_depth", 500.0))
-    assert to_target.even_counts(3)[-1] == to_target.taken.reached < 30.0
+    assert to_target.even_counts(3)[-1] == to_target.reached < 30.0
     assert taken(None, n_steps=0).even_counts(3).tolist() == [0.0, 0.0, 0.0]
 
 
 def test_of_many_steps_those_that_go_far_and_those_that_are_read_are_kept(monkeypatch):
     asked = [5.0, 15.0, 1005.0]
     whole = taken(None, n_steps=200)
-    monkeypatch.setattr(output_module, "KEPT_STEPS", 20)
-    output = taken(asked, n_steps=200)
-    assert len(output.taken.nodes) <= 26
-    assert [output.taken.nodes[place].cycle for place in (0, -1)] == [0.0, 2000.0]
-    assert output.taken.course.ends == tuple(np.arange(201) * 10.0)
+    monkeypatch.setattr(course_module, "KEPT_STEPS", 20)
+    course = taken(asked, n_steps=200)
+    assert len(course.nodes) <= 26
+    assert course.cycles[[0, -1]].tolist() == [0.0, 2000.0]
+    assert course.ends == tuple(np.arange(201) * 10.0)
     counts = np.linspace(0.0, 2000.0, 11)
-    one, other = (each.read(counts)["wear_depth"] for each in (output, whole))
+    one, other = (each.read(counts)["wear_depth"] for each in (course, whole))
     assert np.abs(one - other).max() < 0.02 * other.max()
-    one, other = (each.read(np.array(asked)) for each in (output, whole))
+    one, other = (each.read(np.array(asked)) for each in (course, whole))
     for name, values in one.items():
         assert np.array_equal(values, other[name]), name
