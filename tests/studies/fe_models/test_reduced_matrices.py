@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from solver import build_model
 from studies.fe_models.from_files.model import find_files, load_model
@@ -130,3 +131,22 @@ def test_a_scene_file_and_a_model_in_python_are_the_same(tmp_path):
     ):
         with pytest.raises(ValueError, match=sentence):
             build_model(given["mass"], given["damping"], wrong, *place, **more)
+
+
+def test_masses_in_a_plane(tmp_path):
+    """A lumped model without cyclic symmetry: two directions, and a force that closes the pair."""
+    table = "node,x,y,z,sets,area,normal_x,normal_y,normal_z\n1,0,0,0,A,1e-4,0,1,0\n2,0,0,0,B,,,,\n3,0,1,0,TIP,,,,\n"
+    (tmp_path / "nodes.csv").write_text(table)
+    rows = np.array([[node, dof] for node in (1, 2, 3) for dof in (1, 2)])
+    stiffness, mass = np.diag([1e6, 2e6, 3e6, 4e6, 5e6, 6e6]), np.diag([1.0, 1.0, 1.0, 1.0, 2.0, 2.0])
+    stiffness[[2, 4, 3, 5], [4, 2, 5, 3]] = -1e6
+    named = {"stiffness": stiffness, "mass": mass, "load": np.array([0.0, 50.0, 0.0, -50.0, 0.0, 0.0])}
+    REDUCED["market"](tmp_path, named, rows)
+    changes = {"contact": [["A", "B"]], "next_sector": False, "n_sectors": None, "axis": None, "nodal_diameter": 0}
+    tip = {"set": "TIP", "direction": [1, 0, 0]}
+    model = model_of(tmp_path, **changes, load=tip, response={"tip": tip}, recovery=None)
+    assert model.contact.dofs.tolist() == [[0, 1, -1]]
+    linear = model.linear[0]
+    np.testing.assert_allclose(linear.load_static, [50.0, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-9)
+    found, expected = (eigh(*each, eigvals_only=True) for each in ((linear.stiffness, linear.mass), (stiffness, mass)))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
