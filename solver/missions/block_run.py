@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from solver.accuracy.options import ACCURACY
+from solver.accuracy.history_error import HISTORY_SAFETY
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import SMOOTH_CHANGE
@@ -16,6 +16,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
+from solver.loading_history.path_of_states import KEPT_NODES
 from solver.loading_history.start_states import follow_line
 from solver.loading_history.sweep_start import Direction
 from solver.missions.blocks import Block, Mission
@@ -23,9 +24,9 @@ from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import in_rows, packable
-from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
+from solver.results.verdict import first_cut_off
 from solver.settings import Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
@@ -196,7 +197,7 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         # the flow of the linearised wear rate
         slope = np.asarray(scipy.linalg.expm(cycles * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
-    by_steps = ACCURACY.history_safety * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
+    by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
     found = BlockRun(
         growth=depth[-1],
         response=values["response"],
@@ -301,7 +302,7 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, every_node: i
         here, parameter = states[-1], ahead[0]
         after = coarse.solve(states, parameter, run if parameter == target else run.to(coarse.node_tolerance))
         if after is not None and coarse.change(here, after, float(every_node)) <= LARGEST_CHANGE:
-            states = (here, after)
+            states = (*states, after)[-KEPT_NODES:]
             ahead.pop(0)
         elif (halvings := halvings + 1) > MOST_HALVINGS:
             return None
