@@ -5,32 +5,30 @@ import numpy as np
 from solver.model import ContactInterface, LinearModel, ReducedModel
 
 N = 6
-MASS = np.array([0.5, 0.02, 0.02, 0.02, 0.02])  # kg
-LOSS, OMEGA, COUPLING, INCLINED = 2e-3, 1200.0, 2e5, np.radians(30.0)
-OVERLAP = 2e-5  # m, of neighbouring shrouds before they are put together
-GROUND, BLADE, SHROUD = 2e6, 3e4, (4e6, 1e6)  # N/m
-DISK, LEFT, RIGHT = 0, slice(1, 3), slice(3, 5)  # displacements: of the disk around; of each end around and along the axis
+MASS = np.array([0.5, 0.04, 0.04, 0.005, 0.005, 0.005, 0.005])  # kg
+LOSS, OMEGA, COUPLING, INCLINED = 2e-3, 1200.0, 2e5, np.radians(75.0)
+OVERLAP = 4e-5  # m, of neighbouring shrouds before they are put together
+GROUND, BLADE, SHROUD = 2e6, 4e4, (1e6, 4e5)  # N/m
+# displacements of the disk around the axis; of the tip of the blade and of both ends of its shroud around and along it
+DISK, TIP, LEFT, RIGHT = 0, slice(1, 3), slice(3, 5), slice(5, 7)
 
 
 def sector() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass and stiffness (5, 5) of a sector alone, and its unit load (5,).
+    """Mass and stiffness (7, 7) of a sector alone, and its unit load (7,).
 
-    A disk moves around the axis. A blade, bent in one inclined direction and stiff in the other, carries both ends of a
-    shroud, which springs join.
+    A disk moves around the axis. A blade, bent in one inclined direction and stiff in the other, carries a shroud.
     """
-    stiffness = np.zeros((5, 5))
-    stiffness[DISK, DISK] = GROUND
     along = np.array([np.cos(INCLINED), np.sin(INCLINED)])
     bent = BLADE * np.outer(along, along) + 40.0 * BLADE * (np.eye(2) - np.outer(along, along))
-    foot = np.array([[1.0], [0.0]])
+    stiffness, load = np.zeros((7, 7)), np.zeros(7)
+    stiffness[DISK, DISK], load[TIP] = GROUND, along
+    foot = np.zeros((2, 7))
+    foot[:, TIP], foot[0, DISK] = np.eye(2), -1.0
+    stiffness += foot.T @ bent @ foot
     for end in (LEFT, RIGHT):
-        to_disk = np.zeros((2, 5))
-        to_disk[:, end], to_disk[:, :1] = np.eye(2), -foot
-        stiffness += to_disk.T @ bent @ to_disk
-    between = np.zeros((2, 5))
-    between[:, LEFT], between[:, RIGHT] = -np.eye(2), np.eye(2)
-    stiffness += between.T @ np.diag(SHROUD) @ between
-    load = np.concatenate([[0.0], 0.5 * along, 0.5 * along])
+        arm = np.zeros((2, 7))
+        arm[:, TIP], arm[:, end] = -np.eye(2), np.eye(2)
+        stiffness += arm.T @ np.diag(SHROUD) @ arm
     return np.diag(MASS), stiffness, load
 
 
@@ -41,9 +39,9 @@ def contacts(n: int) -> ContactInterface:
     return ContactInterface(pairs, np.full(n, 1e-5), np.full(n, -OVERLAP), np.zeros(n), nowhere, n * ("shroud",))
 
 
-def structure(mass: np.ndarray, stiffness: np.ndarray, load: np.ndarray, tips: np.ndarray, own: np.ndarray) -> LinearModel:
-    """The structure in other displacements, of which `own` gives the old ones. load, tips: the latter in rows."""
-    mass, stiffness = (own.conj().T @ each @ own for each in (mass, stiffness))
+def structure(forms: tuple[np.ndarray, np.ndarray], load: np.ndarray, tips: np.ndarray, own: np.ndarray) -> LinearModel:
+    """The structure in other displacements, of which `own` gives the old ones. forms: mass and stiffness."""
+    mass, stiffness = (own.conj().T @ form @ own for form in forms)
     return LinearModel(mass, LOSS / OMEGA * stiffness, stiffness, np.zeros(len(mass)), own.conj().T @ load, tips @ own)
 
 
@@ -52,28 +50,28 @@ def one_sector(diameter: int) -> ReducedModel:
     mass, stiffness, load = sector()
     structures = {}
     for k in range(N // 2 + 1):
-        own = np.eye(5, dtype=complex)
+        own = np.eye(7, dtype=complex)
         own[RIGHT, LEFT] = np.exp(2j * np.pi * k / N) * np.eye(2)
         whole = stiffness.astype(complex)
         whole[DISK, DISK] += 2.0 * COUPLING * (1.0 - np.cos(2.0 * np.pi * k / N))
         excited = load if k == min(diameter, N - diameter) else 0.0 * load
-        structures[k] = structure(mass, whole, excited, load[None], own[:, [3, 4, 0, 1, 2]])
+        structures[k] = structure((mass, whole), excited, load[None], own[:, [5, 6, 0, 1, 2, 3, 4]])
     return ReducedModel(structures, contacts(1), ("tip",), N, diameter)
 
 
 def whole_ring(diameter: int) -> ReducedModel:
     """All sectors and contacts; the right ends by their displacements relative to the left ends of the next sectors."""
     mass, stiffness, load = sector()
-    whole, own = np.kron(np.eye(N), stiffness), np.eye(5 * N)
+    whole, own = np.kron(np.eye(N), stiffness), np.eye(7 * N)
     for j in range(N):
         after = (j + 1) % N
-        disks = np.zeros(5 * N)
-        disks[5 * j], disks[5 * after] = 1.0, -1.0
+        disks = np.zeros(7 * N)
+        disks[7 * j], disks[7 * after] = 1.0, -1.0
         whole += COUPLING * np.outer(disks, disks)
-        own[5 * j + 3 : 5 * j + 5, 5 * after + 1 : 5 * after + 3] = np.eye(2)
-    relative = (5 * np.arange(N)[:, None] + [3, 4]).ravel()
-    others = np.setdiff1d(np.arange(5 * N), relative)
+        own[7 * j + 5 : 7 * j + 7, 7 * after + 3 : 7 * after + 5] = np.eye(2)
+    relative = (7 * np.arange(N)[:, None] + [5, 6]).ravel()
+    others = np.setdiff1d(np.arange(7 * N), relative)
     loads = np.kron(np.exp(2j * np.pi * diameter * np.arange(N) / N), load)
     tips = np.kron(np.eye(N), load)
-    linear = structure(np.kron(np.eye(N), mass), whole, loads, tips, own[:, np.concatenate([relative, others])])
+    linear = structure((np.kron(np.eye(N), mass), whole), loads, tips, own[:, np.concatenate([relative, others])])
     return ReducedModel({0: linear}, contacts(N), tuple(f"tip{j}" for j in range(N)))
