@@ -8,8 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from solver.accuracy.options import ACCURACY
 from solver.model import ComplexArray, FloatArray
+
+HISTORY_SAFETY = 1.5
+"""Error of a history over its difference to the reference solution. Dovetail, 16 and 48 pairs, all schemes, steps of
+250 to 2000 cycles: 0.02 to 1.4, in the median 0.3."""
+
+PAIR_OVER_VOLUME = 2.0
+"""Relative error of the depth of a pair over that of the worn volume, at least, where four or more pairs wear. With 1
+the deepest pairs of the dovetail at mu = 0.3 are outside of their errors by 2.7 times, and explicit steps at 212.5 Hz,
+48 pairs, by 3.2 times."""
+
+CROSSING_WINDOW = 0.5
+"""Fraction of the cycle count from which on the largest difference is the error: histories in which an event happens at
+different counts cross each other (dovetail, 211.25 Hz, steps of 2000 cycles: without it the estimate at the crossing is
+a quarter of the true error). Later differences are not used: an error does not depend on the length of the study."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +74,7 @@ def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
     area
         (n_contact,), m2.
     """
-    counts, fine, safety = outputs.counts, outputs.fine, ACCURACY.history_safety
+    counts, fine, safety = outputs.counts, outputs.fine, HISTORY_SAFETY
 
     def crossing(differences: FloatArray) -> FloatArray:
         return safety * largest_before(steps.counts, differences, counts)
@@ -81,7 +94,7 @@ def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
     relative[~reached] = np.nan
     # no pair is known better than the volume: one that agrees with the reference solution does so by chance. Without
     # this 5 and 7 of 24 deep pairs of the dovetail at 211.25 and 211.375 Hz are outside of their errors, by seven times
-    of_pair = np.minimum(ACCURACY.pair_over_volume, np.sqrt(_pairs_that_count(depth * area))) * relative
+    of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(_pairs_that_count(depth * area))) * relative
     with np.errstate(invalid="ignore"):
         of_pairs = np.fmax(np.fmax(difference, crossing(apart)), np.where(depth > 0.0, of_pair[:, None] * depth, 0.0))
     of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
@@ -138,10 +151,7 @@ def _frequency_error(both: Both, safety: float, known: FloatArray | float) -> Fl
 
 
 def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
-    """Largest difference (n_output, ...) from `crossing_window` times each count up to this count; 0 if none.
-
-    Two histories in which an event happens at different counts cross each other. At the crossing their difference is
-    small and is no measure of the error.
+    """Largest difference (n_output, ...) from `CROSSING_WINDOW` times each count up to this count; 0 if none.
 
     cycles (n,): ascending counts at which both were compared.
     differences (n, ...): of any quantity; NaN beyond the end of the reference solution.
@@ -149,7 +159,7 @@ def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArr
     """
     known = np.isfinite(differences).all(axis=tuple(range(1, differences.ndim)))
     at, differences = cycles[known], differences[known]
-    first = np.searchsorted(at, ACCURACY.crossing_window * counts, "left")
+    first = np.searchsorted(at, CROSSING_WINDOW * counts, "left")
     last = np.searchsorted(at, counts, "right")
     return np.array([differences[one:other].max(axis=0, initial=0.0) for one, other in zip(first, last, strict=True)])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from solver.accuracy.options import ACCURACY
+from solver.accuracy.history_error import HISTORY_SAFETY
 from solver.model import FloatArray
 from solver.settings import Quantity
 
@@ -25,7 +25,7 @@ def target_error(at: float, reference: float, wear_error: float, rate: float) ->
     """
     by_wear = 0.0 if wear_error == 0.0 else wear_error / rate if rate > 0.0 else math.inf
     apart = abs(reference - at)
-    return max(by_wear, ACCURACY.history_safety * apart if math.isfinite(apart) else 0.0)
+    return max(by_wear, HISTORY_SAFETY * apart if math.isfinite(apart) else 0.0)
 
 
 def error_of_wear(quantity: Quantity, depth: FloatArray, depth_error: FloatArray, volume_error: float) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from solver.accuracy.options import ACCURACY
+from solver.accuracy.history_error import HISTORY_SAFETY
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
 from solver.continuation.natural import SMOOTH_CHANGE
@@ -24,9 +24,9 @@ from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import in_rows, packable
-from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
+from solver.results.verdict import first_cut_off
 from solver.settings import Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
@@ -197,7 +197,7 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         # the flow of the linearised wear rate
         slope = np.asarray(scipy.linalg.expm(cycles * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
-    by_steps = ACCURACY.history_safety * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
+    by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
     found = BlockRun(
         growth=depth[-1],
         response=values["response"],

@@ -20,8 +20,7 @@ from solver.missions.result import MissionHistory
 from solver.model import FloatArray
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, unpack
-from solver.results.cut_off import describe_cut_off
-from solver.results.verdict import describe_uncertain
+from solver.results.verdict import describe_cut_off, describe_uncertain
 
 ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
 """Outcomes of a reference solution that are those of the history."""

@@ -80,7 +80,7 @@ class WearHistory(PresentedHistory):
     - response (n_output, n_response): complex first harmonic, m.
     - response_mean, response_peak (n_output, n_response): mean and largest magnitude over a period, m.
     - loop_displacement, loop_force (n_output, n_loops, n_phase, 3): m and N, fretting loops of the chosen pairs, see
-      `solver.results.loops.contact_loops`.
+      `solver.results.state_report.contact_loops`.
     - excitation_frequency, excitation_frequency_error (n_output,): frequency of the excitation and its estimated error,
       Hz; the error of a given frequency is 0.
     - worn_volume_error (n_output,): estimated relative error of the worn volume by steps and their propagation,

@@ -15,11 +15,13 @@ from solver.harmonic_balance.state import State
 from solver.model import ComplexArray, FloatArray
 from solver.packing import packable
 from solver.results.history import PeriodicState
-from solver.results.loops import contact_loops
 from solver.settings import Resolution
 from solver.structure.condensation import relative_indices, whole_motion
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Joint
+
+LOOP_PHASES = 128
+"""Number of phases of a loop, equally spaced over a period from 0 on, whatever the number of samples of a state is."""
 
 
 def periodic_state(joint: Joint, point: State) -> PeriodicState:
@@ -135,3 +137,39 @@ def largest_distance(state_t: FloatArray) -> FloatArray:
                 largest[pair] = max(largest[pair], first * first + second * second)
         largest[pair] = np.sqrt(largest[pair])
     return largest
+
+
+def loop_phases() -> FloatArray:
+    """Phases (LOOP_PHASES,), rad, from 0 without 2 pi."""
+    return 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES
+
+
+def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+    """Relative displacement, m, and contact force, N, of chosen pairs of a state, both (n_pairs, LOOP_PHASES, 3).
+
+    Force: the values of the contact law in time, linearly interpolated between the samples of the state: a Fourier
+    series would overshoot at corners and at jumps. Displacement: the series of the state, which is exact at any phase;
+    a pair with a sliding mass moves with harmonics beyond the series, which follow from the integration through the
+    period.
+
+    Components: normal, first and second tangent; closing and compression are positive. Along a direction in which a
+    pair has no displacement, displacement and force are 0, but for a constant normal load.
+    """
+    chosen = list(pairs)
+    displacement = evaluation.displacement_h[chosen] @ joint.basis.at(loop_phases())
+    displacement[:, 1:] += at_phases(joint.law.beyond_series(evaluation, evaluation.displacement_h)[chosen], 0.5)
+    displacement *= (joint.contact.dofs[chosen] >= 0)[:, :, None]
+    force = at_phases(evaluation.force_t[chosen], 0.0)
+    return displacement.transpose(0, 2, 1), force.transpose(0, 2, 1)
+
+
+def at_phases(values_t: FloatArray, lead: float) -> FloatArray:
+    """Values (..., LOOP_PHASES) at the phases of a loop, by linear interpolation of periodic samples (..., N).
+
+    lead: 0 where the first sample is at phase 0, 0.5 where the first sample is half a step before.
+    The positions of the phases are whole numbers: a phase of a sample gives this sample to the last bit.
+    """
+    n_samples = values_t.shape[-1]
+    whole, rest = np.divmod(2 * n_samples * np.arange(LOOP_PHASES) + round(2 * lead) * LOOP_PHASES, 2 * LOOP_PHASES)
+    before, after = values_t[..., whole % n_samples], values_t[..., (whole + 1) % n_samples]
+    return np.asarray(before + rest / (2 * LOOP_PHASES) * (after - before))

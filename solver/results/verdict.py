@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
-from solver.model import IntArray
+import numpy as np
+
+from solver.model import ContactInterface, FloatArray, IntArray
 from solver.outcome import SENSITIVE_ERROR, Outcome, in_digits, known_to
-from solver.results.cut_off import describe_cut_off
 from solver.results.history import WearHistory
+from solver.settings import NEGLIGIBLE
 
 HELD_FORCE = 1e-5
 """Fraction of the friction of all pairs that a hold of the mean position takes up at most. Motion and wear change by
@@ -74,3 +76,21 @@ def describe_hold(cycle: float) -> str:
         f"from cycle {in_digits(cycle)} on every pair slips and only friction holds the joint in one direction: its"
         f" mean position is held there, by at most {HELD_FORCE:g} of the friction"
     )
+
+
+def first_cut_off(contact: ContactInterface, cycles: FloatArray, pressure: FloatArray, depth: FloatArray) -> float:
+    """First count at which a pair at an edge of the modelled contact carries load or has worn, NaN if never.
+
+    cycles (n_output,). pressure, depth (n_output, n_contact): Pa and m, NaN at counts without a state.
+    """
+    if contact.edge is None or not contact.edge.any():
+        return math.nan
+    reached = [values[:, contact.edge].max(axis=1) > NEGLIGIBLE * values.max(axis=1) for values in (pressure, depth)]
+    found = np.flatnonzero(np.logical_or(*reached))
+    return float(cycles[found[0]]) if found.size else math.nan
+
+
+def describe_cut_off(cycle: float) -> str:
+    """Sentence with the first count of a cut off contact."""
+    when = f"at cycle {in_digits(cycle)}" + (" already" if cycle else "")
+    return f"pairs at the edge of the modelled contact carry load or have worn {when}"

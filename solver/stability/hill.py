@@ -28,6 +28,9 @@ from solver.structure.condensation import relative_indices
 from solver.structure.fourier import build_basis, derivative
 from solver.structure.joint import Joint
 
+# Real part over omega from which an exponent is infinite, that of a displacement without mass made finite by round-off:
+# in random scenes from 8e10 on, those of the joint -88 to 0.
+_INFINITE = 100.0
 _HALF = 0.499  # imaginary part over omega from which a multiplier counts as real and negative
 _SAMPLES = 4096  # of the contact law: impacts change the multipliers by what lies between two samples
 
@@ -87,7 +90,7 @@ def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
 
 def _chosen(exponents: ComplexArray, number: int) -> ComplexArray:
     """Multipliers of the exponents, over omega, with the smallest imaginary parts, each once."""
-    finite = exponents[np.isfinite(exponents) & (np.abs(exponents.imag) <= 1.0 - _HALF)]
+    finite = exponents[(np.abs(exponents.real) < _INFINITE) & (np.abs(exponents.imag) <= 1.0 - _HALF)]
     # both copies of a real and negative multiplier lie at the edge of the strip
     negative = np.abs(finite.imag) >= _HALF
     finite = finite[~negative | (finite.imag > 0.0)]

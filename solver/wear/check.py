@@ -8,9 +8,8 @@ import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, certify
 from solver.accuracy.error_estimate import UNKNOWN
-from solver.accuracy.options import ACCURACY
 from solver.accuracy.period_events import lacks_even, left_out
-from solver.accuracy.refinement import refine
+from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome
@@ -131,7 +130,7 @@ def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
         return now > NEGLIGIBLE
     if now > LEFT_OUT_GROWN * choice.left_out:
         return error * now > settings.rtol * choice.left_out
-    return now < ACCURACY.kept_fraction**2 * choice.left_out
+    return now < KEPT_FRACTION**2 * choice.left_out
 
 
 def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
@@ -160,7 +159,7 @@ def _vibrates_otherwise(state: WearState) -> bool:
     if state.judged_h is None or state.judged_h.shape != state.point.evaluation.predicted_h.shape:
         return True
     before, now = state.judged_h[:, 1:], state.point.evaluation.predicted_h[:, 1:]
-    return float(np.linalg.norm(now - before)) > ACCURACY.vibration_recheck * float(np.linalg.norm(before))
+    return float(np.linalg.norm(now - before)) > VIBRATION_RECHECK * float(np.linalg.norm(before))
 
 
 def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failure | None:

@@ -11,8 +11,7 @@ import numpy as np
 from solver.accuracy.certificate import NOT_CERTIFIED
 from solver.model import FloatArray, IntArray, ReducedModel
 from solver.packing import packable
-from solver.results.loops import LOOP_PHASES
-from solver.results.state_report import StateReport
+from solver.results.state_report import LOOP_PHASES, StateReport
 from solver.settings import Resolution, WearTarget
 from solver.wear.interpolation import TargetSearch, depth_within
 

@@ -12,12 +12,11 @@ import numpy as np
 from solver.accuracy.history_error import Both, HistoryError, error_of_given_steps, history_error
 from solver.accuracy.target_error import error_of_wear, target_error
 from solver.harmonic_balance.state import Failure
-from solver.model import FloatArray, IntArray, ReducedModel
+from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable, unpack
-from solver.results.cut_off import first_cut_off
 from solver.results.history import StartState, WearHistory
-from solver.results.verdict import judge, last_error
+from solver.results.verdict import first_cut_off, judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
 from solver.wear.course import unknown_course
@@ -77,17 +76,13 @@ def integrate_together(
     integrations = _Integrations(case, start, keep, Progress() if resume is None else unpack(resume))
     for each in asked:
         history = _assembled(model, start, each, integrations.of(each))
-        rows = known_rows(history)
+        # the counts that were reached
+        rows = np.flatnonzero(np.isfinite(history.worn_volume))
         history = replace(history, error_estimate=last_error(history, rows, history.last_cycle))
         if history.outcome is Outcome.CONVERGED:
             outcome, message = judge(history, rows, settings.rtol)
             history = replace(history, outcome=outcome, message=message)
         yield history
-
-
-def known_rows(history: WearHistory) -> IntArray:
-    """Indices of the counts that a history has reached."""
-    return np.flatnonzero(np.isfinite(history.worn_volume))
 
 
 @packable

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from solver.results.cut_off import describe_cut_off
 from solver.results.history import WearHistory
-from solver.results.verdict import judge, last_error
+from solver.results.verdict import describe_cut_off, judge, last_error
 from studyrunner.kinds.task import PointResult
 from studyrunner.kinds.wear import History, Integrated
 from studyrunner.percent import describe_reach, show_count

@@ -8,7 +8,7 @@ import pytest
 
 from solver import march_wear
 from solver.outcome import Outcome
-from solver.results.cut_off import describe_cut_off, first_cut_off
+from solver.results.verdict import describe_cut_off, first_cut_off
 from solver.settings import SolverSettings
 from studies import build_scene
 from studies.scenes.closed_forms.hertz import line_half_width, point_radius

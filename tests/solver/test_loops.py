@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.outcome import Outcome
-from solver.results.loops import LOOP_PHASES, at_phases, loop_phases
+from solver.results.state_report import LOOP_PHASES, at_phases, loop_phases
 from solver.settings import Scheme, SolverSettings
 from tests.solver.models import branch_states, march_wear, scene
 

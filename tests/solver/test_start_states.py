@@ -1,4 +1,4 @@
-"""Sweeps against exact motions, and their convergence with samples and harmonics."""
+"""Folds of a sweep against exact motions, and sweeps without a state. States of both branches: `test_accuracy.py`."""
 
 import numpy as np
 import pytest
@@ -8,41 +8,9 @@ from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import SolverSettings
-from tests.references import vibro_impact_orbit
 from tests.solver.models import branch_states, scene
-from tests.solver.reconstruction import full_motion
 
 FINE = SolverSettings(harmonics=21, samples=256)
-TWO_MASSES = ([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2)
-VIBRO_IMPACT = (1.0, 0.05, 1.0, 0.02, 100.0, 0.1)
-
-
-def first_harmonic(model, state, **values):
-    return np.abs(full_motion(scene(model, **values), state).displacement[1])
-
-
-@pytest.mark.slow
-def test_a_sweep_up_stays_on_the_branch_with_impacts():
-    omegas = np.round(np.arange(0.85, 1.501, 0.05), 10)
-    starts = branch_states(scene("vibro_impact"), 0.0, 0.02, omegas, FINE, "up")
-    for omega, start in zip(omegas, starts, strict=True):
-        if omega in (1.05, 1.2, 1.3, 1.4, 1.5):
-            assert start.state is not None
-            expected = abs(vibro_impact_orbit(*VIBRO_IMPACT, omega, sweep_start=0.85).harmonic(0))
-            assert first_harmonic("vibro_impact", start.state)[1] == pytest.approx(expected, rel=0.005, abs=0.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("omega", [1.5])
-def test_a_single_frequency_deep_in_the_bistable_range_knows_its_branch(omega):
-    # both branches exist from 1.0919 to 1.5576 rad/s
-    model = scene("vibro_impact")
-    (rising,), (falling,) = (branch_states(model, 0.0, 0.02, [omega], FINE, sweep) for sweep in ("up", "down"))
-    assert rising.state is not None
-    expected = abs(vibro_impact_orbit(*VIBRO_IMPACT, omega, sweep_start=0.85).harmonic(0))
-    assert first_harmonic("vibro_impact", rising.state)[1] == pytest.approx(expected, rel=0.005, abs=0.0)
-    assert not falling.state.contact_force_h.any()
-    assert rising.branch == falling.branch == 0
 
 
 @pytest.mark.slow

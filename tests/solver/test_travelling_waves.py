@@ -50,20 +50,11 @@ def state(nodal_diameter):
 
 
 @pytest.mark.slow
-def test_every_point_is_marched_to_its_end_or_keeps_what_it_had():
-    for offset, history in zip(OFFSETS, histories(20, 0.5), strict=True):
-        assert history.last_cycle >= 0.0
-        reached = history.cycles <= history.last_cycle
-        assert np.isfinite(history.worn_volume[reached]).all(), f"{offset} Hz"
-        if history.outcome.complete:
-            assert history.last_cycle == CYCLES[-1]
-        assert (np.diff(history.worn_volume[reached]) >= 0.0).all()
-    finished = [history.outcome is Outcome.CONVERGED for history in histories(20, 0.5)]
-    assert finished == [True] * len(OFFSETS)
-
-
-@pytest.mark.slow
-def test_what_wears_does_so_at_the_resonance():
+def test_histories_are_computed_to_their_end_and_wear_at_the_resonance():
+    for history in histories(20, 0.5):
+        assert history.outcome is Outcome.CONVERGED
+        assert history.last_cycle == CYCLES[-1]
+        assert (np.diff(history.worn_volume) >= 0.0).all()
     volumes = [float(history.worn_volume[-1]) for history in histories(20, 0.5)]
     assert 1e-11 < volumes[1] < 1e-8
     assert volumes[2] < 1e-6 * volumes[1]

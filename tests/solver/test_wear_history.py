@@ -7,7 +7,7 @@ import pytest
 
 from solver.outcome import Outcome
 from solver.results.history import StartState
-from solver.results.loops import LOOP_PHASES
+from solver.results.state_report import LOOP_PHASES
 from solver.settings import Scheme, SolverSettings, ToTheEnd, first_resolution
 from tests.solver.models import branch_states, march_wear, random_model, scene
 from tests.solver.worn_slider import (

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.results.loops import LOOP_PHASES
+from solver.results.state_report import LOOP_PHASES
 from studyrunner import variables
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result.arrays import coordinates
