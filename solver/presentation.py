@@ -123,7 +123,7 @@ class Presented:
         rows = [(name, _span(getattr(self, name), _OF_VALUES.get(name, ("", "1"))[1])) for name in self.SHOWN]
         rows.append(("message", next((text for text in messages if text), "none")))
         first = f"{type(self).__name__}: {self.OVER[1]} {_span(points, '')}: {words}"
-        return "\n".join((first, *(f"  {name:<18} {text}" for name, text in rows)))
+        return "\n".join((first, *(f"  {name.replace('_', ' '):<18} {text}" for name, text in rows)))
 
 
 def _new_axes() -> Axes:

@@ -16,14 +16,13 @@ HISTORY_SAFETY = 1.5
 
 PAIR_OVER_VOLUME = 2.0
 """Relative error of the depth of a pair over that of the worn volume, at least, where four or more pairs wear. With 1
-the deepest pairs of the dovetail at mu = 0.3 are outside of their errors by 2.7 times, and explicit steps at 212.5
-Hz, 48 pairs, by 3.2 times."""
+the deepest pairs of the dovetail at mu = 0.3 are outside of their errors by 2.7 times, and explicit steps at 212.5 Hz,
+48 pairs, by 3.2 times."""
 
 CROSSING_WINDOW = 0.5
-"""Fraction of the cycle count. Two histories in which an event happens at different counts cross each other. So the
-error is the largest difference from this fraction of the count on (dovetail, 211.25 Hz, steps of 2000 cycles:
-without it the estimate at the crossing is a quarter of the true error). Later differences are not used: an error
-does not depend on the length of the study."""
+"""Fraction of the cycle count from which on the largest difference is the error: histories in which an event happens at
+different counts cross each other (dovetail, 211.25 Hz, steps of 2000 cycles: without it the estimate at the crossing is
+a quarter of the true error). Later differences are not used: an error does not depend on the length of the study."""
 
 
 @dataclass(frozen=True)
@@ -152,10 +151,7 @@ def _frequency_error(both: Both, safety: float, known: FloatArray | float) -> Fl
 
 
 def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
-    """Largest difference (n_output, ...) from `crossing_window` times each count up to this count; 0 if none.
-
-    Two histories in which an event happens at different counts cross each other. At the crossing their difference is
-    small and is no measure of the error.
+    """Largest difference (n_output, ...) from `CROSSING_WINDOW` times each count up to this count; 0 if none.
 
     cycles (n,): ascending counts at which both were compared.
     differences (n, ...): of any quantity; NaN beyond the end of the reference solution.

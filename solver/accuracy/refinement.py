@@ -103,7 +103,6 @@ def refine(
     point: State,
     run: Run,
     most: float = MOST_UNKNOWNS,
-    usual_work: float = 0.0,
 ) -> Refined:
     """Estimate the error of a state at fixed wear depth; refine the state to an error below rtol in automatic settings.
 
@@ -111,9 +110,8 @@ def refine(
 
     case, point: the state and the case with its harmonics and samples. omega, excitation_amplitude: rad/s, N.
     most: most unknowns of a joint of 48 pairs with more harmonics (`room_for`).
-    usual_work: N m, lower bound of the slip work to which errors are relative, for states with almost no slip.
     """
-    given = ResolvedState(case, case.joint(omega, excitation_amplitude), point, usual_work)
+    given = ResolvedState(case, case.joint(omega, excitation_amplitude), point)
     return _Search(run, run.budget.iterations, most).refined(given.at_rest(run))
 
 

@@ -33,15 +33,11 @@ SMALL_PEAK = 0.01
 
 @dataclass(frozen=True)
 class ResolvedState:
-    """A state with the case and the joint of its solution.
-
-    usual_work: N m, lower bound of the slip work to which an error of the wear rate is relative; 0 for none.
-    """
+    """A state with the case and the joint of its solution."""
 
     case: Case
     joint: Joint
     point: State
-    usual_work: float = 0.0
 
     def solve_at(self, resolution: Resolution, run: Run) -> ResolvedState | None:
         """The state with other harmonics and samples; None where it is not found."""
@@ -141,6 +137,6 @@ class ResolvedState:
         return max(NEGLIGIBLE * float(np.linalg.norm(response)), 1e-300)
 
     def _least_work(self) -> float:
-        """Slip work, N m, below which its error has less weight: by the work of the excitation, or `usual_work`."""
+        """Slip work, N m, below which its error has less weight: a fraction of the work of the excitation."""
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
-        return max(SMALL_WORK * abs(self.joint.structure.input_work(motion)), self.usual_work)
+        return SMALL_WORK * abs(self.joint.structure.input_work(motion))

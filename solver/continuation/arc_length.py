@@ -25,27 +25,22 @@ FIRST_ARC = SMOOTH_CHANGE / 10.0
 
 CORNER_ARC = 1e-3
 """Length of the step behind a corner, and least length after a step. Without such a least length the same branches
-take 46 % more iterations; with ten times the value 8 % more than with several lengths, with this value 5 %."""
+take 46 % more iterations."""
 
 SHORTEST_ARC = CORNER_ARC / 10.0
 """Shortest step: where none of this length converges, the branch has a corner."""
 
 ARC_WANDER = 2.0
 """Distance of a corrector from its start over the length of the step, above which the corrector is given up. Without it
-the branch of `tests/solver/test_natural.py` is left for another one. Four times the length takes 1 % more
-iterations."""
+the branch of `tests/solver/test_natural.py` is left for another one."""
 
 
 @dataclass
 class Arc:
-    """A branch and its arc-length steps in the scaled unknowns (p / size, parameter / span).
+    """A branch and its arc-length steps in scaled unknowns (p / size, parameter / span), with the history of its start.
 
-    The tangential history of the start is constant.
-
-    - balance_at: balance at a value of the parameter for a tangential history (n_contact, 2), m.
-    - start: first state, with its parameter.
-    - span: natural length of the parameter, which scales the arc.
-    - run: tolerance and limits.
+    balance_at: balance at a value of the parameter for a tangential history (n_contact, 2), m.
+    start: first state, with its parameter. span: natural length of the parameter. run: tolerance and limits.
     """
 
     balance_at: BalanceAt
@@ -120,9 +115,8 @@ class Arc:
     def _step_over_corner(self, state: State, tangent: FloatArray) -> State | None:
         """State behind a corner of the branch; None where no state is found.
 
-        At a corner a contact sample changes its status, and the branch may turn back. The plane across the old tangent
-        may not meet the branch behind the corner. So the tangent behind the corner is taken a little ahead of the
-        state, and both signs of this tangent are tried. A solution on the branch before the corner is refused.
+        At a corner a contact sample changes its status, and the plane across the old tangent may not meet the branch
+        behind. So the tangent is taken a little ahead of the state, and both of its signs are tried.
         """
         base = self.place(state)
         ahead = base + CORNER_ARC * tangent
@@ -152,9 +146,8 @@ class Arc:
     def _fold(self, state: State, tangent: FloatArray, after: State) -> State:
         """State at the fold between two states, or the one of them that lies nearest to it; tangent: at the first.
 
-        The fold is where the tangent of the branch has no part along the parameter: regula falsi (Illinois) on this
-        part. At a corner of the branch the part jumps, and the search closes in on the corner. Of the states on the
-        way, the one with the extreme parameter is the fold.
+        Regula falsi (Illinois) on the part of the tangent along the parameter, which is zero at a fold and jumps at a
+        corner. Of the states on the way, the one with the extreme parameter is the fold.
         """
         low, high = 0.0, float(tangent @ (self.place(after) - self.place(state)))
         at_low, at_high = float(tangent[-1]), -float(tangent[-1])

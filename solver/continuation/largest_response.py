@@ -31,9 +31,8 @@ from solver.structure.joint import Case
 
 PEAK_RISE = 2.0
 """Largest rise of the logarithm of the response with the phase lag, 1/rad, over rtol, at which an amplitude counts as
-the largest one: its frequency is then within 2 rtol of half the width of the resonance, and the amplitude within
-2 rtol^2. The states of single samples change with the frequency, so that the rise is rough: by 0.005 for the dovetail
-with rtol 0.01, which would take five solves a step with 1e-4."""
+the largest one: its frequency is then within 2 rtol of half the width of the resonance. The states of single samples
+change with the frequency, so that the rise is rough: by 0.005 for the dovetail with rtol 0.01."""
 
 LARGEST_LAG_STEP = 0.2
 """Largest change of the phase lag between two solves, rad."""
@@ -44,8 +43,7 @@ def solve_at_peak(
 ) -> tuple[Bordered, float] | None:
     """The state of the largest amplitude near a phase lag, rad, and its lag; None where it is not found.
 
-    Arguments as in `solve_at_lag`. Along the frequency the wear depth is constant, also where the depth grows with the
-    motion in a step.
+    Arguments as in `solve_at_lag`. Along the frequency the wear depth is constant, also in an implicit step.
     """
     below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
     before: tuple[float, float] | None = None
@@ -76,16 +74,10 @@ def accepted_rise(rtol: float) -> float:
 
 
 def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float, float]:
-    """Changes along the frequency at fixed wear depth and tangential history, both s/rad.
+    """Changes along the frequency at fixed wear depth and tangential history, both s/rad: of the logarithm of the
+    amplitude of the first response, in the first harmonic, and of the lag.
 
-    accuracy: rise over the turn that does not count.
-
-    Returns
-    -------
-    rise : float
-        Of the logarithm of the amplitude of the first response, in the first harmonic.
-    turn : float
-        Of the lag.
+    accuracy: first change over the second one that does not count.
     """
     joint, at = state.balance.joint, state.at
     held = Balance(joint, at.history, at.wear_depth)

@@ -46,9 +46,8 @@ def phase_lag(joint: Joint, at: Evaluation) -> float:
 class AtLag:
     """The problem: a balance, with fixed or with growing wear depths, whose frequency follows from its lag.
 
-    case: of the joint of the balance. balance: at some frequency. lag: rad, between 0 and pi.
-    The error is the sine of the lag above the given one, so that `Bordered.reduced` is the change of the lag with the
-    frequency along the states, s/rad.
+    case: of the joint of the balance. balance: at some frequency. lag: rad, between 0 and pi. `Bordered.reduced` is the
+    change of the lag with the frequency along the states, s/rad.
     """
 
     case: Case
@@ -93,10 +92,8 @@ def solve_at_lag(
 
 @dataclass(frozen=True)
 class FrequencyDerivative:
-    """Derivatives with respect to the frequency at a fixed predicted force.
-
-    residual (n_rel, 2H+1): N s/rad. product: of `F^H x`, N m s/rad. response: of the first response in the first
-    harmonic, m s/rad.
+    """Derivatives with respect to the frequency at a fixed predicted force: of the residual (n_rel, 2H+1), N s/rad, of
+    `F^H x`, N m s/rad, and of the first response in the first harmonic, m s/rad.
     """
 
     residual: FloatArray

@@ -44,8 +44,7 @@ from solver.structure.joint import Case, Joint
 
 TRANSIENT_CUT = 0.35
 """Factor of the length of a step that fails, or whose change is twice `SMOOTH_CHANGE`. Half the value takes 2.5
-times the iterations of a jump at a fold. With 0.5 a random scene (`THROWN_OFF` in `tests/solver/test_homotopy.py`)
-does not settle within the budget."""
+times the iterations of a jump at a fold."""
 
 SEARCH_ITERATIONS = 800
 """Most Newton iterations of a relaxation with its periodic state. A jump at a fold of vibro-impact takes 400 to 500. A

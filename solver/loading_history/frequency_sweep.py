@@ -141,7 +141,7 @@ class FrequencySweep:
     def without_state(
         self, outcome: Outcome, message: str = "", resolution: Resolution | None = None, estimate: Estimate = UNKNOWN
     ) -> StartState:
-        """No state at the current frequency, and why."""
+        """No state at the current frequency, and why; of a state that is found all but the state itself."""
         used = Resolution((1,), 4) if self.nodes is None else self.nodes.state.nodes.resolution
         return StartState(
             outcome=outcome,

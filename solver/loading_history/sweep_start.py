@@ -28,8 +28,7 @@ CELLS_PER_OCTAVE = 4
 """Cells in an octave. All points of a cell have one first frequency: 105 Hz, half the resonance, for the dovetail."""
 
 ORIGIN_CANDIDATES = 8
-"""Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen. They
-are 2 % apart and at least 1 % away from two resonances of the dovetail, 212.9 and 411 Hz."""
+"""Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen."""
 
 
 @packable

@@ -16,6 +16,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
+from solver.loading_history.path_of_states import KEPT_NODES
 from solver.loading_history.start_states import follow_line
 from solver.loading_history.sweep_start import Direction
 from solver.missions.blocks import Block, Mission
@@ -301,7 +302,7 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, every_node: i
         here, parameter = states[-1], ahead[0]
         after = coarse.solve(states, parameter, run if parameter == target else run.to(coarse.node_tolerance))
         if after is not None and coarse.change(here, after, float(every_node)) <= LARGEST_CHANGE:
-            states = (here, after)
+            states = (*states, after)[-KEPT_NODES:]
             ahead.pop(0)
         elif (halvings := halvings + 1) > MOST_HALVINGS:
             return None

@@ -276,15 +276,14 @@ def judge_point(
 
 def _errors_by_resolution(mode: NonlinearMode, state: ModeState, run: Run) -> FloatArray:
     """Errors (3,) of frequency, rad/s, damping ratio and drive by harmonics and samples; inf where not known."""
-    # samples of their own: an event may stay next to the same sample of twice as many
-    finer = mode.at(Resolution(mode.case.resolution.orders, 3 * mode.case.resolution.samples + 2))
-    unknown, moved = np.full(3, math.inf), mode.move(state, finer, run)
-    if moved is None:
-        return unknown
-    others = (finer.at(shifted(finer.case.resolution, levels)) for levels in (2, 1, -1))
-    held = (other for other in others if mode.model.holds(other.case.resolution.highest))
-    found = next((found for other in held if (found := finer.move(moved, other, run)) is not None), None)
-    return unknown if found is None else ERROR_OVER_CHANGE * np.abs(found.values - state.values)
+    for levels in (2, 1, -1):
+        other = shifted(mode.case.resolution, levels)
+        # twice as many samples come last: an event may stay next to the same sample
+        for samples in (3 * other.samples + 2, 4 * other.samples + 2, 2 * other.samples):
+            richer = mode.at(Resolution(other.orders, samples))
+            if mode.model.holds(other.highest) and (found := mode.move(state, richer, run)) is not None:
+                return ERROR_OVER_CHANGE * np.abs(found.values - state.values)
+    return np.full(3, math.inf)
 
 
 def describe_loss(sweep: Sweep[ModeState]) -> str:

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -40,26 +41,17 @@ MARCH_PERIODS = 2
 SingleArray = NDArray[np.float32]
 
 
-@dataclass(frozen=True)
-class PeriodFactor:
+class PeriodMatrices(NamedTuple):
     """Matrices of the march through N samples, for the n pairs that slip or are open at one of them.
 
-    joint, basis: the joint, and the Fourier basis of the N samples.
-    pairs (n,): indices of these pairs.
-    coupling (n_rel, 3n): `Z / eps - 1`; columns of displacements that a pair does not have are zero.
-    own (N, n, 3, 3): A.
-    carried (N, n, 2, 2): B.
-    row (k,): nonzero rows of A, sample by sample, as `3 place + component` with the place among `pairs`.
-    first (N + 1,): index in `row` of the first row of each sample.
-    swept (2 n k,): `A (Z / eps - 1)` in these rows and the tangential columns.
-    inverse: inverses of `1 + A (Z / eps - 1)` in these rows and columns, sample by sample.
-    inverse_first (N + 1,): index in `inverse` of the first value of each sample.
+    - own (N, n, 3, 3), carried (N, n, 2, 2): A and B.
+    - row (k,): nonzero rows of A, sample by sample, as `3 place + component` with the place among the n pairs.
+    - first (N + 1,): index in `row` of the first row of each sample.
+    - swept (2 n k,): `A (Z / eps - 1)` in these rows and the tangential columns.
+    - inverse: inverses of `1 + A (Z / eps - 1)` in these rows and columns, sample by sample.
+    - inverse_first (N + 1,): index in `inverse` of the first value of each sample.
     """
 
-    joint: Joint
-    basis: FourierBasis
-    pairs: IntArray
-    coupling: FloatArray
     own: FloatArray
     carried: FloatArray
     row: IntArray
@@ -67,6 +59,20 @@ class PeriodFactor:
     swept: SingleArray
     inverse: SingleArray
     inverse_first: IntArray
+
+
+@dataclass(frozen=True)
+class PeriodFactor:
+    """March of some pairs (n,) of a joint through the samples of a Fourier basis.
+
+    coupling (n_rel, 3n): `Z / eps - 1`; columns of displacements that a pair does not have are zero.
+    """
+
+    joint: Joint
+    basis: FourierBasis
+    pairs: IntArray
+    coupling: FloatArray
+    matrices: PeriodMatrices
 
     exact = False
 
@@ -76,8 +82,9 @@ class PeriodFactor:
 
         The truncation of the harmonics may change the sign of the Jacobian: see `JacobianSolver.determinant_sign`.
         """
-        ends = zip(self.inverse_first[:-1], self.inverse_first[1:], np.diff(self.first), strict=True)
-        systems = (self.inverse[begin:end].reshape(n_rows, n_rows) for begin, end, n_rows in ends if n_rows)
+        of = self.matrices
+        ends = zip(of.inverse_first[:-1], of.inverse_first[1:], np.diff(of.first), strict=True)
+        systems = (of.inverse[begin:end].reshape(n_rows, n_rows) for begin, end, n_rows in ends if n_rows)
         return float(np.prod([np.linalg.slogdet(system)[0] for system in systems]))
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -86,11 +93,7 @@ class PeriodFactor:
             return right.copy()
         spread = self.joint.to_pairs(right)
         right_t = (spread[self.pairs].reshape(-1, right.shape[1]) @ self.basis.synthesis).T
-        state_t = march_samples(
-            np.ascontiguousarray(right_t),
-            *(self.own, self.carried, self.row, self.first, self.swept, self.inverse, self.inverse_first),
-            MARCH_PERIODS,
-        )
+        state_t = march_samples(np.ascontiguousarray(right_t), self.matrices, MARCH_PERIODS)
         return right - self.coupling @ (state_t.T @ self.basis.analysis)
 
 
@@ -132,8 +135,8 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
     first, inverse_first = (np.concatenate([[0], np.cumsum(part)]) for part in (sizes, sizes**2))
     all_rows, all_swept, all_inverse = np.concatenate(rows), np.concatenate(swept), np.concatenate(inverse)
     coupling = np.ascontiguousarray(square[np.ix_(joint.component_index, components)])
-    march = own, carried, all_rows, first, all_swept, all_inverse, inverse_first
-    return PeriodFactor(joint, build_basis(joint.basis.orders, n_samples), pairs, coupling, *march)
+    matrices = PeriodMatrices(own, carried, all_rows, first, all_swept, all_inverse, inverse_first)
+    return PeriodFactor(joint, build_basis(joint.basis.orders, n_samples), pairs, coupling, matrices)
 
 
 # the marches of one history need the stiffness of a few structures only
@@ -146,21 +149,12 @@ def stiffness_of_most(structure: CondensedStructure) -> FloatArray:
 
 
 @njit(cache=True)
-def march_samples(
-    right_t: FloatArray,
-    own: FloatArray,
-    carried: FloatArray,
-    row: IntArray,
-    first: IntArray,
-    swept: SingleArray,
-    inverse: SingleArray,
-    inverse_first: IntArray,
-    periods: int,
-) -> FloatArray:
+def march_samples(right_t: FloatArray, of: PeriodMatrices, periods: int) -> FloatArray:
     """Changes of the state (N, 3n) in the last of some periods, from a state without change.
 
-    right_t (N, 3n): right-hand sides at the pairs of the march. All other arrays as in `PeriodFactor`.
+    right_t (N, 3n): right-hand sides at the pairs of the march.
     """
+    own, carried, row, first, swept, inverse, inverse_first = of
     n_samples, size = right_t.shape
     n_pairs = size // 3
     state_t = np.zeros((n_samples, size))

@@ -118,8 +118,8 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, growing
     - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch.
 
     The number of time steps is doubled until the first multiplier has settled, or lies on one side of 1 by more than
-    its error. growing_only: without a second number of time steps where nothing grows, and of a state with
-    more harmonics on any branch. Raises OutOfTimeError.
+    its error. growing_only: to see whether something grows, with one number of time steps where nothing does, and of a
+    state with more harmonics on any branch. Raises OutOfTimeError.
     """
     switching, stuck = switching_pairs(at)
     if not switching.any():
@@ -151,7 +151,11 @@ def _settled(joint: Joint, at: Evaluation, growing_only: bool, rtol: float) -> M
             break
         n_samples, coarse = 2 * n_samples, found.values[0]
         values = _integrated(joint, at, n_samples, small)
-        found = Multipliers(values, float(abs(values[0] - coarse)) if values.size else np.inf)
+        error = np.inf
+        if values.size:
+            # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
+            error = abs(abs(values[0]) - abs(coarse)) if growing_only else abs(values[0] - coarse)
+        found = Multipliers(values, float(error))
     return found
 
 

@@ -14,12 +14,11 @@ that are open during the whole period are free: they need no law.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.sparse import csr_array
 
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.sampled_law import SampledLaw, sampled_law
@@ -31,70 +30,33 @@ from solver.structure.joint import Joint
 _SAMPLES_AT_ONCE = 64  # of the contact law: bounds the memory of large joints
 
 
-@dataclass(frozen=True)
-class Monodromy:
-    """Integration of disturbances through the N samples of a period, with the time h between two samples.
+class Monodromy(NamedTuple):
+    """Integration of disturbances through the N samples of a period, with n displacements and p switching pairs.
 
-    - inertia, drag (n, n): `M / h^2` and `C / h` of the displacements that move, N/m.
-    - compliance (n, n): inverse of `9/4 M / h^2 + 3/2 C / h + K`, m/N.
-    - select (3p, n): from the displacements that move to the motion of the switching pairs.
-    - law: derivative of the contact law.
+    - response (n, 2n): motion without contact forces from the known parts of acceleration and velocity, m per sample.
+    - spread (n, 3p): motion under unit contact forces, m/N.
+    - inverse (N, 3p, 3p): contact forces from the right-hand side of the law.
+    - past (N, p, 3, 12): right-hand side of the law from `du` without contact forces, `du'`, known velocity, `dv'`.
+    - places (12p,): rows of these four motions, and 4n for a displacement that does not exist.
 
     A disturbance (4n, j) has the displacements now and at the sample before, and the velocities (m per sample)
     likewise.
     """
 
-    inertia: FloatArray
-    drag: FloatArray
-    compliance: FloatArray
-    select: csr_array
-    law: SampledLaw
+    response: FloatArray
+    spread: FloatArray
+    inverse: FloatArray
+    past: FloatArray
+    places: IntArray
 
     @property
     def size(self) -> int:
         """Size of a disturbance."""
-        return 4 * len(self.inertia)
-
-    @cached_property
-    def _contact(self) -> tuple[FloatArray, FloatArray]:
-        """Motion under unit contact forces (n, 3p), m/N, and the inverse (N, 3p, 3p) of the law for the forces."""
-        law, spread = self.law, np.ascontiguousarray((self.select @ self.compliance).T)
-        flexibility = np.asarray(self.select @ spread)
-        n_samples, n_pairs = law.by_force.shape[:2]
-        blocks, pairs = flexibility.reshape(n_pairs, 3, 3 * n_pairs), np.arange(n_pairs)
-        inverse = np.empty((n_samples, 3 * n_pairs, 3 * n_pairs))
-        for first in range(0, n_samples, _SAMPLES_AT_ONCE):
-            part = slice(first, first + _SAMPLES_AT_ONCE)
-            system = -((law.by_motion[part] + 1.5 * law.by_speed[part]) @ blocks)
-            system.reshape(len(system), n_pairs, 3, n_pairs, 3)[:, pairs, :, pairs] += law.by_force[part].swapaxes(0, 1)
-            inverse[part] = np.linalg.inv(system.reshape(len(system), 3 * n_pairs, 3 * n_pairs))
-        return spread, inverse
-
-    @cached_property
-    def _response(self) -> FloatArray:
-        """Motion (n, 2n) without contact forces from the known parts of acceleration and velocity, m per sample."""
-        return -self.compliance @ np.hstack([self.inertia, self.drag])
-
-    @cached_property
-    def _law_of_past(self) -> FloatArray:
-        """Right-hand side of the law (N, p, 3, 12) from `du` without contact forces, `du'`, known velocity, `dv'`."""
-        law = self.law
-        parts = (-law.by_motion - 1.5 * law.by_speed, law.by_last_motion, -law.by_speed, law.by_last_speed)
-        return np.concatenate(parts, axis=3)
-
-    @cached_property
-    def _places(self) -> IntArray:
-        """Places (12p,) of what `_law_of_past` takes in four motions of n rows, and 4n for what does not exist."""
-        n, n_rows = len(self.inertia), self.select.shape[0]
-        place = np.full(n_rows, -1)
-        place[np.repeat(np.arange(n_rows), np.diff(self.select.indptr))] = self.select.indices
-        places = place.reshape(-1, 1, 3) + n * np.arange(4)[:, None]
-        return np.where(place.reshape(-1, 1, 3) < 0, 4 * n, places).ravel()
+        return 4 * len(self.response)
 
     def apply(self, disturbance: FloatArray) -> FloatArray:
         """Disturbances (size, j) a period later."""
-        spread, inverse = self._contact
-        return pass_period(self._response, spread, inverse, self._law_of_past, self._places, disturbance)
+        return pass_period(self, disturbance)
 
     def matrix(self) -> FloatArray:
         """The monodromy (size, size)."""
@@ -102,32 +64,25 @@ class Monodromy:
 
 
 @njit(cache=True)
-def pass_period(
-    response: FloatArray,
-    spread: FloatArray,
-    inverse: FloatArray,
-    law_of_past: FloatArray,
-    places: IntArray,
-    disturbance: FloatArray,
-) -> FloatArray:
-    """Disturbances (4n, j) through the N samples of a period; arguments as the properties of `Monodromy`."""
-    n, n_rows = response.shape[0], inverse.shape[1]
+def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
+    """Disturbances (4n, j) through the N samples of a period."""
+    n, n_rows = of.response.shape[0], of.inverse.shape[1]
     now, before = disturbance[:n].copy(), disturbance[n : 2 * n].copy()
     speed, speed_before = disturbance[2 * n : 3 * n].copy(), disturbance[3 * n :].copy()
     right = np.zeros((n_rows, disturbance.shape[1]))
-    for sample in range(inverse.shape[0]):
+    for sample in range(of.inverse.shape[0]):
         # BDF2: v = 3/2 y + known; acceleration from v in the same way
         known = 0.5 * before - 2.0 * now
-        after = np.dot(response, np.concatenate((1.5 * known + 0.5 * speed_before - 2.0 * speed, known)))
+        after = np.dot(of.response, np.concatenate((1.5 * known + 0.5 * speed_before - 2.0 * speed, known)))
         if n_rows > 0:
             past = np.concatenate((after, now, known, speed))
             right[:] = 0.0
             for row in range(n_rows):
                 for m in range(12):
-                    place = places[12 * (row // 3) + m]
+                    place = of.places[12 * (row // 3) + m]
                     if place < 4 * n:
-                        right[row] += law_of_past[sample, row // 3, row % 3, m] * past[place]
-            after -= np.dot(spread, np.dot(inverse[sample], right))
+                        right[row] += of.past[sample, row // 3, row % 3, m] * past[place]
+            after -= np.dot(of.spread, np.dot(of.inverse[sample], right))
         now, before, speed, speed_before = after, now, 1.5 * after + known, speed
     return np.concatenate((now, before, speed, speed_before))
 
@@ -149,11 +104,32 @@ def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples
     )
     inertia, drag = mass / fine.law.sample_step**2, damping / fine.law.sample_step
     compliance = np.linalg.inv(2.25 * inertia + 1.5 * drag + stiffness)
-    chosen = dofs[switching].ravel()
-    rows = np.flatnonzero(chosen >= 0)
-    place = (np.cumsum(moves) - 1)[chosen[rows]]
-    select = csr_array((np.ones(rows.size), (rows, place)), shape=(chosen.size, len(mass)))
-    return Monodromy(inertia, drag, compliance, select, sampled_law(fine.law, state, np.flatnonzero(switching)))
+    # displacements of the switching pairs among those that move, -1 for none
+    place = np.where(dofs[switching] >= 0, (np.cumsum(moves) - 1)[dofs[switching]], -1).reshape(-1, 1, 3)
+    there, rows, n = place.ravel() >= 0, place.ravel(), len(mass)
+    spread = np.where(there, compliance[rows].T, 0.0)
+    law = sampled_law(fine.law, state, np.flatnonzero(switching))
+    parts = (-law.by_motion - 1.5 * law.by_speed, law.by_last_motion, -law.by_speed, law.by_last_speed)
+    return Monodromy(
+        response=-compliance @ np.hstack([inertia, drag]),
+        spread=np.ascontiguousarray(spread),
+        inverse=_inverse_of_law(law, np.where(there[:, None], spread[rows], 0.0)),
+        past=np.concatenate(parts, axis=3),
+        places=np.where(place < 0, 4 * n, place + n * np.arange(4)[:, None]).ravel(),
+    )
+
+
+def _inverse_of_law(law: SampledLaw, flexibility: FloatArray) -> FloatArray:
+    """Inverse (N, 3p, 3p) of the law for the contact forces; flexibility (3p, 3p): motion under them, m/N."""
+    n_samples, n_pairs = law.by_force.shape[:2]
+    blocks, pairs = flexibility.reshape(n_pairs, 3, 3 * n_pairs), np.arange(n_pairs)
+    inverse = np.empty((n_samples, 3 * n_pairs, 3 * n_pairs))
+    for first in range(0, n_samples, _SAMPLES_AT_ONCE):
+        part = slice(first, first + _SAMPLES_AT_ONCE)
+        system = -((law.by_motion[part] + 1.5 * law.by_speed[part]) @ blocks)
+        system.reshape(len(system), n_pairs, 3, n_pairs, 3)[:, pairs, :, pairs] += law.by_force[part].swapaxes(0, 1)
+        inverse[part] = np.linalg.inv(system.reshape(len(system), 3 * n_pairs, 3 * n_pairs))
+    return inverse
 
 
 def switching_pairs(at: Evaluation) -> tuple[BoolArray, BoolArray]:

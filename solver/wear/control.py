@@ -19,7 +19,7 @@ from solver.march.steps import Lengths, take_step
 from solver.model import FloatArray
 from solver.newton.iteration import SHORTEST_STEP
 from solver.outcome import Outcome
-from solver.settings import Scheme
+from solver.settings import ROUND_OFF, Scheme
 from solver.wear.jump import jump
 from solver.wear.rate_slope import too_long
 from solver.wear.state import WearState
@@ -50,7 +50,11 @@ to 2.7 times the allowed ones."""
 
 @dataclass(frozen=True)
 class Given:
-    """Euler steps of `length` cycles. To the end of wear, each step wears about as much as the first one."""
+    """Euler steps of `length` cycles, which end at its multiples also behind a shorter step.
+
+    So histories that differ in k_w only have equal steps in `k_w h`. To the end of wear, each step wears about as much
+    as the first one.
+    """
 
     length: float
     scheme: Scheme = "implicit"
@@ -142,7 +146,10 @@ class WearLine:
             return state.length
         if isinstance(steps, LargestDepth):
             return steps.depth / float(self.work.rate(state.point.evaluation).max())
-        return steps.length if self.end < math.inf else steps.length * float(state.largest_rates[-1] / state.rates[-1])
+        if self.end == math.inf:
+            return steps.length * float(state.largest_rates[-1] / state.rates[-1])
+        left = steps.length * (math.floor(state.cycle / steps.length + ROUND_OFF) + 1.0) - state.cycle
+        return left if left < (1.0 - ROUND_OFF) * steps.length else steps.length
 
     def _shortest(self, state: WearState, length: float) -> float:
         """Shortest step, cycles: the accuracy to which the end of a branch is located."""

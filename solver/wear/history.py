@@ -12,7 +12,7 @@ import numpy as np
 from solver.accuracy.history_error import Both, HistoryError, error_of_given_steps, history_error
 from solver.accuracy.target_error import error_of_wear, target_error
 from solver.harmonic_balance.state import Failure
-from solver.model import FloatArray, IntArray, ReducedModel
+from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, packable, unpack
 from solver.results.history import StartState, WearHistory
@@ -76,17 +76,13 @@ def integrate_together(
     integrations = _Integrations(case, start, keep, Progress() if resume is None else unpack(resume))
     for each in asked:
         history = _assembled(model, start, each, integrations.of(each))
-        rows = known_rows(history)
+        # the counts that were reached
+        rows = np.flatnonzero(np.isfinite(history.worn_volume))
         history = replace(history, error_estimate=last_error(history, rows, history.last_cycle))
         if history.outcome is Outcome.CONVERGED:
             outcome, message = judge(history, rows, settings.rtol)
             history = replace(history, outcome=outcome, message=message)
         yield history
-
-
-def known_rows(history: WearHistory) -> IntArray:
-    """Indices of the counts that a history has reached."""
-    return np.flatnonzero(np.isfinite(history.worn_volume))
 
 
 @packable

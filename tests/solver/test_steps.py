@@ -48,12 +48,6 @@ def counts(states):
     return np.array([state.cycle for state in states])
 
 
-def bdf2_depth(length, before, grown, depth, rate):
-    """Depth behind a step; grown: in the step before, whose length is `before`. rate: at its end."""
-    w = length / before
-    return depth + w**2 / (1 + 2 * w) * grown + (1 + w) / (1 + 2 * w) * length * rate
-
-
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_given_step_follows_its_own_equation(scheme):
     states, steps = steps_of(Given(4000.0, scheme), 3, END)
@@ -142,7 +136,7 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
         assert step.error > 0.0
 
 
-def test_a_given_step_that_is_not_found_is_shortened_and_grows_again(monkeypatch):
+def test_a_given_step_that_is_not_found_is_shortened_and_later_ones_end_at_multiples_again(monkeypatch):
     own, tried = control.attempt_step, list[float]()
 
     def attempt(work, state, length, scheme):
@@ -150,8 +144,9 @@ def test_a_given_step_that_is_not_found_is_shortened_and_grows_again(monkeypatch
         return None if len(tried) == 1 else own(work, state, length, scheme)
 
     monkeypatch.setattr(control, "attempt_step", attempt)
-    steps_of(Given(4000.0), 4, END)
-    assert tried == [4000.0, 1000.0, 2000.0, 4000.0, 4000.0]
+    states, _ = steps_of(Given(4000.0), 6, END)
+    assert tried == [4000.0, 1000.0, 2000.0, 1000.0, 2000.0, 2000.0, 4000.0]
+    assert counts(states)[[3, 5, 6]].tolist() == [4000.0, 8000.0, 12_000.0]
 
 
 def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
@@ -160,9 +155,9 @@ def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
     states, _ = steps_of(Adaptive(1e-2), 3)
     depth, rate, h = depths(states), rates(states), np.diff(counts(states))
     assert depth[1] == pytest.approx(h[0] * rate[1], rel=1e-9)
-    for n in (1, 2):
-        expected = bdf2_depth(h[n], h[n - 1], depth[n] - depth[n - 1], depth[n], rate[n + 1])
-        assert depth[n + 1] == pytest.approx(expected, rel=1e-9)
+    w, grown = h[1:] / h[:-1], np.diff(depth)
+    expected = w**2 / (1 + 2 * w) * grown[:-1] + (1 + w) / (1 + 2 * w) * h[1:] * rate[2:]
+    assert grown[1:] == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("rule", [Given(4000.0, "explicit"), Given(4000.0), Adaptive(1e-2)])

@@ -109,6 +109,13 @@ def test_travelling_wave_has_the_nodal_diameters_it_needs(nodal_diameter, n_sect
     assert np.allclose(excited.load_harmonic, excited.response[0].conj())
 
 
+def test_same_parameters_give_the_same_bits():
+    one, two = (build(Parameters(mesh=1, nodal_diameter=3), 3) for _ in range(2))
+    for k in one.linear:
+        for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
+            assert np.array_equal(getattr(one.linear[k], name), getattr(two.linear[k], name))
+
+
 def test_loss_factor_is_exact_at_the_first_frequency(at_rest):
     linear = at_rest.linear[0]
     omega = 2.0 * np.pi * frequencies(linear)[0]

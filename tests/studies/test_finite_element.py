@@ -1,10 +1,12 @@
 """Bending, cyclic symmetry and reduction, each on the smallest mesh that shows it."""
 
 import numpy as np
+import pytest
 from scipy import linalg
+from scipy.sparse.linalg import spsolve
 
 from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness
-from studies.finite_element.elements.solid_mesh import ElementGroup, SolidMesh
+from studies.finite_element.elements.solid_mesh import ElementGroup, Material, SolidMesh
 from studies.finite_element.joint.cut_faces import CyclicAxis
 from studies.finite_element.joint.pairing import ContactSurfaces
 from studies.finite_element.joint.surfaces import surface_of_nodes
@@ -12,6 +14,23 @@ from studies.finite_element.joint_model import JointDefinition, MeshModel, Reduc
 from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, wedge_shape
 from tests.studies.fe_models.solid_meshes import STEEL, block, joined
+
+
+def test_bending_does_not_lock():
+    length, height, width = 1.0, 0.05, 0.04
+    # No lateral contraction: the beam formula does not know that the clamped end hinders it.
+    material = Material(114e9, 0.0, 4430.0)
+    beam = length**3 / (3.0 * material.young_modulus * width * height**3 / 12.0)
+    deflections = []
+    for kind in ("C3D8I", "C3D8"):
+        mesh, reference = block(kind, (10, 1, 1), lambda points: points * [length, height, width], material)
+        free = np.repeat(reference[:, 0] > 0.0, 3)
+        load = np.zeros((mesh.n_nodes, 3))
+        load[reference[:, 0] == 1.0, 1] = 0.25
+        solved = spsolve(assemble_stiffness(mesh)[free][:, free].tocsc(), load.ravel()[free])
+        deflections.append(solved @ load.ravel()[free])
+    assert deflections[0] == pytest.approx(beam, rel=0.005)
+    assert deflections[1] < 0.6 * beam
 
 
 def merged(coordinates, elements):

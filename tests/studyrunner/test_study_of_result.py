@@ -141,21 +141,6 @@ def test_mesh_and_model_come_back_bit_by_bit(folder):
     assert main(["out.nc", "--plan"]) == 0
 
 
-@pytest.mark.slow
-def test_the_file_that_is_read_is_not_replaced(slider, capsys):
-    before = slider.read_bytes()
-    capsys.readouterr()
-    for arguments in (["slider.nc"], ["slider.nc", "-o", "./slider.nc"], ["slider.nc", "--write-scene", "slider.nc"]):
-        assert main(arguments) == 2
-        said = capsys.readouterr().err
-        option = "--write-scene" if "--write-scene" in arguments else "-o"
-        assert f"give another file with {option}: this one is read by the run" in said
-        assert len(said.splitlines()) == 1
-    Path("link.nc").symlink_to("slider.nc")
-    assert main(["link.nc", "-o", "slider.nc"]) == 2
-    assert slider.read_bytes() == before
-
-
 def change(path, work):
     with h5py.File(path, "r+") as file:
         work(file)

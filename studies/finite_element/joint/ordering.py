@@ -306,7 +306,9 @@ def order_structure(
     involved = master[np.concatenate(nodes)]
     kept = np.isin(free, involved)
     if kept.all():
-        raise SceneError("contact", "all nodes that move are in contact pairs", "refine the mesh")
+        raise SceneError(
+            "contact", "all nodes that move are in contact pairs", "refine the mesh, or keep modes in reduced matrices"
+        )
     dissection = dissect(couplings, positions[free], kept)
     place = np.empty(len(free) + 1, dtype=np.int64)
     place[dissection.order] = np.arange(len(free))

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from solver import build_model
 from studies.fe_models.from_files.model import find_files, load_model
@@ -11,6 +12,7 @@ from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.scene import reduce_model
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
+from studies.scene_file import read_scene, write_scene
 from tests.studies.fe_models.matrix_files import REDUCED
 from tests.studies.fe_models.reduced import D, N, Sector
 
@@ -104,9 +106,10 @@ def test_tables_that_do_not_fit_are_named(tmp_path):
         model_of(tmp_path)
 
 
-def test_a_model_in_python_is_the_same():
-    """`build_model` of the matrices at each nodal diameter."""
+def test_a_scene_file_and_a_model_in_python_are_the_same(tmp_path):
+    """Of the matrices at each nodal diameter: groups `nd/<k>`, and tables of `build_model`."""
     scene = sector().scene
+    write_scene(scene, tmp_path / "scene.h5")
     given = {name: {k: getattr(each, name) for k, each in scene.linear.items()} for name in ("mass", "damping")}
     stiffness = {k: each.stiffness for k, each in scene.linear.items()}
     more = {
@@ -116,9 +119,11 @@ def test_a_model_in_python_is_the_same():
     }  # fmt: skip
     place = scene.contact.dofs, scene.contact.area
     model = build_model(given["mass"], given["damping"], stiffness, *place, **more)
-    for k, each in scene.linear.items():
-        for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
-            np.testing.assert_array_equal(getattr(model.linear[k], name), getattr(each, name))
+    for found in (model, read_scene(tmp_path / "scene.h5", 3)):
+        assert (found.n_sectors, found.nodal_diameter) == (N, D)
+        for k, each in scene.linear.items():
+            for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
+                np.testing.assert_array_equal(getattr(found.linear[k], name), getattr(each, name))
     for wrong, sentence in (
         ({0: stiffness[0]}, "stiffness: give the matrix of nodal diameter 2"),
         ({**stiffness, D: stiffness[D] + np.triu(stiffness[D])}, "stiffness: give a Hermitian matrix"),
@@ -126,3 +131,22 @@ def test_a_model_in_python_is_the_same():
     ):
         with pytest.raises(ValueError, match=sentence):
             build_model(given["mass"], given["damping"], wrong, *place, **more)
+
+
+def test_masses_in_a_plane(tmp_path):
+    """A lumped model without cyclic symmetry: two directions, and a force that closes the pair."""
+    table = "node,x,y,z,sets,area,normal_x,normal_y,normal_z\n1,0,0,0,A,1e-4,0,1,0\n2,0,0,0,B,,,,\n3,0,1,0,TIP,,,,\n"
+    (tmp_path / "nodes.csv").write_text(table)
+    rows = np.array([[node, dof] for node in (1, 2, 3) for dof in (1, 2)])
+    stiffness, mass = np.diag([1e6, 2e6, 3e6, 4e6, 5e6, 6e6]), np.diag([1.0, 1.0, 1.0, 1.0, 2.0, 2.0])
+    stiffness[[2, 4, 3, 5], [4, 2, 5, 3]] = -1e6
+    named = {"stiffness": stiffness, "mass": mass, "load": np.array([0.0, 50.0, 0.0, -50.0, 0.0, 0.0])}
+    REDUCED["market"](tmp_path, named, rows)
+    changes = {"contact": [["A", "B"]], "next_sector": False, "n_sectors": None, "axis": None, "nodal_diameter": 0}
+    tip = {"set": "TIP", "direction": [1, 0, 0]}
+    model = model_of(tmp_path, **changes, load=tip, response={"tip": tip}, recovery=None)
+    assert model.contact.dofs.tolist() == [[0, 1, -1]]
+    linear = model.linear[0]
+    np.testing.assert_allclose(linear.load_static, [50.0, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-9)
+    found, expected = (eigh(*each, eigvals_only=True) for each in ((linear.stiffness, linear.mass), (stiffness, mass)))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
