@@ -77,8 +77,7 @@ class BlockRun:
     slope (n_contact, n_contact): derivative of the growth by the depth before, 1; None if not asked for.
     response_error, growth_error: estimated relative errors of responses and growth.
     inaccurate: largest relative error of a state above rtol, 0 where there is none.
-    held: whether the mean position of a joint that slides as a whole was held.
-    cut_off: whether a pair at an edge of the modelled contact carries load or has worn.
+    held, cut_off: whether a joint that slides as a whole was held, or a pair at an edge of the contact carries load.
     like, begun: what the reference solution takes over, and the next mission (None for a block that continues).
     last: the state at the end, for a block that continues; its `start_history` is that of the next state.
     iterations: of Newton's method, start state included.

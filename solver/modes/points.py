@@ -22,6 +22,7 @@ from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path_of_states import Path, Step
 from solver.loading_history.sweep import Sweep
+from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.mode import ModeState, NonlinearMode
 from solver.modes.mode_start import TOP_BASE, Rest, find_rest
@@ -34,7 +35,7 @@ Direction = Literal["up", "down"]
 
 ERROR_OVER_CHANGE = 1.5
 """Error of frequency and damping over their change with more harmonics and samples. Estimated over true errors of both:
-mass on a rigid slider at least 1.2, oscillator with a wall 1.3, pressed foot that begins to slip 0.5, dovetail 8."""
+mass on a rigid slider at least 1.2, oscillator with a wall 1.4, pressed foot that begins to slip 0.5, dovetail 2."""
 
 _NO_FIRST = Failure(Outcome.START_FAILED, "the mode was not found at its first amplitude")
 
@@ -219,12 +220,23 @@ def solve_point(sweep: Sweep[ModeState], amplitude: float, run: Run) -> ModePoin
         ends = f"{sweep.here.parameter:.4g} and {ahead.parameter:.4g}"
         said = f"no state was found between the amplitudes {ends} m sqrt(kg), where the mode has states"
         return Failure(Outcome.BRANCH_LOST, said)
-    reference = None
-    if sweep.reference is not None:
-        path, states = sweep.reference
-        other = path.solve(states, amplitude, run.fresh())
-        reference = None if other is None else (mode_of(path), other)
-    return judge_point(mode, found.state, reference, run)
+    return judge_point(mode, found.state, _reference_at(sweep, amplitude, run), run)
+
+
+def _reference_at(sweep: Sweep[ModeState], amplitude: float, run: Run) -> tuple[NonlinearMode, ModeState] | None:
+    """The state of the reference sweep at an amplitude, m sqrt(kg); None where there is none."""
+    if sweep.reference is None:
+        return None
+    path, states = sweep.reference
+    # its last node may be farther away than the longest step, and a leap may end at another mode
+    last = states[-1].parameter
+    n_steps = max(1, math.ceil(abs(math.log(amplitude / last)) / math.log(LARGEST_STEP_RATIO)))
+    for target in np.geomspace(last, amplitude, n_steps + 1)[1:]:
+        found = path.solve(states, float(target), run.fresh())
+        if found is None:
+            return None
+        states = (*states, found)
+    return mode_of(path), states[-1]
 
 
 def judge_point(
