@@ -16,6 +16,7 @@ SMALL = {
     " solver.samples=32",
     "cylinder_on_flat": "scene.strips=24 solver.harmonics=3 solver.samples=64",
     "sphere_on_flat": "scene.patches=5 solver.harmonics=3 solver.samples=64",
+    "damper": "axes.nodal_diameter=4 slow_time.cycles=10000 slow_time.outputs=3 solver.harmonics=3 solver.samples=64",
     "dovetail": "scene.mesh=1 axes.frequency=[207.0,212.5] slow_time.cycles=3000 slow_time.outputs=4"
     " solver.harmonics=3 solver.samples=64",
     "extremes": "axes.frequency=212.86 axes.wear_coefficient=[1.1e-14,1.1e-7] axes.step=1000 slow_time.cycles=20"
@@ -95,11 +96,17 @@ def resonates_at_each_nodal_diameter(result):
     assert (result.worn_volume.isel(cycle=-1) > 0.0).all()
 
 
+def resonates_between_a_free_and_a_stuck_wedge(result):
+    assert (result.excitation_frequency < result.stuck_frequency).all()
+    assert (result.worn_volume.isel(cycle=-1) > 0.0).all()
+
+
 SHOWN: dict[str, Callable[[xr.Dataset], None]] = {
     "scatter": wears_in_each_sample_another_volume,
     "mission": wears_in_run_up_and_dwells,
     "modes": resonates_lower_the_more_it_is_worn,
     "dovetail": wears_near_its_resonance_only,
+    "damper": resonates_between_a_free_and_a_stuck_wedge,
     "shrouded": resonates_at_each_nodal_diameter,
     "vibro_impact": has_two_branches,
     "work_precision": agrees_better_with_smaller_steps,
