@@ -103,8 +103,9 @@ class NonlinearMode:
         history (n_contact, 2): tangential history, m. run, most: as in `Run.solve`.
         """
         found = run.solve_bordered(_AtAmplitude(self, amplitude, history), start, values, most)
-        # zeta goes to infinity where friction stops a mass for good: with few harmonics there are further states
-        if found is None or abs(found.values[1]) > 1.0:
+        # zeta goes to infinity where friction stops a mass for good: with few harmonics there are further states; below
+        # frequency 0 there is the mode once more, backwards
+        if found is None or abs(found.values[1]) > 1.0 or found.values[0] <= 0.0:
             return None
         after = final_history(found.balance, found.at)
         return ModeState(found.at, after, amplitude, values=found.values, shape=found.extra)

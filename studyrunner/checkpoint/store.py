@@ -46,7 +46,7 @@ _PAUSE = 0.1
 _RUN = "run"  # kind of the only entry about the file itself
 _SCHEMA = "CREATE TABLE entries (kind TEXT NOT NULL, key TEXT NOT NULL, blob BLOB NOT NULL, PRIMARY KEY (kind, key))"
 _APPLICATION = int.from_bytes(b"wear", "big")
-_VERSION = 3
+_VERSION = 4
 _PRAGMAS = ("trusted_schema=OFF", "temp_store=MEMORY", "locking_mode=EXCLUSIVE", "synchronous=FULL")
 _DAMAGES = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_FORMAT)
 _FAULTS = {

@@ -168,6 +168,14 @@ def energies(problem, state):
 
 
 @pytest.mark.slow
+def test_the_reference_of_a_mode_does_not_go_backwards():
+    """Its long steps predict a frequency below 0, at which there is the mode once more."""
+    found = backbone(foot(), [3e-3], 0.5)
+    assert found.outcome == (Outcome.CONVERGED,)
+    assert found.frequency_error[0] < 1e-3 * found.frequency[0]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", ["foot", "slider", "travelling wave"])
 def test_the_negative_damping_feeds_in_what_damping_and_friction_take(joint):
     if joint == "foot":
