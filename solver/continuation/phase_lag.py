@@ -22,7 +22,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.model import ComplexArray, FloatArray
 from solver.newton.bordering import Bordered
 from solver.newton.run import Run
-from solver.settings import DIFFERENCE
+from solver.settings import DIFFERENCE, ROUND_OFF
 from solver.structure.fourier import to_complex
 from solver.structure.frequency_slope import frequency_slope
 from solver.structure.joint import Case, Joint
@@ -38,8 +38,12 @@ def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
 
 
 def phase_lag(joint: Joint, at: Evaluation) -> float:
-    """Lag of the vibration behind the excitation, rad, from -pi/2 to 3 pi/2."""
-    return (-cmath.phase(excitation_product(joint, at.displacement_h)) + 0.5 * math.pi) % (2 * math.pi) - 0.5 * math.pi
+    """Lag of the vibration behind the excitation, rad, from -pi/2 to 3 pi/2; 0 where nothing moves."""
+    product = excitation_product(joint, at.displacement_h)
+    free = np.abs(to_complex(at.predicted_h)[:, 0]) / joint.relative_penalty
+    if abs(product) <= ROUND_OFF * float(np.abs(joint.structure.drive) @ free):
+        return 0.0
+    return (-cmath.phase(product) + 0.5 * math.pi) % (2 * math.pi) - 0.5 * math.pi
 
 
 @dataclass(frozen=True)

@@ -39,14 +39,20 @@ def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -
     """
     work.run.budget.limit = work.run.budget.iterations + SEARCH_ITERATIONS
     reached = _held(work, state, worn) or _on_another_branch(work, state, worn)
+    if isinstance(reached, Failure) and reached.outcome is Outcome.ADRIFT:
+        # the last pairs that stick come loose together
+        reached = _held(work, state, worn, drifts=True) or reached
     work.run.budget.limit = float("inf")
     return reached if isinstance(reached, Failure) else work.noted(replace(reached, cycle=cycle, previous=None))
 
 
-def _held(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | None:
-    """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends."""
+def _held(work: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
+    """The stable state with a hold of the mean position; None where no joint slides as a whole, or a branch ends.
+
+    drifts: whether the joint is known to slide as a whole, although some pairs still stick.
+    """
     at = state.point.evaluation
-    hold = None if state.hold is not None else free_slide(work.at(state), at)
+    hold = None if state.hold is not None else free_slide(work.at(state), at, drifts=drifts)
     if hold is None:
         return None
     joint, before = work.case.held(hold).joint(state.omega, work.excitation_amplitude), state.depth
@@ -81,13 +87,13 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
     return replace(state, point=found)
 
 
-def free_slide(joint: Joint, at: Evaluation) -> Hold | None:
+def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | None:
     """Hold of the mean position of a state.
 
-    None unless every pair slips at some time and the structure is free to slide in one direction; masses on rigid
-    ground have a hold of their own (`Penalty.mean`).
+    None unless every pair slips at some time, or it `drifts`, and the structure is free to slide in one direction;
+    masses on rigid ground have a hold of their own (`Penalty.mean`).
     """
-    if (at.status_t == STICK).all(axis=1).any() or joint.law.rate_dependent:
+    if ((at.status_t == STICK).all(axis=1).any() and not drifts) or joint.law.rate_dependent:
         return None
     stiffness, directions = np.linalg.eigh(joint.structure.static_stiffness)
     # spin softening may give small negative eigenvalues

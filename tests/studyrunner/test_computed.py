@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver.packing import Packed, pack
-from studies.scenes import dovetail_sector
+from studies.scenes import sector
 from studyrunner.scene import computed as computed_module
 from studyrunner.scene import scene as scene_module
 from studyrunner.scene.computed import InMemory
@@ -33,7 +33,7 @@ def forbid(monkeypatch):
         raise AssertionError("computed again")
 
     monkeypatch.setattr(scene_module, "_build_here", compute)
-    monkeypatch.setattr(dovetail_sector, "prepare_model", compute)
+    monkeypatch.setattr(sector, "prepare_model", compute)
 
 
 def memory(model):
