@@ -20,10 +20,12 @@ SLIDING_ON = 178  # seed: it goes on slipping to and fro
 TOLERANCE = SolverSettings().tolerance
 
 
-def started(seed, settings=SolverSettings()):
+def started(seed, **settings):
     scene = random_scene(seed)
     frequencies = np.array([scene.frequency_hz])
-    return next(follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", settings))[1]
+    return next(
+        follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings(**settings))
+    )[1]
 
 
 def ratcheting(seed, monkeypatch):
@@ -37,7 +39,7 @@ def ratcheting(seed, monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr(ResolvedState, "at_rest", note)
         # few samples: with many the last work falls slowly from one shakedown to the next
-        started(seed, SolverSettings(harmonics=3, samples=64))
+        started(seed, harmonics=3, samples=64)
     omega = 2 * np.pi * random_scene(seed).frequency_hz
     return next((joint, point) for joint, point in seen if joint.omega == omega)
 

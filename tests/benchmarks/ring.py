@@ -1,0 +1,82 @@
+"""A ring of blades whose shrouds touch, by time integration, against one sector with contact to the next one.
+
+    python -m tests.benchmarks.ring
+
+The ring (`tests.ring_of_masses`) has all sectors and contacts, without symmetry. Periods are integrated one by one with
+n and 2 n steps until the motion repeats, and extrapolated. Printed: first harmonic of the tips and worn volume of a
+sector after some cycles, of the ring and of the sector by harmonic balance.
+
+The sector knows one wave, and one wear for all sectors. With 4 N at 280 Hz and nodal diameter 1 the wave of the ring is
+unstable: waves of other nodal diameters grow beside it, to a third of it at 6 N and 310 Hz. While it wears, sectors
+begin to wear unequally: from 500 cycles on at nodal diameter 1, from 1000 at 3.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solver import frequency_response, march_wear
+from tests.benchmarks.frame import Table
+from tests.benchmarks.time_integration import at_rest, build, first_harmonic, one_period, ramp
+from tests.ring_of_masses import N, one_sector, whole_ring
+
+FRICTION, WEAR, CYCLES, EACH = 0.3, 1e-10, 300.0, 1.0
+CASES = ((0, 138.0, 0.5), (1, 280.0, 3.3), (2, 300.0, 10.0), (3, 320.0, 12.0), (4, 300.0, 10.0), (5, 280.0, 3.3))
+"""Nodal diameter, frequency, Hz, excitation amplitude, N."""
+
+_REPEATS = 1e-7
+_MOST_PERIODS = 20_000
+
+
+def ring_in_time(diameter: int, frequency: float, amplitude: float, steps: Sequence[int], cycles: float):
+    """First harmonics (n, N) of the unworn tips, m, and worn volumes (n, N), m3, for numbers of steps a period."""
+    model, tips, volumes = whole_ring(diameter), [], []
+    rows = np.real(model.linear[0].response)
+    for n_steps in steps:
+        gap, motion = model.contact.gap, None
+        for at, load in ramp(frequency, amplitude, 300).tolist():
+            structure = build(model, FRICTION, at, load, n_steps)
+            motion = one_period(structure, motion or at_rest(model, structure, gap), gap)
+        assert motion is not None
+        for _ in range(_MOST_PERIODS):
+            before, motion = motion.x, one_period(structure, motion, gap)
+            if np.abs(motion.x - before).max() < _REPEATS * np.abs(motion.x).max():
+                break
+        else:
+            raise RuntimeError("the motion does not repeat")
+        tips.append(first_harmonic(structure, motion, rows))
+        depth = np.zeros(N)
+        for _ in range(round(cycles / EACH)):
+            motion = one_period(structure, motion, gap + depth)
+            depth = depth + EACH * WEAR * motion.work / model.contact.area
+        volumes.append(depth * model.contact.area)
+    return np.array(tips), np.array(volumes)
+
+
+def extrapolated(values: np.ndarray) -> np.ndarray:
+    """Limit of values with n and 2 n steps, whose error falls as 1/n^2."""
+    return (4.0 * values[1] - values[0]) / 3.0
+
+
+def main() -> None:
+    """The table."""
+    table = Table("nodal diameter, Hz, N", "tip um", "sector", "volume mm3", "sector", "error told", "true")
+    for diameter, frequency, amplitude in CASES:
+        tips, volumes = ring_in_time(diameter, frequency, amplitude, (360, 720), CYCLES)
+        sector = one_sector(diameter)
+        tip = abs(frequency_response(sector, [frequency], amplitude, FRICTION).response[0, 0])
+        worn = march_wear(sector, frequency, amplitude, FRICTION, WEAR, CYCLES)
+        volume, true = float(worn.worn_volume[-1]), float(extrapolated(volumes).mean())
+        table.row(
+            f"{diameter}, {frequency:g}, {amplitude:g}",
+            1e6 * float(np.abs(extrapolated(tips)).mean()),
+            1e6 * tip,
+            1e9 * true,
+            1e9 * volume,
+            float(worn.worn_volume_error[-1]),
+            abs(volume / true - 1.0) if volume > 0.0 else 0.0,
+        )
+
+
+if __name__ == "__main__":
+    main()
