@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,11 +38,6 @@ class NaturalFrequencies:
 
     nodal_diameters: tuple[int, ...]
     frequencies: FloatArray
-
-
-NO_FREQUENCIES = NaturalFrequencies((), np.zeros((0, N_MODES)))
-KeepFrequencies = Callable[[NaturalFrequencies], None]
-"""Function that takes the frequencies of the first nodal diameters, for an interrupted computation to go on from."""
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ from studies.finite_element.joint_model import (
     ReductionOptions,
     Retainer,
 )
-from studies.scene_answers import N_MODES, KeepFrequencies, NaturalFrequencies
+from studies.scene_answers import N_MODES, NaturalFrequencies
 from studies.scene_error import SceneError
 
 Progress = Callable[[str], None]
@@ -242,26 +242,16 @@ def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int
         raise _refused(error, nodal_diameter, prepared.rotation) from error
 
 
-def natural_frequencies(
-    prepare: Callable[[], PreparedModel], n_sectors: int, known: NaturalFrequencies, keep: KeepFrequencies
-) -> NaturalFrequencies:
+def natural_frequencies(prepared: PreparedModel, n_sectors: int) -> NaturalFrequencies:
     """Lowest natural frequencies of the glued structure at all nodal diameters 0..n_sectors // 2.
-
-    prepare: prepares the model, where something is left to compute. known: those of the first nodal diameters, from an
-    interrupted computation. keep: called after each nodal diameter with all that are known.
 
     Raises SceneError where the glued structure is not held, or unstable.
     """
-    n_known, n_all = len(known.nodal_diameters), n_sectors // 2 + 1
-    if n_known < n_all:
-        prepared = prepare()
-        for k in range(n_known, n_all):
-            row = np.full((1, N_MODES), np.nan)
-            found = glued_frequencies(prepared, k, N_MODES)
-            row[0, : len(found)] = found
-            known = NaturalFrequencies(tuple(range(k + 1)), np.concatenate([known.frequencies, row]))
-            keep(known)
-    return known
+    found = np.full((n_sectors // 2 + 1, N_MODES), np.nan)
+    for k, row in enumerate(found):
+        own = glued_frequencies(prepared, k, N_MODES)
+        row[: len(own)] = own
+    return NaturalFrequencies(tuple(range(len(found))), found)
 
 
 def _static_load(mass: sparse.csr_matrix, coordinates: FloatArray, model: MeshModel | MatrixModel) -> FloatArray:

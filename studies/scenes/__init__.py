@@ -5,7 +5,7 @@ Every bundled scene is a module of this package with a pydantic class `Parameter
 leaves the contact stiffness to this registry. It may also have the functions
 
 - `describe_mesh(parameters) -> SurfaceMesh`,
-- `natural_frequencies(parameters, known, keep) -> NaturalFrequencies`, where it knows more than its reduced model,
+- `natural_frequencies(parameters) -> NaturalFrequencies`, where it knows more than its reduced model,
 - `with_room_for_wear(parameters, expected) -> Parameters`, where its pairs end at an artificial edge,
 - `FRICTION_IN_MODEL`, where the model depends on the friction coefficient,
 - `exact_answer(parameters, asked) -> ExactAnswer` to a `WearQuestion`, with `EXACT_ANSWER_KNOWS`: all keys of a study
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from solver.model import ReducedModel
-    from studies.scene_answers import ExactAnswer, KeepFrequencies, NaturalFrequencies, SurfaceMesh, WearQuestion
+    from studies.scene_answers import ExactAnswer, NaturalFrequencies, SurfaceMesh, WearQuestion
     from studies.scenes.half_space.room_for_wear import ExpectedWear
 
 BUNDLED = (
@@ -84,20 +84,12 @@ def scene_mesh(model: str, parameters: BaseModel) -> SurfaceMesh:
     return cast("SurfaceMesh", _scene_attribute(model, "describe_mesh")(parameters))
 
 
-def scene_frequencies(
-    model: str, parameters: BaseModel, known: NaturalFrequencies | None = None, keep: KeepFrequencies | None = None
-) -> NaturalFrequencies:
+def scene_frequencies(model: str, parameters: BaseModel) -> NaturalFrequencies:
     """Natural frequencies from a bundled scene that knows more than its reduced model; it may take some seconds.
-
-    known: those that an interrupted computation has given to `keep`, which is called after each nodal diameter.
 
     Raises SceneError where the parameters describe no possible structure.
     """
-    # imported here: listing the scenes costs nothing
-    from studies.scene_answers import NO_FREQUENCIES
-
-    find = cast("Callable[..., NaturalFrequencies]", _scene_attribute(model, "natural_frequencies"))
-    return find(parameters, known or NO_FREQUENCIES, keep or (lambda _: None))
+    return cast("NaturalFrequencies", _scene_attribute(model, "natural_frequencies")(parameters))
 
 
 def scene_with_room(model: str, parameters: BaseModel, expected: ExpectedWear) -> BaseModel:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import pi
 
 import numpy as np
@@ -13,8 +13,8 @@ from studies.contact_compliance import ContactStiffness
 from studies.finite_element.elements.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.finite_element.joint.cut_faces import CyclicAxis
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions
-from studies.finite_element.reduced_joint import PreparedModel, build_fe_scene, natural_frequencies, prepare_model
-from studies.scene_answers import KeepFrequencies, NaturalFrequencies
+from studies.finite_element.reduced_joint import build_fe_scene, natural_frequencies, prepare_model
+from studies.scene_answers import NaturalFrequencies
 from studies.scene_error import SceneError
 from studies.scenes.structured_mesh import find_stations, join_blocks
 
@@ -89,18 +89,9 @@ def reduce_sector(sector: Sector, parameters: SectorParameters, n_harmonics: int
     return build_fe_scene(*sector, options, n_harmonics).model
 
 
-def frequencies_of_sector(
-    define: Callable[[], Sector], n_sectors: int, known: NaturalFrequencies, keep: KeepFrequencies
-) -> NaturalFrequencies:
-    """Lowest frequencies with all contacts glued at all nodal diameters 0..N/2.
-
-    known: those of the first nodal diameters. keep: takes what is known, after each nodal diameter.
-    """
-
-    def prepare() -> PreparedModel:
-        return prepare_model(*define(), n_reductions=n_sectors // 2 + 1)
-
-    return natural_frequencies(prepare, n_sectors, known, keep)
+def frequencies_of_sector(sector: Sector, n_sectors: int) -> NaturalFrequencies:
+    """Lowest frequencies with all contacts glued at all nodal diameters 0..N/2."""
+    return natural_frequencies(prepare_model(*sector, n_reductions=n_sectors // 2 + 1), n_sectors)
 
 
 def mesh_of_bodies(bodies: Sequence[tuple[Sequence[FloatArray], Sequence[str], Material]]) -> tuple[

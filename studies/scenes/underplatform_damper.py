@@ -24,7 +24,7 @@ from studies.finite_element.joint import surfaces
 from studies.finite_element.joint.cut_faces import CutFaces
 from studies.finite_element.joint.pairing import ContactSurfaces
 from studies.finite_element.joint_model import JointDefinition, Retainer, SetMotion
-from studies.scene_answers import KeepFrequencies, NaturalFrequencies, SurfaceMesh
+from studies.scene_answers import NaturalFrequencies, SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scenes.sector import (
     AXIS,
@@ -76,9 +76,9 @@ def describe_mesh(parameters: Parameters) -> SurfaceMesh:
     return surfaces.describe_mesh(define_sector(parameters)[0].mesh)
 
 
-def natural_frequencies(parameters: Parameters, known: NaturalFrequencies, keep: KeepFrequencies) -> NaturalFrequencies:
+def natural_frequencies(parameters: Parameters) -> NaturalFrequencies:
     """As `sector.frequencies_of_sector`. Raises SceneError where the parameters do not go together."""
-    return frequencies_of_sector(lambda: define_sector(parameters), parameters.n_sectors, known, keep)
+    return frequencies_of_sector(define_sector(parameters), parameters.n_sectors)
 
 
 def define_sector(parameters: Parameters) -> Sector:
