@@ -164,7 +164,11 @@ def _numbers(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
 
 def _matrix(name: str, given: ArrayLike, n: int | None = None, *, real: bool) -> Matrix:
     """A symmetric or Hermitian matrix; n: its size, that of the stiffness, None for the stiffness itself."""
-    found = _array(name, given, "biuf" if real else "biufc")
+    found = _array(name, given, "biufc")
+    if real and found.dtype.kind == "c":
+        # the matrices of nodal diameter 0 often come as complex ones
+        _check(name, bool((found.imag == 0.0).all()), "give real numbers, as a number or an array")
+        found = found.real
     if n is None:
         n = len(found) if found.ndim else 0
         _check(name, found.shape == (n, n) and n > 0, f"give a square matrix instead of shape {found.shape}")
