@@ -29,7 +29,7 @@ _REASONS = {
     "cycles": "only the unworn states are asked for, the same for every step and scheme",
     "unworn": "wear_coefficient = 0 wears nothing, whatever the step and the scheme",
     "largest_depth": "slow_time.largest_depth sets the steps of the explicit scheme, whatever the step axis says",
-    "adaptive": "the adaptive scheme chooses its steps, which are the same for every wear_coefficient at other counts",
+    "adaptive": "the adaptive scheme chooses its steps, for another wear_coefficient the same ones at other counts",
     "final": 'the scheme "final" takes no step of a given length: the same state for every wear_coefficient',
     "steps": "wear_coefficient times step is that of another point: the same history at other cycle counts",
     IDLE_RTOL: "rtol is used by nothing: harmonics and samples are given, and the scheme is not adaptive",

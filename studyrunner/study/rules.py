@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator
 from typing import Any, get_args
 
+from solver.settings import FIRST_HARMONICS
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter.section import OF_PAIRS
 from studyrunner.study.kinds import MISSIONS, MODES, NUMBERS, WEAR
@@ -127,7 +128,8 @@ def _solver(study: Study) -> Iterator[Wrong]:
             values = getattr(study.solver, key)
             shown = values[0] if len(values) == 1 else list(values)
             yield Wrong(f"solver.{key}", shown, f"give it once, here or as axes.{key}")
-    most = max(study.given_harmonics, default=0)
+    # automatic harmonics begin with three
+    most = max((*study.given_harmonics, *((FIRST_HARMONICS,) if AUTO in study.harmonics else ())), default=0)
     fewest = min((number for number in study.samples if number != AUTO), default=None)
     if fewest is not None and fewest <= 2 * most:
         table = "solver" if study.axes.samples is None else "axes"

@@ -231,3 +231,8 @@ def test_points_of_no_result_are_marked(result):
     assert joined.newton_iterations.values.tolist() == [[1, 0], [0, 1]]
     assert joined.worn_volume.isnull().sum() == 4
     assert Outcome.NOT_COMPUTED in joined.outcome.attrs["flag_values"]
+
+
+def test_a_dataset_that_is_no_result_of_a_study_has_no_summary():
+    with pytest.raises(ValueError, match="no result of a study"):
+        xr.Dataset().fretwear.summary()

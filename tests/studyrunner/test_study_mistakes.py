@@ -50,6 +50,7 @@ WRONG = [
     (SLIDER, "solver.harmonics=[1, 1.5]", "solver.harmonics = 1.5: .. whole"),
     (SLIDER, "solver.harmonics=1e9", 'solver.harmonics = 1000000000.0: .. 1000 or less, or "auto"'),
     (SLIDER, "solver.samples=10", "solver.samples = 10: .. at least 11"),
+    (SLIDER, ("solver.harmonics=auto", "solver.samples=4"), "solver.samples = 4: .. at least 7"),
     (SLIDER, "slow_time.cycles=-1", "slow_time.cycles = -1: .. 0 or more"),
     (SLIDER, "slow_time.outputs=[2, 1]", "slow_time.outputs = [2, 1]: .. ascending"),
     (SLIDER, "slow_time.outputs=[0, 10]", "slow_time.outputs = 10.0: .. at most"),
