@@ -88,8 +88,9 @@ def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
     numbers = np.atleast_1d(outcome.attrs.get("flag_values", ())).tolist()
     words = dict(zip(numbers, str(outcome.attrs.get("flag_meanings", "")).split(), strict=False))
     named = [words.get(number, f"outcome_{number}") for number in outcome.values.ravel().tolist()]
-    found = outcome.copy(data=np.array(named, dtype=np.str_).reshape(outcome.shape)).drop_attrs(deep=False)
-    return found.assign_attrs(units="1", long_name="how the computation of the point ended, in a word")
+    values = np.array(named, dtype=np.str_).reshape(outcome.shape)
+    attributes = {"units": "1", "long_name": "how the computation of the point ended, in a word"}
+    return xr.DataArray(values, outcome.coords, outcome.dims, attrs=attributes)
 
 
 def open_known(path: str | Path) -> xr.Dataset:

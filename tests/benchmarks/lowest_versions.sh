@@ -15,7 +15,7 @@ trap 'rm -rf "$work"' EXIT
 
 # not in the tree itself: what is built there would stay
 mkdir "$work/source"
-(cd "$root" && cp -r solver studies studyrunner pyproject.toml README.md LICENSE "$work/source")
+(cd "$root" && cp -r solver studies studyrunner fretwear.py pyproject.toml README.md LICENSE "$work/source")
 (cd "$root" && find solver studies studyrunner -type f ! -name "*.py" ! -name "*.nb[ci]" ! -name "*.pyc" | sort) >"$work/files.txt"
 "$python" -m venv "$work/env"
 own=$work/env/bin
