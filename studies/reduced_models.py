@@ -69,11 +69,8 @@ def read_scene(path: str | Path, *, n_harmonics: int = 1) -> ReducedModel:
     Raises
     ------
     SceneError
-        Where there is no such file, where it is no scene file, is damaged, or describes no possible structure.
+        Where the file is no scene file, is damaged, or describes no possible structure.
+    OSError
+        Where there is no such file or it cannot be opened.
     """
-    try:
-        return scene_file.read_scene(path, n_harmonics)
-    except OSError as error:
-        raise SceneError(
-            "model", str(path), f"give a scene file that can be read ({error.strerror or error})"
-        ) from error
+    return scene_file.read_scene(path, n_harmonics)
