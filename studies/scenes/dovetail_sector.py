@@ -17,41 +17,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.model import FloatArray, ReducedModel
+from solver.model import FloatArray
 from studies.finite_element.elements.assembly import check_elements
 from studies.finite_element.elements.solid_mesh import ElementGroup, SolidMesh
 from studies.finite_element.joint import surfaces
 from studies.finite_element.joint.cut_faces import CutFaces
 from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
 from studies.finite_element.joint_model import JointDefinition, Retainer, SetMotion
-from studies.scene_answers import NaturalFrequencies, SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scenes.dovetail_mesh import DovetailMesh, build_dovetail_mesh, chord_directions
 from studies.scenes.dovetail_parameters import Parameters, check_parameters
-from studies.scenes.sector import AXIS, Sector, frequencies_of_sector, reduce_sector
+from studies.scenes.sector import AXIS, Sector, functions_of
 
 __all__ = ["Parameters", "build"]
 
 SURFACES = ("intrados", "extrados")
-
-
-def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
-    """As `sector.reduce_sector`. Raises SceneError where the parameters do not go together."""
-    return reduce_sector(define_sector(parameters), parameters, n_harmonics)
-
-
-def describe_mesh(parameters: Parameters) -> SurfaceMesh:
-    """Outer faces of disk and blade; the flanks and the cut faces between sectors are among them.
-
-    Raises SceneError where the parameters do not go together.
-    """
-    check_parameters(parameters)
-    return surfaces.describe_mesh(build_solid_mesh(parameters, build_dovetail_mesh(parameters)))
-
-
-def natural_frequencies(parameters: Parameters) -> NaturalFrequencies:
-    """As `sector.frequencies_of_sector`. Raises SceneError where the parameters do not go together."""
-    return frequencies_of_sector(define_sector(parameters), parameters.n_sectors)
 
 
 def define_sector(parameters: Parameters) -> Sector:
@@ -121,3 +101,6 @@ def _arranged(pairs: ContactPairs, mesh: DovetailMesh) -> ContactPairs:
     frames: FloatArray = ordered.frames.copy()
     frames[:, 2] *= np.sign(frames[:, 2, :1])
     return replace(ordered, frames=frames)
+
+
+build, describe_mesh, natural_frequencies = functions_of(define_sector)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import pi
+from typing import TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -12,9 +13,10 @@ from solver.model import FloatArray, IntArray, ReducedModel
 from studies.contact_compliance import ContactStiffness
 from studies.finite_element.elements.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.finite_element.joint.cut_faces import CyclicAxis
+from studies.finite_element.joint.surfaces import describe_mesh
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, natural_frequencies, prepare_model
-from studies.scene_answers import NaturalFrequencies
+from studies.scene_answers import NaturalFrequencies, SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scenes.structured_mesh import find_stations, join_blocks
 
@@ -72,6 +74,7 @@ class SectorParameters(BaseModel):
 
 
 Sector = tuple[MeshModel, JointDefinition]
+P = TypeVar("P", bound=SectorParameters)
 
 
 def reduce_sector(sector: Sector, parameters: SectorParameters, n_harmonics: int) -> ReducedModel:
@@ -89,9 +92,26 @@ def reduce_sector(sector: Sector, parameters: SectorParameters, n_harmonics: int
     return build_fe_scene(*sector, options, n_harmonics).model
 
 
-def frequencies_of_sector(sector: Sector, n_sectors: int) -> NaturalFrequencies:
-    """Lowest frequencies with all contacts glued at all nodal diameters 0..N/2."""
-    return natural_frequencies(prepare_model(*sector, n_reductions=n_sectors // 2 + 1), n_sectors)
+def functions_of(
+    define_sector: Callable[[P], Sector],
+) -> tuple[Callable[[P, int], ReducedModel], Callable[[P], SurfaceMesh], Callable[[P], NaturalFrequencies]]:
+    """Functions `build`, `describe_mesh` and `natural_frequencies` of a scene, see `studies.scenes`.
+
+    build: as `reduce_sector`. describe_mesh: outer faces of the sector. natural_frequencies: with all contacts glued,
+    at all nodal diameters 0..N/2. All raise SceneError where the parameters do not go together.
+    """
+
+    def build(parameters: P, n_harmonics: int) -> ReducedModel:
+        return reduce_sector(define_sector(parameters), parameters, n_harmonics)
+
+    def mesh(parameters: P) -> SurfaceMesh:
+        return describe_mesh(define_sector(parameters)[0].mesh)
+
+    def frequencies(parameters: P) -> NaturalFrequencies:
+        n_all = parameters.n_sectors // 2 + 1
+        return natural_frequencies(prepare_model(*define_sector(parameters), n_reductions=n_all), parameters.n_sectors)
+
+    return build, mesh, frequencies
 
 
 def mesh_of_bodies(bodies: Sequence[tuple[Sequence[FloatArray], Sequence[str], Material]]) -> tuple[

@@ -17,20 +17,18 @@ from math import cos, radians, sin
 import numpy as np
 from pydantic import Field
 
-from solver.model import FloatArray, ReducedModel
+from solver.model import FloatArray
 from studies.finite_element.joint import surfaces
 from studies.finite_element.joint.cut_faces import CutFaces
 from studies.finite_element.joint.pairing import ContactSurfaces
 from studies.finite_element.joint_model import JointDefinition, SetMotion
-from studies.scene_answers import NaturalFrequencies, SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scenes.sector import (
     Sector,
     SectorParameters,
     block_of,
-    frequencies_of_sector,
+    functions_of,
     mesh_of_bodies,
-    reduce_sector,
 )
 from studies.scenes.structured_mesh import graded
 
@@ -56,21 +54,6 @@ class Parameters(SectorParameters):
     def tip_radius(self) -> float:
         """Inner radius of the shroud, m."""
         return self.rim_radius + self.blade_length
-
-
-def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
-    """As `sector.reduce_sector`. Raises SceneError where the parameters do not go together."""
-    return reduce_sector(define_sector(parameters), parameters, n_harmonics)
-
-
-def describe_mesh(parameters: Parameters) -> SurfaceMesh:
-    """Outer faces of the sector. Raises SceneError where the parameters do not go together."""
-    return surfaces.describe_mesh(define_sector(parameters)[0].mesh)
-
-
-def natural_frequencies(parameters: Parameters) -> NaturalFrequencies:
-    """As `sector.frequencies_of_sector`. Raises SceneError where the parameters do not go together."""
-    return frequencies_of_sector(define_sector(parameters), parameters.n_sectors)
 
 
 def define_sector(parameters: Parameters) -> Sector:
@@ -129,3 +112,6 @@ def _blocks(parameters: Parameters) -> list[FloatArray]:
         block_of(blade[:, None], np.outer(thickness, [-1.0, 1.0]), axial, turned),
         block_of(shroud[:, None], around_tip, axial, p.shroud_angle),
     ]
+
+
+build, describe_mesh, natural_frequencies = functions_of(define_sector)

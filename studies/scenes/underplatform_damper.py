@@ -18,22 +18,20 @@ from math import cos, radians, sin, tan
 import numpy as np
 from pydantic import Field
 
-from solver.model import FloatArray, ReducedModel
+from solver.model import FloatArray
 from studies.finite_element.elements.solid_mesh import Material
 from studies.finite_element.joint import surfaces
 from studies.finite_element.joint.cut_faces import CutFaces
 from studies.finite_element.joint.pairing import ContactSurfaces
 from studies.finite_element.joint_model import JointDefinition, Retainer, SetMotion
-from studies.scene_answers import NaturalFrequencies, SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scenes.sector import (
     AXIS,
     Sector,
     SectorParameters,
     block_of,
-    frequencies_of_sector,
+    functions_of,
     mesh_of_bodies,
-    reduce_sector,
 )
 from studies.scenes.structured_mesh import graded
 
@@ -64,21 +62,6 @@ class Parameters(SectorParameters):
     def roof_rise(self) -> float:
         """Radial height of the roof over the sides of the wedge, m."""
         return (self.damper_half_width - 0.5 * self.platform_gap) * tan(radians(self.roof_angle))
-
-
-def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
-    """As `sector.reduce_sector`. Raises SceneError where the parameters do not go together."""
-    return reduce_sector(define_sector(parameters), parameters, n_harmonics)
-
-
-def describe_mesh(parameters: Parameters) -> SurfaceMesh:
-    """Outer faces of the sector. Raises SceneError where the parameters do not go together."""
-    return surfaces.describe_mesh(define_sector(parameters)[0].mesh)
-
-
-def natural_frequencies(parameters: Parameters) -> NaturalFrequencies:
-    """As `sector.frequencies_of_sector`. Raises SceneError where the parameters do not go together."""
-    return frequencies_of_sector(define_sector(parameters), parameters.n_sectors)
 
 
 def define_sector(parameters: Parameters) -> Sector:
@@ -182,3 +165,6 @@ def _wedge(parameters: Parameters) -> FloatArray:
     bottom = p.platform_radius - p.damper_height
     share = np.linspace(0.0, 1.0, m + 1)[:, None]
     return block_of(bottom + share * (roof - bottom), p.half_pitch + stations, _axial(p))
+
+
+build, describe_mesh, natural_frequencies = functions_of(define_sector)
