@@ -11,14 +11,13 @@ from numpy.typing import ArrayLike
 
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import Direction
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome, known_to
 from solver.presentation import PresentedResponse
 from solver.results.history import StartState
 from solver.results.state_report import evaluated
 from solver.results.verdict import describe_cut_off, first_cut_off
-from solver.settings import SolverSettings
+from solver.settings import Direction, SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case, friction_of_pairs
 

@@ -21,11 +21,11 @@ from solver.settings import DIFFERENCE, NEGLIGIBLE
 
 FIRST_ARC = SMOOTH_CHANGE / 10.0
 """Length of the first step, in unknowns divided by the norm of the first predicted force; the longest one is
-`SMOOTH_CHANGE`. With this length seven branches with folds take 1.5 % more iterations."""
+`SMOOTH_CHANGE`."""
 
 CORNER_ARC = 1e-3
-"""Length of the step behind a corner, and least length after a step. Without such a least length the same branches
-take 46 % more iterations."""
+"""Length of the step behind a corner, and least length after a step. Without such a least length seven branches with
+folds take 46 % more iterations."""
 
 SHORTEST_ARC = CORNER_ARC / 10.0
 """Shortest step: where none of this length converges, the branch has a corner."""
@@ -84,10 +84,7 @@ class Arc:
         return np.append(state.evaluation.predicted_h.ravel() / self.size, state.parameter / self.span)
 
     def slope(self, parameter: float, evaluation: Evaluation) -> FloatArray:
-        """Derivative (n_rel, m), N, of the residual with respect to parameter / span.
-
-        A finite difference is enough: the slope only gives directions to the corrector, whose residual is exact.
-        """
+        """Derivative (n_rel, m), N, of the residual by parameter / span, by a difference: enough for a direction."""
         ahead = self.balance_at(parameter + DIFFERENCE * self.span, self.start.history).evaluate(evaluation.predicted_h)
         return (ahead.residual - evaluation.residual) / DIFFERENCE
 
@@ -113,10 +110,10 @@ class Arc:
         return None if found is None else State(found.at, self.start.history, float(found.values[0] * self.span))
 
     def _step_over_corner(self, state: State, tangent: FloatArray) -> State | None:
-        """State behind a corner of the branch; None where no state is found.
+        """State behind a corner of the branch, where a contact sample changes its status; None where none is found.
 
-        At a corner a contact sample changes its status, and the plane across the old tangent may not meet the branch
-        behind. So the tangent is taken a little ahead of the state, and both of its signs are tried.
+        The plane across the old tangent may not meet the branch behind. So the tangent is taken a little ahead of the
+        state, and both of its signs are tried.
         """
         base = self.place(state)
         ahead = base + CORNER_ARC * tangent

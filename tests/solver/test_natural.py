@@ -58,8 +58,7 @@ def test_natural_steps_end_before_a_fold_and_say_so():
     assert size(point) == pytest.approx(0.1, rel=0.02, abs=0.0)
 
 
-@pytest.mark.parametrize("keep", [True, False])
-def test_history_is_handed_on_or_kept(keep):
+def test_history_is_handed_on():
     case = build_case(random_model(1, ("3d", "3d")), 0.4, OMEGA, SolverSettings(3, 64))
     idle = np.zeros(2)
 
@@ -69,15 +68,11 @@ def test_history_is_handed_on_or_kept(keep):
     found = first_point(case, OMEGA, 20.0, idle)
     start = State(found.evaluation, found.history, 20.0)
     assert start.history.any()
-    point, arrived = follow_naturally(balance_at, start, 80.0, Run(TOLERANCE), keep_history=keep)
+    point, arrived = follow_naturally(balance_at, start, 80.0, Run(TOLERANCE))
     assert arrived
-    if keep:
-        assert np.array_equal(point.history, start.history)
-        assert np.array_equal(point.evaluation.history, start.history)
-    else:
-        assert not np.array_equal(point.history, start.history)
-        balance = balance_at(80.0, point.evaluation.history)
-        assert np.array_equal(point.history, final_history(balance, point.evaluation))
+    assert not np.array_equal(point.history, start.history)
+    balance = balance_at(80.0, point.evaluation.history)
+    assert np.array_equal(point.history, final_history(balance, point.evaluation))
 
 
 def upper_branch_size(amplitude):

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.continuation.static_state import solve_static_state
+from solver.continuation.first_state import solve_static_state
 from solver.harmonic_balance.dlft import Balance
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.newton.run import Run

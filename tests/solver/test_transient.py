@@ -8,8 +8,8 @@ from scipy.linalg import expm
 
 from solver.continuation import transient
 from solver.continuation.arc_length import Arc
+from solver.continuation.first_state import solve_static_state
 from solver.continuation.natural import NEAR_ITERATIONS
-from solver.continuation.static_state import solve_static_state
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
