@@ -36,8 +36,7 @@ class ResponseCurve(PresentedCurve):
 
     - parameter: "frequency" or "excitation_amplitude", which changes along the curve; the other one is constant.
     - frequency, excitation_amplitude (n_points,): Hz, N.
-    - response (n_points, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)).
-    - response_peak (n_points, n_response): largest magnitude over a period, m.
+    - response, response_peak (n_points, n_response): as in `FrequencyResponse`.
     - response_error (n_points,): estimated relative error by harmonics and samples; inf where unknown, as beside
       folds; NaN where not asked for.
     - is_fold (n_points,): points at which the parameter turns.
@@ -94,19 +93,16 @@ def response_curve(
 ) -> ResponseCurve:
     """The curve of periodic states from one frequency, or one excitation amplitude, to another, through all folds.
 
-    A curve may turn back behind its first value before it comes to the last one, by as much as both are apart.
-    The first state is that of `frequency_response`: swept "up" to the lower or "down" to the upper frequency; for a
-    curve over the amplitude a "ramp". From there arc length follows the curve. Harmonics, samples and the tangential
-    history of the pairs are those of the first state: a slow sweep of a machine, which leaves a history of its own at
-    each frequency, and which jumps at folds, is `frequency_response`.
+    The first state is that of `frequency_response`, swept "up" to the lower or "down" to the upper frequency; for a
+    curve over the amplitude a "ramp". From there arc length follows the curve, with the harmonics, samples and
+    tangential history of the first state: a slow sweep of a machine, which leaves a history of its own at each
+    frequency, and which jumps at folds, is `frequency_response`. A curve may turn back behind its first value before it
+    comes to the last one, by as much as both are apart.
 
-    model, friction_coefficient, settings, wear_depth: as in `frequency_response`. Best give harmonics in the settings:
-    the first state may need fewer than others.
-    frequency, excitation_amplitude: one number for one of them, Hz or N, and two for the other one: first and last
-    value.
+    frequency, excitation_amplitude: one number for one of them, Hz or N, and first and last value of the other one.
+    settings: best with given harmonics, as the first state may need fewer than others.
     most_points: largest number of points. errors: False leaves out `response_error`, which takes most of the time.
-
-    Raises ValueError as `frequency_response`, and where there are not one number and two different ones.
+    All others, and ValueError, as in `frequency_response`.
     """
     settings = SolverSettings() if settings is None else settings
     omegas = 2.0 * np.pi * check_numbers("frequency", frequency, above=0.0)

@@ -1,7 +1,7 @@
 """Relaxation in time to a periodic state: the harmonics of the motion vary slowly until they are constant.
 
-The motion is y(t) = Re sum Y_n(T) exp(i n w t) with slowly varying amplitudes Y_n(T), so that d/dt acts on Y_n as
-i n w + d/dT. With the velocity V = (i n w + d/dT) Y as a second unknown, the equation of motion reads
+The motion is y(t) = Re sum Y_n(T) exp(i n w t), with amplitudes that vary slowly: d/dt acts on Y_n as i n w + d/dT.
+With the velocity V = (i n w + d/dT) Y as a second unknown, the equation of motion reads
 
     M (i n w + d/dT) V + C V + K Y + lambda = F,
 
@@ -9,21 +9,19 @@ and an implicit Euler step of length D in T from (Y_0, V_0), with s = i n w + 1/
 
     (K + s C + s^2 M) Y + lambda = F + M (s Y_0 + V_0) / D + C Y_0 / D.
 
-This is the harmonic balance, Eq. (8), with other matrices and loads. The equation is condensed on the contact pairs and
-solved by Newton's method, as the balance is. A periodic motion (V_0 = i n w Y_0, Y = Y_0) fulfils the equation exactly
-for each D; for D -> infinity the equation is the balance. The friction law is periodic over one period and starts from
-the history of the step before. The static harmonic has s = 1/D.
+This is the harmonic balance, Eq. (8), with other matrices and loads. A periodic motion (V_0 = i n w Y_0, Y = Y_0)
+fulfils the equation exactly for each D; for D -> infinity the equation is the balance. The friction law is periodic
+over one period and starts from the history of the step before. The static harmonic has s = 1/D.
 
-A short step resolves the transient of the structure; a long step damps all decaying motions. Growing motions leave an
-unstable state as long as 1/D exceeds their rate, which the determinant of the step shows (`stability.hill`). So D
-starts at one period, the stability of each periodic state is tested, and D is bounded by this rate once a state was
-unstable.
+A short step resolves the transient, a long step damps all decaying motions. Growing motions leave an unstable state as
+long as 1/D exceeds their rate, which the determinant of the step shows (`stability.hill`). So D starts at one period,
+each periodic state is tested for stability, and D is bounded by this rate once a state was unstable.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any, cast
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -46,15 +44,14 @@ TRANSIENT_CUT = 0.35
 times the iterations of a jump at a fold."""
 
 SEARCH_ITERATIONS = 800
-"""Most Newton iterations of a relaxation with its periodic state. A jump at a fold of vibro-impact takes 400 to 500. A
-motion that does not settle (a blade whose 16 pairs all slip and lift) would take thousands."""
+"""Most Newton iterations of a relaxation with its periodic state. A jump at a fold of vibro-impact takes 400 to 500; a
+motion that does not settle would take thousands."""
 
 RUNAWAY = 1e3
 """Displacement over the largest one of vibration and start; above it parts run away."""
 
 RELAXED_CHANGE = SMOOTH_CHANGE / 10.0
-"""Change over a step below which a periodic state is sought: norm of the change of the amplitudes over the larger norm
-of two motions."""
+"""Change of the motion over a step below which a periodic state is sought."""
 
 
 @dataclass(frozen=True)
@@ -86,12 +83,8 @@ class Transient:
         self.parts: list[tuple[LinearModel, Matrix]] = []
         for order in orders:
             linear = case.model.harmonic_structure(order)
-            load: Matrix = np.zeros(linear.mass.shape[0])
-            if order == 0:
-                load = linear.load_static
-            elif order == 1:
-                load = joint.excitation_amplitude * linear.load_harmonic
-            self.parts.append((linear, load))
+            loads: dict[int, Matrix] = {0: linear.load_static, 1: joint.excitation_amplitude * linear.load_harmonic}
+            self.parts.append((linear, loads.get(order, np.zeros(linear.load_static.size))))
 
     def periodic(self, evaluation: Evaluation) -> Motion:
         """Motion of the whole structure in a periodic state of the joint: the end of an infinite step."""
@@ -109,12 +102,10 @@ class Transient:
             full = cast("Matrix", linear.stiffness + rate * linear.damping + rate**2 * linear.mass)
             condensed = condense(full, self.relative, load)
             stiffness[place], force[place] = condensed.stiffness, condensed.force
-        plain = self.joint.structure
-        kept: dict[str, Any] = {field.name: getattr(plain, field.name) for field in fields(plain)}
-        kept["static_stiffness"] = np.real(stiffness[0])
-        kept["moving"] = DenseStiffness(stiffness[1:])
+        plain = {**vars(self.joint.structure), "static_stiffness": np.real(stiffness[0])}
+        plain["moving"] = DenseStiffness(stiffness[1:])
         load_h = from_complex(np.real(force[0]), force[1:].T)
-        return replace(self.joint, structure=_LoadedStructure(**kept, load_h=load_h))
+        return replace(self.joint, structure=_LoadedStructure(**plain, load_h=load_h))
 
     def after(self, evaluation: Evaluation, before: Motion, inverse: float) -> Motion:
         """Motion at the end of a step, from the solution of the balance of the step."""

@@ -1,10 +1,9 @@
 """The sweep along the frequencies of a study: where it begins, nodes common to many points, the state at each point.
 
-In a run-up or run-down a machine passes other frequencies before the point, and the joint keeps their history. So a
-sweep begins well away from the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and
-1.85 times. All points of a cell, a quarter octave, have one first frequency: the one at which the vibration loads the
-stuck joint least, so that no sweep begins at a resonance. So the state of a point depends on the scene and on the point
-but not on the other points of a study.
+A machine passes other frequencies before the point, and the joint keeps their history. So a sweep begins well away from
+the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and 1.85 times. All points of a
+cell, a quarter octave, have one first frequency: the one at which the vibration loads the stuck joint least, so that no
+sweep begins at a resonance. It depends on the scene and on the cell, not on the other points of a study.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ BEGIN_AWAY = 0.3
 0.38 the dovetail has the same state within 2e-3."""
 
 CELLS_PER_OCTAVE = 4
-"""Cells in an octave. All points of a cell have one first frequency: 105 Hz, half the resonance, for the dovetail."""
+"""Cells in an octave. The first frequency of the dovetail is 105 Hz, half the resonance."""
 
 START_CANDIDATES = 8
 """Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen."""
@@ -58,11 +57,7 @@ _REASONS = (Outcome.UNSTABLE, Outcome.ADRIFT, Outcome.UNSETTLED)
 @packable
 @dataclass(frozen=True)
 class FrequencySweepState:
-    """Saved state of a `FrequencySweep`, with which another one goes on.
-
-    cell, penalty_omega, omega: of the sweep (`cell_of`), frequency of its penalty, and of a ramp, rad/s; omega: None
-    for a sweep in frequency. nodes: saved state of the sweep.
-    """
+    """Saved state of a `FrequencySweep`: cell, frequency of the penalty, rad/s, that of a ramp or None, and nodes."""
 
     cell: int
     penalty_omega: float
@@ -73,11 +68,11 @@ class FrequencySweepState:
 class FrequencySweep:
     """The sweep over frequencies: one `Sweep` for all points of a cell, or one for each point (ramp).
 
+    nodes, cell: the present sweep, and its cell. save: called where it was saved.
     run: of the state at the current frequency, without the sweep to this frequency.
-    save: called where the sweep was saved.
     every: for which states stability is tested, as in `find_instability`.
-    known: frequencies, Hz, and the resolutions that states need there. Each state then takes that of the nearest one;
-        its error is not estimated, and there is no reference sweep. Empty: errors are estimated.
+    known: frequencies, Hz, and resolutions. Where there are some, each state takes that of the nearest one; its error
+        is not estimated, and there is no reference sweep.
     """
 
     def __init__(
@@ -109,7 +104,7 @@ class FrequencySweep:
             self.nodes.set_deadline(deadline)
 
     def state(self) -> FrequencySweepState | None:
-        """What another sweep needs to go on, to be packed; None where nothing is saved yet."""
+        """What another sweep needs to go on; None where nothing is saved yet."""
         if self.nodes is None or self.nodes.saved is None:
             return None
         path = path_of(self.nodes)
@@ -146,9 +141,8 @@ class FrequencySweep:
                 if isinstance(first, Outcome):
                     return self.without_state(why_lost(nodes, first), _where_lost(nodes))
                 path, reached = first[0], Step(first[1])
-            refined = self._at_known(frequency, path.case, omega, reached.state)
-            if refined is None:
-                refined = refine(path.case, omega, self.excitation_amplitude, reached.state, run)
+            at = path.case, omega, self.excitation_amplitude, reached.state, run
+            refined = self._at_known(*at) or refine(*at)
         except np.linalg.LinAlgError:
             return self.without_state(Outcome.SINGULAR)
         # folds of a ramp are load factors
@@ -197,7 +191,7 @@ class FrequencySweep:
         return nodes
 
     def _new_sweep(self, cell: int, penalty_omega: float, omega: float | None) -> Sweep[State]:
-        """A sweep before its first node. omega: frequency of a ramp, rad/s, else None."""
+        """A sweep before its first node. omega: of a ramp, rad/s, else None."""
         case = build_case(self.model, self.friction_coefficient, penalty_omega, self.settings)
         path, of = LoadingPath(case, self.excitation_amplitude, omega), self.run.budget
         budget = Budget(deadline=of.deadline, report=of.report)
@@ -207,8 +201,8 @@ class FrequencySweep:
         return self.nodes
 
     def _first(self, path: LoadingPath, place: float, run: Run) -> tuple[LoadingPath, State] | Outcome:
-        """A state from the static one at a value of the parameter, with the harmonics of a path, or else with one as
-        far as the settings allow it, and its path; or the reason of the first attempt.
+        """A state from the static one at a value of the parameter, and its path, with the harmonics of a path, or else
+        with one; or the reason of the first attempt.
         """
         others = [allowed(OTHER_START, self.settings)] if self.settings.automatic else []
         omega, load = (place, 1.0) if path.omega is None else (path.omega, place)
@@ -223,18 +217,14 @@ class FrequencySweep:
                 break
         return why[-1] if why[-1].static else why[0]
 
-    def _at_known(self, frequency: float, case: Case, omega: float, state: State) -> Refined | None:
+    def _at_known(self, case: Case, omega: float, load: float, state: State, run: Run) -> Refined | None:
         """The state with the known resolution; None where none is known, or where the state is not found with it."""
         if not self.known:
             return None
-        _, resolution = min(self.known, key=lambda each: abs(each[0] - frequency))
-        wanted, moved = case.at(resolution), state
-        if resolution != case.resolution:
-            found = self.run.move(case, wanted.joint(omega, self.excitation_amplitude), state)
-            if found is None:
-                return None
-            moved = found
-        return Refined(wanted, moved, NOTHING, accurate=True)
+        _, resolution = min(self.known, key=lambda each: abs(2.0 * np.pi * each[0] - omega))
+        wanted = case.at(resolution)
+        moved = state if wanted is case else run.move(case, wanted.joint(omega, load), state)
+        return None if moved is None else Refined(wanted, moved, NOTHING, accurate=True)
 
     def _judged(self, refined: Refined, nodes: Sweep[State]) -> StartState:
         """The outcome of a refined state, with its error and the state of the reference sweep."""

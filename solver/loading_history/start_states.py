@@ -21,18 +21,19 @@ from itertools import pairwise
 import numpy as np
 
 from solver.clock import computing_time
-from solver.continuation.phase_lag import phase_lag, solve_at_peak
+from solver.continuation.phase_lag import phase_lag, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import Failure, State
+from solver.harmonic_balance.state import Failure, State, history_at_rest
 from solver.loading_history.frequency_sweep import FrequencySweep, cell_of, edge_of, why_lost
-from solver.loading_history.path import FREE_STEP
-from solver.loading_history.sweep import NODE_ITERATIONS, Sweep
+from solver.loading_history.path import FREE_STEP, Step
+from solver.loading_history.sweep import Sweep
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, OutOfTimeError, Run
 from solver.outcome import Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
 from solver.settings import Direction, FollowedFrequency, SolverSettings
+from solver.stability.hill import is_stable
 
 
 def follow_branch(
@@ -52,7 +53,6 @@ def follow_branch(
 
     friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
     frequencies: Hz, ascending. Or what is sought in a range of frequencies: the first resonance that the sweep meets.
-    sweep: "up" or "down" along the frequency, or "ramp" of the excitation at a given frequency.
     keep: called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
         position and the activity of the sweep, in words.
     resume: progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there
@@ -101,7 +101,7 @@ def follow_line(
 
 
 class _NoResonanceError(Exception):
-    """The sweep meets no resonance, or has no state at a frequency."""
+    """The sweep meets no resonance."""
 
     def __init__(self, message: str, outcome: Outcome = Outcome.RESONANCE_LOST) -> None:
         super().__init__(message)
@@ -113,30 +113,22 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
 
     line: sweep "up" or "down", at its beginning or as saved on its way.
     """
-    before = None
     for near, far in _segments(follow, line.sweep == "down"):
         # the state at a frequency belongs to the sweep of its cell
-        search = _Between(line, line.sweep_to(0.5 * (near + far), beyond=True))
-        nodes = search.nodes
-        place, end = (2.0 * math.pi * frequency for frequency in (near, far))
-        if nodes.here is not None and nodes.has_passed(place):
-            # saved on the way
-            place = nodes.here.parameter
-        nodes.advance_to(place)
-        here = search.excess(place)
-        if before is not None and before > 0.0 >= here:
-            return near
-        while place != end:
-            nodes.advance_to(float(np.nextafter(place, nodes.direction * math.inf)))
-            if nodes.ahead is None:
-                raise search.lost(place, nodes.state.failure or Outcome.BRANCH_LOST)
-            target = min(nodes.ahead.state.parameter, end, key=lambda at: (at - place) * nodes.direction)
-            there = search.excess(target)
-            if here > 0.0 >= there:
-                found = search.zero(place, target)
-                return (found if follow.of == "resonance" else search.peak(found)) / (2.0 * math.pi)
-            place, here = target, there
-        before = here
+        nodes = line.sweep_to(0.5 * (near + far), beyond=True)
+        nodes.advance_to(2.0 * math.pi * near)
+        while (here := nodes.here) is not None and (step := nodes.ahead) is not None:
+            found = _resonance_between(line, nodes, here, step, follow)
+            if found is not None:
+                return found
+            end = step.state.parameter
+            if (2.0 * math.pi * far - end) * nodes.direction <= 0.0:
+                break
+            nodes.advance_to(float(np.nextafter(end, nodes.direction * math.inf)))
+        else:
+            at = near if nodes.last is None else nodes.last.parameter / (2.0 * math.pi)
+            said = f"the sweep {line.sweep} ends at {at:.6g} Hz and has met no resonance until there"
+            raise _NoResonanceError(said, why_lost(nodes, nodes.state.failure or Outcome.BRANCH_LOST))
     raise _NoResonanceError(
         f"the sweep {line.sweep} meets no {follow.of} between {follow.low:g} and {follow.high:g} Hz: give another range"
     )
@@ -145,59 +137,40 @@ def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
 def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, float]]:
     """Parts of a range, Hz, in each of which one sweep passes all frequencies, in the order of the sweep."""
     edges = [edge_of(cell) for cell in range(cell_of(follow.low) + 1, cell_of(follow.high) + 1)]
-    ends = [follow.low, *(edge for edge in edges if follow.low < edge < follow.high), follow.high]
-    # a frequency on an edge belongs to the part above
-    parts = [(low, high if high == follow.high else float(np.nextafter(high, 0.0))) for low, high in pairwise(ends)]
-    return ((high, low) for low, high in reversed(parts)) if down else iter(parts)
+    parts = pairwise([follow.low, *(edge for edge in edges if follow.low < edge < follow.high), follow.high])
+    return ((high, low) for low, high in reversed(list(parts))) if down else parts
 
 
-class _Between:
-    """States of a sweep between its present and its next node. Its functions raise _NoResonanceError."""
-
-    def __init__(self, line: FrequencySweep, nodes: Sweep[State]) -> None:
-        self.line, self.nodes = line, nodes
-        self.run = Run(line.settings.tolerance, Budget(deadline=line.run.budget.deadline))
-
-    def lost(self, omega: float, failure: Outcome) -> _NoResonanceError:
-        """The sweep has no state at a frequency, rad/s."""
-        said = f"ends at {omega / (2.0 * math.pi):.6g} Hz and has met no resonance until there"
-        return _NoResonanceError(f"the sweep {self.line.sweep} {said}", why_lost(self.nodes, failure))
-
-    def state_at(self, omega: float) -> State:
-        """State at a frequency, rad/s."""
-        found = self.nodes.state_at(omega, self.run.fresh())
-        if isinstance(found, Outcome):
-            raise self.lost(omega, found)
-        return found.state
-
-    def excess(self, omega: float) -> float:
-        """Positive before the resonance on the way of the sweep, negative behind."""
-        self.run.budget.iterations, self.run.budget.limit = 0, NODE_ITERATIONS
-        state = self.state_at(omega)
-        joint = self.nodes.path.case.joint(omega, self.line.excitation_amplitude)
-        return self.nodes.direction * math.cos(phase_lag(joint, state.evaluation))
-
-    def zero(self, one: float, other: float) -> float:
-        """Frequency, rad/s, at which the excess passes zero."""
-        if self.excess(one) <= 0.0:
-            # zero but for round-off
-            return one
-        from scipy.optimize import brentq  # where it is used: it takes a while to load
-
-        found = float(brentq(self.excess, one, other, xtol=self.line.settings.tolerance * one, rtol=1e-12))
-        for fold in self.nodes.ahead.folds if self.nodes.ahead is not None else ():
-            if abs(found - fold) <= FREE_STEP * fold:
-                back = "down" if self.line.sweep == "up" else "up"
-                over = f"resonance at {fold / (2.0 * math.pi):.6g} Hz"
-                raise _NoResonanceError(f'the sweep {self.line.sweep} jumps over the {over}: give sweep = "{back}"')
-        return found
-
-    def peak(self, omega: float) -> float:
-        """Frequency of the largest amplitude near phase resonance, rad/s."""
-        at, case = self.state_at(omega).evaluation, self.nodes.path.case
-        balance = Balance(case.joint(omega, self.line.excitation_amplitude), at.history, at.wear_depth)
-        found = solve_at_peak(case, balance, at.predicted_h, 0.5 * math.pi, self.run.fresh())
-        if found is None:
-            at_hertz = f"{omega / (2.0 * math.pi):.6g} Hz"
-            raise _NoResonanceError(f"no largest amplitude is found near phase resonance at {at_hertz}")
-        return float(found[0].values[0])
+def _resonance_between(
+    line: FrequencySweep, nodes: Sweep[State], here: State, step: Step[State], follow: FollowedFrequency
+) -> float | None:
+    """Frequency, Hz, of a resonance between two nodes, with the history of the first one; None where there is none."""
+    case, load, ahead = nodes.path.case, line.excitation_amplitude, step.state
+    # positive before a resonance on the way of the sweep, negative behind
+    one, other = (
+        nodes.direction * math.cos(phase_lag(case.joint(at.parameter, load), at.evaluation)) for at in (here, ahead)
+    )
+    if not one > 0.0 >= other:
+        return None
+    part = 0.0 if step.folds else one / (one - other)
+    joint = case.joint(here.parameter + part * (ahead.parameter - here.parameter), load)
+    balance = Balance(joint, history_at_rest(joint, here), here.evaluation.wear_depth)
+    before = here.evaluation.predicted_h
+    run = Run(line.settings.tolerance, Budget(deadline=line.run.budget.deadline))
+    start = before + part * (ahead.evaluation.predicted_h - before)
+    found = solve_at_lag(case, balance, start, 0.5 * math.pi, run)
+    omega = math.nan if found is None else float(found.values[0])
+    for fold in step.folds:
+        before_fold = (fold - omega) * nodes.direction > FREE_STEP * fold
+        if found is None or not before_fold or not is_stable(found.balance, found.at, run):
+            back = "down" if line.sweep == "up" else "up"
+            over = f"resonance at {fold / (2.0 * math.pi):.6g} Hz"
+            raise _NoResonanceError(f'the sweep {line.sweep} jumps over the {over}: give sweep = "{back}"')
+    if found is not None and not follow.low <= omega / (2.0 * math.pi) <= follow.high:
+        return None
+    if found is not None and follow.of == "peak":
+        peak = solve_at_peak(case, found.balance, found.at.predicted_h, 0.5 * math.pi, run)
+        found = None if peak is None else peak[0]
+    if found is None:
+        raise _NoResonanceError(f"no {follow.of} is found near {joint.omega / (2.0 * math.pi):.6g} Hz")
+    return float(found.values[0]) / (2.0 * math.pi)

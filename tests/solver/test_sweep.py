@@ -44,7 +44,8 @@ def assert_same_state(one, other):
     """To the last bit."""
     assert np.array_equal(one.state.displacement_h, other.state.displacement_h)
     assert np.array_equal(one.state.start_history, other.state.start_history)
-    assert (one.response_error, one.branch) == (other.response_error, other.branch)
+    for name in ("response_error", "branch", "newton_iterations"):
+        assert getattr(one, name) == getattr(other, name)
 
 
 def slip_work(start):
@@ -174,14 +175,6 @@ def test_runs_that_end_at_each_save_arrive_at_the_same_numbers(case, monkeypatch
     assert n_runs > 2 * len(whole)
     for index, wanted in whole.items():
         assert_same_state(found[index], wanted)
-        assert found[index].newton_iterations == wanted.newton_iterations
-
-
-@pytest.mark.slow
-def test_the_iterations_of_a_frequency_are_its_own_whatever_is_known():
-    together = starts([205.0, 211.0, 212.0])
-    assert starts([212.0])[212.0].newton_iterations == together[212.0].newton_iterations
-    assert together[205.0].newton_iterations < together[211.0].newton_iterations
 
 
 @pytest.mark.slow
