@@ -130,7 +130,10 @@ def test_over_the_amplitude_the_curve_folds_where_the_mass_grazes_the_wall():
     assert found.excitation_amplitude[-1] == 0.06
     first, second = np.flatnonzero(found.is_fold)
     assert found.excitation_amplitude[first] == pytest.approx(GRAZING, rel=2e-3)
+    # back behind the start on the unstable branch between, then to the branch of a sweep in frequency
     assert found.excitation_amplitude[second] < 0.02
+    swept = frequency_response(scene("vibro_impact"), at, 0.06, 0.0, settings=settings)
+    assert found.response[-1] == pytest.approx(swept.response[0], rel=1e-6)
     # beside the fold five harmonics may be too few to tell
     assert set(found.stability[: first - 3]) == {"stable"}
     assert set(found.stability[first + 1 : second]) == {"fold"}
