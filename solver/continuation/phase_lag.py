@@ -23,8 +23,8 @@ from solver.model import ComplexArray, FloatArray
 from solver.newton.bordering import Bordered
 from solver.newton.run import Run
 from solver.settings import DIFFERENCE, ROUND_OFF
+from solver.structure.condensation import frequency_slope
 from solver.structure.fourier import to_complex
-from solver.structure.frequency_slope import frequency_slope
 from solver.structure.joint import Case, Joint
 
 LARGEST_FREQUENCY_CHANGE = 0.02
