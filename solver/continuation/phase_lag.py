@@ -27,8 +27,8 @@ from solver.newton.bordering import Bordered
 from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
 from solver.settings import DIFFERENCE, NEGLIGIBLE, ROUND_OFF
+from solver.structure.condensation import FrequencySlope, frequency_slope
 from solver.structure.fourier import to_complex
-from solver.structure.frequency_slope import FrequencySlope, frequency_slope
 from solver.structure.joint import Case, Joint
 
 LARGEST_FREQUENCY_CHANGE = 0.02
