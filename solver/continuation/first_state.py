@@ -80,7 +80,7 @@ def solve_first_state(
             return raised
         unstable |= arrived
     whole = case.joint(omega, excitation_amplitude)
-    settled = relax_to_periodic(case, whole, wear_depth, rest.evaluation, quiet, rest.history, run)
+    settled = relax_to_periodic(case, whole, wear_depth, rest, quiet, run)
     return Outcome.UNSTABLE if unstable and isinstance(settled, Outcome) else settled
 
 

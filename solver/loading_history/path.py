@@ -190,7 +190,7 @@ class LoadingPath:
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
             joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
-            settled = relax_to_periodic(self.case, joint, balance.wear_depth, end.evaluation, before, end.history, run)
+            settled = relax_to_periodic(self.case, joint, balance.wear_depth, end, before, run)
             if isinstance(settled, Outcome):
                 return settled
             # a fold with a smaller change is a corner of the branch

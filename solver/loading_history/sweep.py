@@ -24,9 +24,9 @@ import numpy as np
 from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.harmonic_levels import fewer
 from solver.accuracy.refinement import VIBRATION_RECHECK
+from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import Path, S, Step
-from solver.march.steps import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable

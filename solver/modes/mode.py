@@ -18,12 +18,11 @@ import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.contact.coulomb import STICK
-from solver.continuation.natural import NEAR_ITERATIONS
+from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.state import State, final_history, history_at_rest
 from solver.loading_history.path import FREE_STEP, Step, choose_resolution, largest_change
-from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, modal_model
 from solver.newton.bordering import Bordered

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from solver.continuation.natural import follow_naturally
+from solver.continuation.natural import LARGEST_STEP_RATIO, STEP_SAFETY, Lengths, follow_naturally, take_step
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, final_history
-from solver.march.steps import LARGEST_STEP_RATIO, STEP_SAFETY, Lengths, take_step
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings

@@ -7,8 +7,8 @@ import pytest
 
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.period_events import left_out
+from solver.continuation.natural import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.harmonic_balance.state import Failure
-from solver.march.steps import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.outcome import Outcome
 from solver.packing import in_rows, pack, unpack
 from solver.settings import Scheme, SolverSettings
