@@ -119,11 +119,11 @@ class Mission(Task):
 
         of_joints = {block.joint: block.joint.model(models) for block in self.blocks}
         blocks = tuple(
-            solver_mission.Block(
+            of_solver.Block(
                 model=of_joints[block.joint],
                 frequency=block.frequency
                 if block.passage is None
-                else solver_mission.Passage(block.frequency, *block.passage),
+                else of_solver.Passage(block.frequency, *block.passage),
                 excitation_amplitude=block.excitation_amplitude,
                 friction_coefficient=block.joint.friction_coefficient,
                 cycles=block.cycles if block.passage is None else None,
