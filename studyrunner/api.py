@@ -11,13 +11,13 @@ from threadpoolctl import threadpool_limits
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
 from studyrunner.mpi.ranks import Ranks, launcher_size
 from studyrunner.result.creation_date import check_date
-from studyrunner.result.existing_result import Target, check_result
+from studyrunner.result.existing_result import check_result
 from studyrunner.result.opening import open_result
 from studyrunner.result.paths import check_output
-from studyrunner.run import Interrupted, RunOptions, compute_study
+from studyrunner.run import RunOptions, compute_study
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
-from studyrunner.system.progress import ProgressDisplay, SilentProgress
+from studyrunner.system.progress import ProgressDisplay
 from studyrunner.user_error import StorageError, UserError
 
 __all__ = ["StorageError", "Study", "UserError", "open_result", "read_study", "run_study"]
@@ -86,21 +86,13 @@ def run_study(
         raise UserError("run_study", "overrides", None, "give them to read_study: this study is read already")
     checked = None if date is None else check_date(date, "run_study", "date")
     path = Path(f"{study.study.name}.nc" if output is None else output)
-    target = _check_output(path, study, overwrite=overwrite)
-    given = RunOptions(fresh=fresh, retry_failed=retry_failed, date=checked)
-    shown = ProgressDisplay() if progress else SilentProgress()
     try:
-        # the scene as well: with two threads its matrices differ in the last bits, and start states with them
-        with threadpool_limits(1):
-            compute_study(Ranks(), study, target, given, shown, shown.say)
-    except Interrupted as ended:
-        raise KeyboardInterrupt(ended.summary.describe_end(target.path, "the same call")) from None
-    return open_result(target.path)
-
-
-def _check_output(path: Path, study: Study, *, overwrite: bool) -> Target:
-    try:
-        found = check_output("output", path, study.files)
-        return check_result("output", found, study, overwrite=overwrite, how="overwrite=True")
+        checked_path = check_output("output", path, study.files)
+        target = check_result("output", checked_path, study, overwrite=overwrite, how="overwrite=True")
     except UserError as error:
         raise UserError("run_study", error.key, error.value, error.remedy) from None
+    shown = ProgressDisplay(quiet=not progress)
+    # the scene as well: with two threads its matrices differ in the last bits, and start states with them
+    with threadpool_limits(1):
+        compute_study(Ranks(), study, target, RunOptions(fresh, retry_failed, checked), shown, shown.say)
+    return open_result(target.path)

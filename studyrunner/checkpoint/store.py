@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.packing import Packed
-from studyrunner.system.endings import uninterrupted
 from studyrunner.system.files import sync_folder
+from studyrunner.system.process import uninterrupted
 from studyrunner.user_error import StorageError
 
 STARTS, PROGRESS, RESULTS, COMPUTED = "start", "progress", "result", "computed"

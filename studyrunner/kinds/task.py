@@ -27,8 +27,7 @@ from studyrunner.scene.drawn_contacts import ContactChange
 from studyrunner.study.realisation import Realisation
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
-from studyrunner.system.machine_faults import MachineFaultError, tells_of_machine
-from studyrunner.system.source_digest import package_digest
+from studyrunner.system.machine import MachineFaultError, package_digest, tells_of_machine
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel

@@ -1,8 +1,5 @@
 """Decides which rank gets which task. This module sends no messages, does not know what a task is, and is given its
-clock.
-
-The server on real ranks and a simulation with thousands of ranks make the same decisions. No decision looks at all
-ranks.
+clock: the server on real ranks and a simulation with thousands of ranks make the same decisions.
 
 By hand: the pools of mpi4py and schwimmbad know no expected run times and leave rank 0 idle (speed-up 0.92 of 2 ranks,
 here 1.97).
@@ -77,7 +74,7 @@ class _Running(Generic[Task]):
     task: Task
     n_left: int
     began: float | None
-    measurement: Measurement | None = None
+    measurement: Measurement = ()
 
 
 class _Waiting(Generic[Task]):
@@ -111,7 +108,7 @@ class _Waiting(Generic[Task]):
 
 
 class Dispatcher(Generic[Task]):
-    """Decides which rank gets which task.
+    """Decides which rank gets which task. No decision looks at all ranks.
 
     - Tasks that give starts go first, unless enough tasks wait for all ranks: so the memory for waiting tasks is
       bounded.
@@ -172,9 +169,8 @@ class Dispatcher(Generic[Task]):
         """
         given = self._given[number]
         task = given.task
-        if given.measurement is not None:
-            self._costs.forget(given.measurement)
-            given.measurement = None
+        self._costs.forget(given.measurement)
+        given.measurement = ()
         if typical:
             self._costs.learn(task.cost_keys, task.cost_of(first=given.n_left == task.n_results), seconds)
             self._n_measured += 1
@@ -224,8 +220,7 @@ class Dispatcher(Generic[Task]):
                 continue
             at_least = _AS_LONG_AGAIN * (now - given.began)
             if at_least > task.cost * self._costs.correction(task.cost_keys):
-                if given.measurement is not None:
-                    self._costs.forget(given.measurement)
+                self._costs.forget(given.measurement)
                 given.measurement = self._costs.learn(task.cost_keys, task.cost, at_least)
         self._n_measured = 0
         self._others.reorder()

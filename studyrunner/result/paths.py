@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from studyrunner.system.files import create, leftovers, new_partial, sync
+from studyrunner.system.files import create, new_partial, sync
 from studyrunner.user_error import UserError
 
 _TRIAL = bytes(4096)  # a full disk has room for a name
@@ -71,14 +71,6 @@ def _is_stream(target: Path) -> bool:
             if os.path.samestat(target.stat(), os.fstat(number)):
                 return True
     return False
-
-
-def remove_leftovers(path: Path) -> None:
-    """Removes temporary files of `path` that killed runs have left. No other run may be at work there."""
-    for found in leftovers(path):
-        # one that stays is no harm
-        with contextlib.suppress(OSError):
-            found.unlink()
 
 
 def progress_file(path: Path) -> Path:

@@ -14,7 +14,7 @@ from solver.packing import Packed, pack, unpack
 from studies.scene_answers import NaturalFrequencies
 from studies.scenes import scene_frequencies, scene_has
 from studyrunner.study.study import Study
-from studyrunner.system.source_digest import package_digest
+from studyrunner.system.machine import package_digest
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel

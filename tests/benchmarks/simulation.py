@@ -1,7 +1,7 @@
 """Ranks with a simulated clock that work on the tasks of a study under the real scheduling code.
 
 Only the computing and the messages are simulated. Which rank gets which task, what is learnt of costs and which tasks a
-result makes possible is decided by `studyrunner.mpi.dispatch`, `cost_model` and `task_progress`.
+result makes possible is decided by `studyrunner.mpi.dispatch`, `cost_model` and `studyrunner.task_runs`.
 """
 
 import heapq
@@ -16,7 +16,7 @@ from studyrunner.kinds.task_plan import TaskPlan
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi.cost_model import CostKeys, CostModel, Measurement
 from studyrunner.mpi.dispatch import Assignment, Dispatcher
-from studyrunner.task_progress import TaskProgress
+from studyrunner.task_runs import TaskProgress
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class KnownCosts(CostModel):
 
     def learn(self, cost_keys: CostKeys, estimated: float, measured: float) -> Measurement:  # noqa: ARG002
         """Learns nothing."""
-        return Measurement(())
+        return ()
 
     def correction(self, cost_keys: CostKeys) -> float:  # noqa: ARG002
         """1."""

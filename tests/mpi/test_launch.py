@@ -58,7 +58,7 @@ def test_processes_of_the_launcher_of_another_library(names, said, tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ("schedule.describe_software = lambda: ('elsewhere', 'other')", "rank 1 on elsewhere runs other versions"),
+        ("ranks.WhatSoftware.answer = lambda _: ('elsewhere', 'other')", "rank 1 on elsewhere runs other versions"),
         ("schedule.follow_rank_0 = lambda *_: None", "rank 1 has not said within 3 s what it runs"),
     ],
     ids=["another source", "one that does not answer"],

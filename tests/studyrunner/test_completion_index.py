@@ -18,7 +18,7 @@ from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import Identity, solver_digest
 from studyrunner.kinds.wear import Sweep
 from studyrunner.study.study_file import read_study
-from studyrunner.task_progress import TaskProgress
+from studyrunner.task_runs import TaskProgress
 from tests.studyrunner.fakes import FACTS, changed, fake_evaluate, fake_sweep, open_completion, without_values
 
 BASE = (

@@ -1,6 +1,8 @@
 """A run that is ended at any point leaves a result that opens, and the next one ends with the same numbers."""
 
 import contextlib
+import os
+import signal
 import sqlite3
 import time
 from dataclasses import replace
@@ -14,6 +16,7 @@ from solver.packing import Packed
 from studyrunner.cli import main
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi import schedule
+from studyrunner.result import write
 from tests.mpi.launching import count_entries, results
 from tests.studyrunner.faked_runs import SMALL
 from tests.studyrunner.fakes import fake_sweep
@@ -64,6 +67,19 @@ def test_an_interrupt_in_any_task(at, solver, capsys):
     xr.testing.assert_identical(results(), expected)
     again = capsys.readouterr().err
     assert (f"{n_there} of {N_POINTS} points are there from an earlier run" in again) == (n_there > 0)
+
+
+def test_a_signal_while_the_whole_result_is_written_changes_nothing(solver, monkeypatch, capsys):
+    own = write.write_result
+
+    def end(*given, **more):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return own(*given, **more)
+
+    monkeypatch.setattr(write, "write_result", end)
+    assert main(SMALL) == 0
+    assert (results().outcome == 0).all()
+    assert "interrupted" not in capsys.readouterr().err
 
 
 @pytest.mark.slow

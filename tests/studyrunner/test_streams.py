@@ -74,7 +74,7 @@ def test_what_cannot_end_well_is_refused_at_the_beginning(case, tmp_path):
 def test_nothing_else_gets_the_number_of_a_stream(tmp_path):
     """A library that complains on stderr must not write into a file of the run."""
     code = (
-        "import os\nfrom studyrunner.system.streams import keep_talking\nkeep_talking()\n"
+        "import os\nfrom studyrunner.system.process import keep_talking\nkeep_talking()\n"
         "file = open('file', 'wb')\nassert file.fileno() > 2\nos.write(2, b'complaint')\nprint('x', flush=True)\n"
     )
     assert shell(f"{sys.executable} -c {shlex.quote(code)} <&- >&- 2>&-", tmp_path)[0] == 0
