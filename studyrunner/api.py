@@ -10,10 +10,9 @@ from threadpoolctl import threadpool_limits
 
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
 from studyrunner.mpi.ranks import Ranks, launcher_size
-from studyrunner.result.creation_date import check_date
-from studyrunner.result.existing_result import check_result
 from studyrunner.result.opening import open_result
-from studyrunner.result.paths import check_output
+from studyrunner.result.provenance import check_date
+from studyrunner.result.target import check_result
 from studyrunner.run import RunOptions, compute_study
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
@@ -87,8 +86,7 @@ def run_study(
     checked = None if date is None else check_date(date, "run_study", "date")
     path = Path(f"{study.study.name}.nc" if output is None else output)
     try:
-        checked_path = check_output("output", path, study.files)
-        target = check_result("output", checked_path, study, overwrite=overwrite, how="overwrite=True")
+        target = check_result("output", path, study, overwrite=overwrite, how="overwrite=True")
     except UserError as error:
         raise UserError("run_study", error.key, error.value, error.remedy) from None
     shown = ProgressDisplay(quiet=not progress)

@@ -223,7 +223,7 @@ def _show_plan(study: Study) -> int:
 
 
 def _check(study: Study) -> int:
-    from studyrunner.result.paths import check_output
+    from studyrunner.result.target import check_output
     from studyrunner.scene.check_command import check_study_model
 
     picture = Path(f"{study.study.name}.check.png")
@@ -234,26 +234,22 @@ def _check(study: Study) -> int:
 
 
 def _write_scene(study: Study, path: Path) -> int:
-    from studyrunner.result.existing_result import check_scene_file
-    from studyrunner.result.paths import check_output
+    from studyrunner.result.target import check_scene_file
     from studyrunner.scene.scene import write_study_scene
 
-    target = check_output("--write-scene", path, study.files)
-    check_scene_file("--write-scene", target)
-    write_study_scene(study, target, _slow_steps())
+    write_study_scene(study, check_scene_file("--write-scene", path, study), _slow_steps())
     print(f"{path}: the scene of study {study.study.name}", flush=True)
     return CONVERGED
 
 
 def _compute(ranks: Ranks, study: Study, options: Options) -> int:
     from solver.outcome import COMPLETE
-    from studyrunner.result.existing_result import check_result
-    from studyrunner.result.paths import check_output
+    from studyrunner.result.target import check_result
     from studyrunner.run import RunOptions, compute_study
     from studyrunner.system.progress import ProgressDisplay, count, format_seconds
 
     path = Path(f"{study.study.name}.nc") if options.output is None else options.output
-    target = check_result("-o", check_output("-o", path, study.files), study, overwrite=options.overwrite)
+    target = check_result("-o", path, study, overwrite=options.overwrite)
     display, announced = ProgressDisplay(), job_size() if ranks.size == 1 else 0
     idle = f"one process, although the job has room for {announced}: srun or mpiexec starts them"
     given = RunOptions(options.fresh, options.retry_failed, options.date)

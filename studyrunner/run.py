@@ -6,28 +6,23 @@ import contextlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from solver.outcome import COMPLETE, Outcome
-from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.checkpoint.records import record_type
+from studyrunner.checkpoint.completion_index import CompletionIndex, record_type
 from studyrunner.checkpoint.store import Store, StoreInUseError
-from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
 from studyrunner.kinds.kind import build_tasks, kind_of
 from studyrunner.kinds.task import Identity, digest
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import serve_tasks
 from studyrunner.plan.plausibility import doubts_of_study
-from studyrunner.result.arrays import SmallArray, coordinates, scene_arrays
-from studyrunner.result.creation_date import describe_date
-from studyrunner.result.existing_result import Label, Target
-from studyrunner.result.paths import older_folder, progress_file
-from studyrunner.result.provenance import compare_with_archived, describe_run
-from studyrunner.result.sample_coordinates import sample_coordinates, worn_coordinate
-from studyrunner.result.software import describe_software
+from studyrunner.result.arrays import small_arrays
+from studyrunner.result.provenance import compare_with_archived, describe_run, describe_time_and_commit
+from studyrunner.result.target import Target, identity_of
 from studyrunner.scene.check_command import remarks_of_study
 from studyrunner.scene.drawn_contacts import contact_changes
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import frequencies_of_ratios, merge_facts, pair_arrays, stuck_frequencies_of
+from studyrunner.scene.scene_set import merge_facts
 from studyrunner.scene_building import Scenes, build_scenes
 from studyrunner.study.study import Study
 from studyrunner.system.files import remove_leftovers
@@ -96,14 +91,14 @@ def compute_study(
         facts = merge_facts(scenes.facts)
         # the software is described when the run begins: a checkout may have changed at the end of the run
         attributes = {**describe_run(study, facts), **({} if scenes.kept is None else scenes.kept.origin)}
-        attributes |= {**describe_software(), **describe_date(options.date)}
+        attributes |= describe_time_and_commit(options.date)
         completion = _open_completion(study, scenes, store, facts, options)
         with display:
             for line in (
                 *notes,
                 *(f"{show_text(study.source)}: {text}" for text in compare_with_archived(study, facts.digest)),
                 *store.notes,
-                *_older(target),
+                *_older(target.older_folder),
                 *scenes.notes,
                 *doubts_of_study(study, facts),
                 *(f"{label}: {text}" for label, text in remarks_of_study(study)),
@@ -113,7 +108,12 @@ def compute_study(
                 display.say(f"{n_found} of {count(completion.plan.n_points, 'point')} are there from an earlier run")
 
             def write() -> Counter[int]:
-                return _write(study, scenes, facts, completion, target, attributes)
+                # netCDF4 takes a moment to load: after the other ranks have got their last task
+                from studyrunner.result.write import write_result
+
+                store.flush()
+                arrays = small_arrays(study, scenes.scenes, scenes.facts, scenes.variables)
+                return write_result(study, facts, completion, target, arrays, attributes, scenes.kept)
 
             return _compute(ranks, study, StudyRun(completion, scenes.models, display), completion, target, write)
 
@@ -147,15 +147,13 @@ def _compute(
             raise KeyboardInterrupt(
                 f"interrupted: {kept or f'{name} holds {done}'}, the same command goes on"
             ) from None
-    if not outcomes[Outcome.NOT_COMPUTED]:
-        completion.prune()
     return outcomes
 
 
 @contextlib.contextmanager
 def _open_progress(target: Target) -> Iterator[Store]:
     """The file of the progress beside a result, open for a run: before the scene is built, which may be in the file."""
-    path = progress_file(target.path)
+    path = target.progress
     try:
         store = Store(path)
     except StoreInUseError as error:
@@ -181,8 +179,7 @@ def _open_completion(
     kind = record_type(study, facts)
     identity = Identity(tuple(each.digest for each in scenes.facts), digest(repr(kind.descr)))
     completion = CompletionIndex(plan, identity, store, kind)
-    label = Label.of(study)
-    store.note_study(label.name, label.model)
+    store.note_study(identity_of(study))
     if options.fresh:
         completion.forget_all()
     if options.retry_failed:
@@ -192,37 +189,8 @@ def _open_completion(
     return completion
 
 
-def _write(
-    study: Study,
-    scenes: Scenes,
-    facts: SceneFacts,
-    completion: CompletionIndex,
-    target: Target,
-    attributes: dict[str, str],
-) -> Counter[int]:
-    """Writes the result file from the finished points; returns the number of points of each outcome."""
-    # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
-    from studyrunner.result.write import write_result
-
-    completion.store.flush()
-    stuck = stuck_frequencies_of(study, scenes.facts, scenes.scenes)
-    hertz = frequencies_of_ratios(study, scenes.facts, scenes.scenes)
-    arrays = [
-        *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
-        *coordinates(study, facts, pair_arrays(study, scenes.facts, scenes.scenes)),
-        SmallArray("stuck_frequency", *stuck, STUCK_FREQUENCY),
-        *worn_coordinate(study, scenes.facts),
-        *sample_coordinates(study, scenes.facts, scenes.scenes),
-        *scene_arrays(study, scenes.variables),
-    ]
-    return write_result(
-        study, facts, completion, target.path, arrays, attributes, scenes.kept, keep_finished=target.finished
-    )
-
-
-def _older(target: Target) -> list[str]:
+def _older(folder: Path) -> list[str]:
     """A sentence where a folder of an earlier version stands beside a result."""
-    folder = older_folder(target.path)
     if not folder.is_dir():
         return []
     return [f"{folder.name} is of version 0.4.0 or before: it is neither used nor changed, and may be removed"]

@@ -160,19 +160,13 @@ def test_a_run_that_is_killed_goes_on_to_the_same_result(tmp_path):
     assert "history" in {line.split()[0] for line in resumed}
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """The result of the stand-in where it is not disturbed."""
-    folder = tmp_path_factory.mktemp("whole")
-    arguments = [*FAKED_STUDY.arguments, "-o", "whole.nc"]
-    assert fake_here(arguments, folder, FAKED_STUDY.environment) == 0
-    return results(folder / "whole.nc")
-
-
 @pytest.mark.parametrize(("n_ranks", "number"), [(0, signal.SIGINT), (2, signal.SIGTERM)])
-def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks, number, whole, tmp_path):
+def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks, number, tmp_path):
     study = FAKED_STUDY
     arguments = [*study.arguments, "-o", "out.nc"]
+    (tmp_path / "whole").mkdir()
+    assert fake_here(arguments, tmp_path / "whole", study.environment) == 0
+    whole = results(tmp_path / "whole" / "out.nc")
 
     def end(running):
         # about half of the points are there
@@ -218,8 +212,8 @@ def test_one_more_signal_ends_a_run_that_cannot_end(tmp_path):
     script.write_text(STUCK, encoding="utf-8")
 
     def end_twice(running):
+        assert running.reaches(lambda: "hangs" in running.said), running.said
         for seconds in (0.0, 0.2, 2.0):
-            running.wait_for("hangs")
             time.sleep(seconds)
             running.process.send_signal(signal.SIGTERM)
 

@@ -55,7 +55,7 @@ def test_a_report_that_nobody_hears_of(tmp_path):
 
 
 REFUSED = {
-    "stdout in a file": ("exec >file;", "-o /dev/stdout", "give the name of an ordinary file"),
+    "no file": ("", "-o /dev/stdout", "give the name of an ordinary file"),
     "little memory": ("ulimit -v 450000;", "", "ulimit -v = 461 MB: give each process at least 1000 MB"),
 }
 
