@@ -160,9 +160,19 @@ def test_a_run_that_is_killed_goes_on_to_the_same_result(tmp_path):
     assert "history" in {line.split()[0] for line in resumed}
 
 
-@pytest.mark.parametrize(("n_ranks", "number"), [(0, signal.SIGINT), (2, signal.SIGTERM)])
-def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks, number, tmp_path):
-    study = FAKED_STUDY
+ENDED_BY = {
+    "an interrupt": (0, signal.SIGINT, (None,)),
+    "the launcher": (2, signal.SIGTERM, (None,)),
+    "one rank": (2, signal.SIGTERM, (1,)),
+    "one rank first": (2, signal.SIGTERM, (1, 0)),
+}
+"""Number of ranks, signal, and who gets it one after the other: ranks, or the process that was started."""
+
+
+@pytest.mark.parametrize("case", ENDED_BY)
+def test_a_run_that_is_ended_leaves_a_result_and_goes_on(case, tmp_path):
+    """The launcher tells all ranks, some earlier than others: rank 0 may be writing by then."""
+    study, (n_ranks, number, victims) = FAKED_STUDY, ENDED_BY[case]
     arguments = [*study.arguments, "-o", "out.nc"]
     (tmp_path / "whole").mkdir()
     assert fake_here(arguments, tmp_path / "whole", study.environment) == 0
@@ -171,7 +181,11 @@ def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks, number, tmp_pa
     def end(running):
         # about half of the points are there
         assert running.reaches(lambda: count_steps(tmp_path) >= study.n_steps // 2), running.said
-        running.process.send_signal(number)
+        ranks = running.ranks()
+        for victim in victims:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(running.process.pid if victim is None else ranks[victim], number)
+            time.sleep(0.1)
 
     ended = run_to_end(n_ranks, arguments, tmp_path, study.environment, end)
     assert ended.status == 130, ended.said
@@ -219,25 +233,3 @@ def test_one_more_signal_ends_a_run_that_cannot_end(tmp_path):
 
     ended = run_to_end(0, [str(script), "two_masses", "-o", "out.nc"], tmp_path, {}, end_twice)
     assert (ended.status, ended.seconds < SOON) == (130, True)
-
-
-@pytest.mark.parametrize("rank_0_too", [False, True])
-def test_a_rank_that_is_ended_ends_the_run_in_good_order(rank_0_too, tmp_path):
-    """The launcher tells all ranks, some earlier than others: rank 0 may be writing by then. Some other program may
-    tell one."""
-    study = FAKED_STUDY
-
-    def terminate(running):
-        assert running.reaches(lambda: count_steps(tmp_path) >= study.n_steps // 4), running.said
-        ranks = running.ranks()
-        os.kill(ranks[1], signal.SIGTERM)
-        if rank_0_too:
-            time.sleep(0.1)
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(ranks[0], signal.SIGTERM)
-
-    ended = run_to_end(2, [*study.arguments, "-o", "out.nc"], tmp_path, study.environment, terminate)
-    assert ended.status == 130
-    assert ended.said.count("run-study: interrupted: out.nc holds ") == 1
-    assert ended.seconds < SOON
-    assert (results(tmp_path / "out.nc").outcome == Outcome.NOT_COMPUTED).any()

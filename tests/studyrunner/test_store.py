@@ -3,8 +3,6 @@
 import contextlib
 import os
 import sqlite3
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -247,26 +245,11 @@ def test_a_file_that_was_removed_meanwhile_is_told(replaced, opened, path):
         opened.flush()
 
 
-HOLDER = """
-import sys, time
-from pathlib import Path
-from studyrunner.checkpoint.store import Store
-store = Store(Path(sys.argv[1]))
-print("locked", flush=True)
-time.sleep(60.0)
-"""
-
-
-def test_two_runs_are_kept_apart(path):
-    fill(path)
-    with subprocess.Popen([sys.executable, "-c", HOLDER, str(path)], stdout=subprocess.PIPE, text=True) as holder:
-        assert holder.stdout.readline() == "locked\n"
-        for _ in range(2):
-            with pytest.raises(StoreInUseError, match=rf"process {holder.pid} on \S+$"):
-                Store(path)
-            assert read_study(path) is None  # it has not said so, and nobody waits for its lock
-        holder.kill()
-    with contextlib.closing(Store(path)) as opened:
-        opened.note_study("of a joint")
-        assert read_study(path) == "of a joint"
+def test_two_runs_are_kept_apart(path, opened):
+    for _ in range(2):
+        with pytest.raises(StoreInUseError, match=rf"process {os.getpid()} on \S+$"):
+            Store(path)
+    assert read_study(path) is None  # it has not said so, and nobody waits for its lock
+    opened.note_study("of a joint")
+    assert read_study(path) == "of a joint"
     assert read_study(path.with_name("none")) is None
