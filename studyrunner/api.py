@@ -35,11 +35,9 @@ def run_study(
 ) -> xr.Dataset:
     """Run a study in this process, as the command `run-study` does, and open its result.
 
-    What is computed and where it goes is the same as with the command: a run that was ended early, in whatever way,
-    goes on where it was when it is called again, from here or by the command; what it needs for that is in the file
-    `<output>.progress`. This process computes alone, one point after the other and with one thread of the linear
-    algebra, so that the numbers are those of the command to the last bit. For several processes give
-    `mpiexec -n 8 run-study study.toml -o output.nc` and read its result by `open_result`.
+    What is computed is the same as with the command, to the last bit, and a run that was ended early goes on when it is
+    called again, from here or by the command: see `<output>.progress`. This process computes alone, with one thread of
+    the linear algebra; for several processes give `mpiexec -n 8 run-study study.toml -o output.nc`.
 
     Parameters
     ----------
@@ -68,9 +66,8 @@ def run_study(
     Raises
     ------
     UserError
-        Where something in the study or the scene is wrong, the output cannot be written, is that of another study or
-        of something else, another run is at work there, or a launcher has started several processes: each would compute
-        all of it. Nothing is computed then.
+        Where study, scene or output are wrong, another run is at work there, or a launcher has started several
+        processes, each of which would compute all of it. Nothing is computed then.
     StorageError
         Where something cannot be written on the way. What was computed is kept, and the same call goes on from it.
     KeyboardInterrupt

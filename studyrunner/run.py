@@ -15,12 +15,12 @@ from studyrunner.kinds.kind import build_tasks, kind_of
 from studyrunner.kinds.task import Identity, digest
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import serve_tasks
-from studyrunner.plan.plausibility import doubts_of_study
+from studyrunner.plan import doubts_of_study
 from studyrunner.result.arrays import small_arrays
 from studyrunner.result.provenance import compare_with_archived, describe_run, describe_time_and_commit
 from studyrunner.result.target import Target, identity_of
-from studyrunner.scene.check_command import remarks_of_study
-from studyrunner.scene.drawn_contacts import contact_changes
+from studyrunner.scene.answers import remarks_of_study
+from studyrunner.scene.pairs import contact_changes
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import merge_facts
 from studyrunner.scene_building import Scenes, build_scenes

@@ -6,7 +6,7 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from solver.clock import n_compiled
 from solver.outcome import Outcome, describe_error
@@ -15,8 +15,7 @@ from studyrunner.kinds.task import Keep, Result, StartResult, Task
 from studyrunner.mpi.cost_model import CostModel
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.schedule import Office, Run
-from studyrunner.scene_building import SceneBuilt, SceneTask, build_scene_task
-from studyrunner.scene_models import ModelCache, SceneModels
+from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task
 from studyrunner.system.machine import MachineFaultError, is_fault_of_machine
 from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import ProgressDisplay, Standing
@@ -43,7 +42,7 @@ def compute_task(task: Task, models: Models, keep: Keep) -> Iterator[Result]:
     return task.compute(models, keep)
 
 
-def evaluator() -> Run[Any, Any]:
+def evaluator() -> Run:
     """The function that does tasks on a rank, and builds scenes.
 
     A task that breaks off gives failed results; the other tasks go on. A fault of the machine is no result.
@@ -79,7 +78,7 @@ def evaluator() -> Run[Any, Any]:
     return evaluate
 
 
-class TaskProgress(Office[Task, Result]):
+class TaskProgress(Office):
     """State of the tasks of a study, and the tasks that results make possible. Results go to `completion`.
 
     A wear history becomes possible with its start state, while the sweep goes on. Results of a task do not depend on

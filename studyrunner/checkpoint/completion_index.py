@@ -17,8 +17,7 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.store import PROGRESS, RESULTS, STARTS, Store
 from studyrunner.kinds.kind import kind_of
-from studyrunner.kinds.task import Identity, PointResult, Result, StartResult, Task, digest, unpack_start
-from studyrunner.kinds.task_plan import TaskPlan
+from studyrunner.kinds.task import Identity, PointResult, Result, StartResult, Task, TaskPlan, digest, unpack_start
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.variables import COUNTS, LOOP_COMPONENTS, LOOP_PHASES, LOOPS

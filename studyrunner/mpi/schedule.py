@@ -1,4 +1,4 @@
-"""Sends tasks to ranks and receives results. This module does not know what a task is.
+"""Sends tasks to ranks and receives results. This module does not know what a task computes.
 
 A task has one result or several; each result is handed on at once. A long task reports its progress from time to time,
 so that another run can continue from there. Rank 0 computes as well: the main thread sends tasks and receives results,
@@ -16,19 +16,17 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any
 
 from studyrunner.mpi.cost_model import CostModel
-from studyrunner.mpi.dispatch import Assignment, Dispatcher, Work
+from studyrunner.mpi.dispatch import Assignment, Dispatcher, Task
 from studyrunner.mpi.ranks import POLL_SECONDS, Question, RankInterrupted, Ranks, wait_for_message
 from studyrunner.system.process import begin_ending, raise_ending, uninterrupted
 
 SECONDS_TO_PROGRESS = 3.0
-"""Shortest time between two reports of progress of a task, s; longer with many ranks.
-
-Together with the second that a report waits for others (`checkpoint.store`) a kill loses no step that was finished more
-than 5 s before, where steps are short and the disk is fast enough.
-"""
+"""Shortest time between two reports of progress of a task, s; longer with many ranks. Together with the second that a
+report waits for others (`checkpoint.store`) a kill loses no step that was finished more than 5 s before, where steps
+are short and the disk is fast enough."""
 
 SECONDS_TO_SHARE = 1.0
 """Shortest time between two reports of the share of a task that is done, s."""
@@ -39,12 +37,14 @@ _MANY_RANKS = 100
 _LOOKS_A_TICK = 100
 _AT_ONCE = 64
 
-Task = TypeVar("Task", bound=Work)
-Result = TypeVar("Result")
+Result = Any
+
+Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
+"""Does a task: gives the results one by one and may hand the progress to the given function."""
 
 
 @dataclass(frozen=True)
-class _Delivery(Generic[Result]):
+class _Delivery:
     """A result that is sent to rank 0, and the time that it took, s."""
 
     number: int
@@ -60,11 +60,7 @@ class _Progress:
     progress: object
 
 
-Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
-"""Does a task: gives the results one by one and may hand the progress to the given function."""
-
-
-class Office(Generic[Task, Result]):
+class Office:
     """What rank 0 does with tasks, results and messages. All of it is called in the main thread."""
 
     def begin(self) -> Iterable[Task]:
@@ -90,14 +86,11 @@ class Office(Generic[Task, Result]):
         """Called many times a second. running: returns the running tasks, as `Dispatcher.running`."""
 
 
-def serve_tasks(
-    ranks: Ranks, office: Office[Task, Result], run: Run[Task, Result], costs: CostModel | None = None
-) -> None:
-    """Rank 0: has all tasks done and computes some of them.
+def serve_tasks(ranks: Ranks, office: Office, run: Run, costs: CostModel | None = None) -> None:
+    """Rank 0: has all tasks done and computes some of them. costs: learns the run times of tasks.
 
-    An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here.
-    run: gives the results of a task one by one. costs: learns the run times of tasks.
-    Raises KeyboardInterrupt where another rank was interrupted.
+    An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here, and
+    KeyboardInterrupt where another rank was interrupted.
     """
     server = _Server(ranks, office, run, costs or CostModel())
     try:
@@ -112,7 +105,7 @@ def serve_tasks(
     server.local.stop()
 
 
-def follow_rank_0(ranks: Ranks, run: Run[Task, Result]) -> None:
+def follow_rank_0(ranks: Ranks, run: Run) -> None:
     """Any other rank: answers questions and does the tasks that rank 0 sends, until rank 0 sends None."""
 
     def send(reply: object) -> None:
@@ -129,8 +122,8 @@ def follow_rank_0(ranks: Ranks, run: Run[Task, Result]) -> None:
 
 
 def _work(
-    assignment: Assignment[Task],
-    run: Run[Task, Result],
+    assignment: Assignment,
+    run: Run,
     send: Callable[[object], None],
     seconds_to_progress: float,
     check: Callable[[], None],
@@ -159,13 +152,13 @@ def _work(
         raise ValueError(f"not {task.n_results} results from {task}")
 
 
-class _LocalWorker(Generic[Task, Result]):
+class _LocalWorker:
     """The computing thread of rank 0. assign: takes tasks. given_up: the thread ends at the next step of its task."""
 
-    def __init__(self, run: Run[Task, Result], seconds_to_progress: float) -> None:
+    def __init__(self, run: Run, seconds_to_progress: float) -> None:
         self._run = run
         self._seconds_to_progress = seconds_to_progress
-        self._tasks: queue.SimpleQueue[Assignment[Task] | None] = queue.SimpleQueue()
+        self._tasks: queue.SimpleQueue[Assignment | None] = queue.SimpleQueue()
         self._sent: deque[object] = deque()
         self.given_up = False
         self.assign = self._tasks.put
@@ -203,14 +196,14 @@ class _LocalWorker(Generic[Task, Result]):
         self._sent.append(message)
 
 
-class _Server(Generic[Task, Result]):
+class _Server:
     """Rank 0: sends tasks, receives results."""
 
-    def __init__(self, ranks: Ranks, office: Office[Task, Result], run: Run[Task, Result], costs: CostModel) -> None:
+    def __init__(self, ranks: Ranks, office: Office, run: Run, costs: CostModel) -> None:
         self._ranks = ranks
         self._office = office
         self._waiting = iter(office.begin())
-        self.dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
+        self.dispatcher = Dispatcher(ranks.size, costs, time.monotonic)
         self.local = _LocalWorker(run, _seconds_to_progress(ranks))
 
     def look(self) -> None:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
-from studyrunner.scene.drawn_contacts import drawn_pairs, scatters_pairs, worn_depth
+from studyrunner.scene.answers import SceneVariable
+from studyrunner.scene.pairs import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import (
     PairArrays,
@@ -20,7 +21,6 @@ from studyrunner.scene.scene_set import (
     pair_arrays,
     stuck_frequencies_of,
 )
-from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.realisation import block_of_input, draw_inputs
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study

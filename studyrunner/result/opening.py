@@ -19,13 +19,22 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
-from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS
-from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.study_of_result import check_result_file
 from studyrunner.study.toml_text import NoTomlError, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
-from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, KEPT, LOOPS, Variable
+from studyrunner.variables import (
+    ASKED,
+    CERTIFICATE,
+    COUNTS,
+    KEPT,
+    LOOPS,
+    OF_A_MISSION,
+    OF_A_MODE_POINT,
+    OF_MISSIONS,
+    OF_MODES,
+    Variable,
+)
 
 ENDED = "ended"
 """Coordinate of an opened result: `outcome` in words."""
