@@ -14,9 +14,7 @@ from solver.accuracy.period_events import half_wave_symmetric, lacks_even
 from solver.continuation.homotopy import add_harmonics, start_with_tail
 from solver.continuation.ratcheting import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.prolongation import transfer
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import State, largest_responses, transfer
 from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, all_orders

@@ -15,7 +15,7 @@ from solver.harmonic_balance.state import State
 from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Joint
 
 RELIEF = (0.1, 0.4)

@@ -19,8 +19,7 @@ import numpy as np
 
 from solver.continuation.natural import follow_naturally
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.prolongation import carried_history
-from solver.harmonic_balance.state import BalanceAt, State
+from solver.harmonic_balance.state import BalanceAt, State, carried_history
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.run import Run
 from solver.settings import Resolution

@@ -22,9 +22,8 @@ from solver.continuation.phase_lag import (
 )
 from solver.harmonic_balance.dlft import Balance
 from solver.model import FloatArray
-from solver.newton.bordering import Bordered
 from solver.newton.linear_solver import FORCING
-from solver.newton.run import Run
+from solver.newton.run import Bordered, Run
 from solver.settings import NEGLIGIBLE
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case

@@ -12,8 +12,7 @@ import numpy as np
 from solver.contact.coulomb import STICK
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import BalanceAt, State, final_history, vibration_change
-from solver.newton.iteration import MOST_ITERATIONS, SHORTEST_STEP
-from solver.newton.run import Run
+from solver.newton.run import MOST_ITERATIONS, SHORTEST_STEP, Run
 
 ATTEMPTS = 25
 """Most attempts of a search that comes closer with each of them: natural steps that fail, solves for the phase lag of

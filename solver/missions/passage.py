@@ -39,8 +39,7 @@ import numpy as np
 
 from solver.accuracy.reference import RTOL_RATIO
 from solver.clock import computing_time
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import Failure
+from solver.harmonic_balance.state import Failure, largest_responses
 from solver.loading_history.start_states import follow_line
 from solver.missions.block_run import Begun, BlockCase, BlockRun
 from solver.missions.blocks import Passage

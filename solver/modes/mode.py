@@ -1,6 +1,6 @@
 """A nonlinear mode: its equations at an amplitude, and its way along the amplitude.
 
-The equations are a harmonic balance with three further unknowns (`solver.newton.bordering`): the frequency omega, the
+The equations are a harmonic balance with three further unknowns (`solver.newton.run`): the frequency omega, the
 damping ratio zeta and the drive Q of the modal model (`modal_model`). The further equations are
 
     Re q = Q,      Im q = 0,      x_1^H M x_1 = a^2.
@@ -20,15 +20,13 @@ from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.contact.coulomb import STICK
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.harmonic_balance.prolongation import transfer
-from solver.harmonic_balance.state import State, final_history, history_at_rest
+from solver.harmonic_balance.state import State, final_history, history_at_rest, transfer
 from solver.loading_history.path import FREE_STEP, choose_resolution, largest_change
 from solver.loading_history.path_of_states import Step
 from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, modal_model
-from solver.newton.bordering import Bordered
-from solver.newton.run import Run
+from solver.newton.run import Bordered, Run
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.settings import DIFFERENCE, Resolution

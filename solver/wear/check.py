@@ -165,8 +165,7 @@ def _vibrates_otherwise(state: WearState) -> bool:
 def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failure | None:
     """Instability of a state by its Floquet multipliers, None if stable; every: as in `find_instability`."""
     joint = work.at(state)
-    unstable = find_instability(work.case, joint, state.point.evaluation, work.run, every)
-    return None if unstable is None else Failure(unstable.outcome, unstable.sentence)
+    return find_instability(work.case, joint, state.point.evaluation, work.run, every)
 
 
 def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:

@@ -20,12 +20,11 @@ from solver.continuation.phase_lag import solve_at_lag
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import FloatArray
-from solver.newton.iteration import MOST_ITERATIONS
-from solver.newton.run import Run
+from solver.newton.run import MOST_ITERATIONS, Run
 from solver.outcome import Outcome, in_digits
 from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.rate_slope import explicit_step_limit
 from solver.wear.state import Choice, LastStep, WearState

@@ -11,9 +11,7 @@ from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.harmonic_levels import MOST_UNKNOWNS, n_unknowns, room_for
 from solver.accuracy.refinement import refine
 from solver.contact.coulomb import SLIP, STICK
-from solver.harmonic_balance.prolongation import transfer
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import State, final_history
+from solver.harmonic_balance.state import State, final_history, largest_responses, transfer
 from solver.newton.run import Run
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import to_complex
