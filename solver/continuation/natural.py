@@ -1,8 +1,8 @@
 """Natural continuation of a converged state along one parameter, and constants that all searches share.
 
-The parameter is the frequency, the excitation amplitude, a homotopy parameter or the fraction of a step on the slow
-time scale. The *change* of the vibration is `vibration_change` of two states, relative to the first one. A state that
-is found is exact to the tolerance for all values of the constants.
+The parameter is the frequency, the excitation amplitude, the position of sliding masses or the fraction of a step on
+the slow time scale. The *change* of the vibration is `vibration_change` of two states, relative to the first one. A
+state that is found is exact to the tolerance for all values of the constants.
 """
 
 from __future__ import annotations

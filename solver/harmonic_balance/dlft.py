@@ -175,24 +175,24 @@ class Linearisation:
 
     def transmit(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Changes of motion, m, and contact force, N, both (n_contact, 3, m), for a step (n_rel, m), N."""
-        held, motion = self._held_back(step)
-        return self.joint.to_pairs(motion), self.joint.to_pairs(step - held)
+        rest, motion = self._untransmitted(step)
+        return self.joint.to_pairs(motion), self.joint.to_pairs(step - rest)
 
     def apply(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step (n_rel, m), N."""
-        held, motion = self._held_back(step)
-        return self.joint.structure.apply(motion) + step - held
+        rest, motion = self._untransmitted(step)
+        return self.joint.structure.apply(motion) + step - rest
 
     def apply_roughly(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step to at least three digits in less time, for directions of Newton's method."""
-        held, motion = self._held_back(step)
-        return self.joint.structure.apply_roughly(motion) + step - held
+        rest, motion = self._untransmitted(step)
+        return self.joint.structure.apply_roughly(motion) + step - rest
 
-    def _held_back(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _untransmitted(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Part of a step (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m."""
         joint = self.joint
         blocks = self.force_tangent, joint.law.compliance, self.growth_tangent
-        return hold_back(np.ascontiguousarray(step), joint.pair_rows, self.active, *blocks)
+        return untransmitted(np.ascontiguousarray(step), joint.pair_rows, self.active, *blocks)
 
     def dense(self, pairs: IntArray, kept: int | None = None) -> FloatArray:
         """Rows and columns of the Jacobian for some pairs and the first `kept` harmonics, 2H'+1, by default all; in the
@@ -225,7 +225,7 @@ class Linearisation:
 
 
 @njit(cache=True)
-def hold_back(
+def untransmitted(
     step: FloatArray,
     rows: IntArray,
     active: IntArray,
@@ -239,7 +239,7 @@ def hold_back(
     each harmonic, m/N. The others as in `Linearisation`.
     """
     m = step.shape[1]
-    held, motion, own = np.zeros_like(step), np.zeros_like(step), np.zeros(3 * m)
+    rest, motion, own = np.zeros_like(step), np.zeros_like(step), np.zeros(3 * m)
     for pair in active:
         own[:] = 0.0
         for i in range(3):
@@ -251,13 +251,13 @@ def hold_back(
             if row < 0:
                 continue
             for k in range(m):
-                held[row, k] = own[i * m + k] - passed[i * m + k]
-            motion[row, 0] = compliance[pair, i, 0].real * held[row, 0]
+                rest[row, k] = own[i * m + k] - passed[i * m + k]
+            motion[row, 0] = compliance[pair, i, 0].real * rest[row, 0]
             for n in range(1, m // 2 + 1):
-                cosine, sine, of = held[row, 2 * n - 1], held[row, 2 * n], compliance[pair, i, n]
+                cosine, sine, of = rest[row, 2 * n - 1], rest[row, 2 * n], compliance[pair, i, n]
                 # a complex amplitude is cosine - i sine
                 motion[row, 2 * n - 1] = of.real * cosine + of.imag * sine
                 motion[row, 2 * n] = of.real * sine - of.imag * cosine
             if i == 0:
                 motion[row, 0] += np.dot(growth[pair], own)
-    return held, motion
+    return rest, motion

@@ -75,14 +75,27 @@ def vibration_size(evaluation: Evaluation) -> float:
 # --- other harmonics: another penalty, with which a pair may be inertial instead of elastic ---
 
 
-def transfer(old: Case, joint: Joint, evaluation: Evaluation) -> tuple[Balance, FloatArray]:
-    """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old`."""
+def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool = False) -> tuple[Balance, FloatArray]:
+    """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old`.
+
+    with_tail: new harmonics of the force are those of its samples, and those of the motion follow from the structure.
+    Zeros would remove the impacts that the samples contain.
+    """
     balance = Balance(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
+    orders, known = joint.basis.orders, old.resolution.orders
     motion_h, force_h = (
-        change_orders(part, old.resolution.orders, joint.basis.orders)
+        change_orders(joint.to_relative(part), known, orders)
         for part in (evaluation.displacement_h, evaluation.force_h)
     )
-    return balance, balance.predict(motion_h, force_h)
+    if with_tail:
+        force = joint.to_relative(evaluation.force_t @ build_basis(orders, evaluation.force_t.shape[2]).analysis)
+        for place in np.flatnonzero(~np.isin(orders, known)):
+            both = slice(2 * place + 1, 2 * place + 3)
+            force_h[:, both] = force[:, both]
+            amplitude = to_complex(force)[:, place]
+            moved = -np.linalg.solve(joint.structure.moving.matrix(int(place)), amplitude)
+            motion_h[:, both] = np.stack([moved.real, -moved.imag], axis=1)
+    return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))
 
 
 def carried_history(old: Case, joint: Joint, evaluation: Evaluation) -> FloatArray:

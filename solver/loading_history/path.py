@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.period_events import left_out, nothing_happens
+from solver.accuracy.harmonic_levels import left_out, nothing_happens
 from solver.accuracy.refinement import KEPT_FRACTION, NODE_UNKNOWNS, Refined, refine
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally

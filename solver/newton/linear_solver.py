@@ -51,8 +51,8 @@ LARGEST_DENSE = 3000
 """Largest number of unknowns of a factorisation: 72 MB and 0.6 s. Above, the highest harmonics are left out."""
 
 EXPENSIVE_UNKNOWNS = 1000
-"""Unknowns of an expensive dense solve: above, no odd harmonics above 79, no homotopy in the harmonics, no 3 N + 2
-samples to compare, and no eigenvalues of Hill's matrix (255 unknowns take 0.15 s, 800 take 3 s)."""
+"""Unknowns of an expensive dense solve: above, no odd harmonics above 79, no 3 N + 2 samples to compare, and
+no eigenvalues of Hill's matrix (255 unknowns take 0.15 s, 800 take 3 s)."""
 
 SMALL_JOINT = 40
 """Relative displacements up to which a joint is small and its Jacobian is factorised: impacts couple most harmonics,
@@ -95,7 +95,7 @@ class DenseFactor:
 
 
 Factor = DenseFactor | PeriodFactor
-"""A factorisation of a Jacobian or of a matrix near the Jacobian; each gives the sign of its determinant."""
+"""A factorisation of a Jacobian or of a matrix near the Jacobian, with the sign of its determinant."""
 
 
 def build_dense_factor(tangent: Linearisation) -> DenseFactor:
@@ -129,7 +129,7 @@ class JacobianSolver:
     def solve_all(
         self, tangent: Linearisation, rights: Sequence[FloatArray] | FloatArray, rtol: float = FORCING
     ) -> FloatArray:
-        """Steps (k, n_rel, m) for k right-hand sides; a small system is factorised once."""
+        """As `solve` for k right-hand sides: steps (k, n_rel, m); a small system is factorised once."""
         rows, rest = tangent.active_rows, tangent.passive_rows
         steps = np.zeros((len(rights), *rights[0].shape))
         if 0 < rows.size * steps.shape[2] <= DENSE_UNKNOWNS:
@@ -148,7 +148,7 @@ class JacobianSolver:
         return steps
 
     def _solve_kept(self, tangent: Linearisation, right: FloatArray, rtol: float) -> FloatArray:
-        """Solution (n_rel, m) in the rows of the active pairs, with the kept factorisation while products are few."""
+        """Solution in the rows of the active pairs, with the kept factorisation while products are few."""
 
         def cleared(values: FloatArray) -> FloatArray:
             # the steps of these rows do not act on the rows of the active pairs
@@ -156,19 +156,13 @@ class JacobianSolver:
             return values
 
         def iterate(factor: Factor, products: int, cycles: float) -> tuple[FloatArray, bool]:
-            def inverse(vector: FloatArray) -> FloatArray:
-                return factor.solve(vector.reshape(right.shape))
-
             # preconditioned from the right: the residual of GMRES is the true one
-            solution, found = solve_gmres(
-                lambda vector: cleared(tangent.apply_roughly(inverse(vector))).ravel(),
-                lambda vector: cleared(tangent.apply(inverse(vector))).ravel(),
-                cleared(right.copy()).ravel(),
-                rtol,
-                products,
-                cycles,
-            )
-            return inverse(solution), found
+            def product(apply: Product) -> Product:
+                return lambda vector: cleared(apply(factor.solve(vector.reshape(right.shape)))).ravel()
+
+            operators = product(tangent.apply_roughly), product(tangent.apply)
+            solution, found = solve_gmres(*operators, cleared(right.copy()).ravel(), rtol, products, cycles)
+            return factor.solve(solution.reshape(right.shape)), found
 
         if self._factor is not None:
             solution, found = iterate(self._factor, KEPT_PRODUCTS, 1)

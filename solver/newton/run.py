@@ -23,27 +23,22 @@ MOST_ITERATIONS = 30
 """Most iterations of one solve. Prototypes took 2 to 5 from a warm start, up to 40 from a cold one near a resonance."""
 
 FULL_STEPS = 6
-"""Full steps in a row without a new lowest residual before steps are halved. Twice as many find equal states; with
-three, too, the static states of the dovetail are equal."""
+"""Full steps in a row without a new lowest residual before steps are halved. Half and twice as many: equal states."""
 
 SHORTEST_STEP = 1.0 / 128.0
-"""Shortest step as a fraction of the full step: seven halvings. With six a random scene (`THROWN_OFF` in
-`tests/solver/test_homotopy.py`) gets no accurate state. Also the shortest natural step over the range to the target
-(where a shorter one is needed, the branch is assumed to fold), and the shortest relaxation step in periods."""
+"""Shortest step as a fraction of the full step: seven halvings. With six one of 60 random scenes gets no accurate
+state. Also the shortest natural step over the range to the target (where a shorter one is needed, the branch is assumed
+to fold), and the shortest relaxation step in periods."""
 
 
-class HasResidual(Protocol):
-    """What the iteration asks of an evaluation."""
-
+class _HasResidual(Protocol):
     @property
-    def scale(self) -> tuple[float, float]:
-        """Scales of the residual."""
+    def scale(self) -> tuple[float, float]: ...
 
-    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
-        """Norm of the residual over its own or given scales."""
+    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float: ...
 
 
-EvaluationT = TypeVar("EvaluationT", bound=HasResidual)
+EvaluationT = TypeVar("EvaluationT", bound=_HasResidual)
 
 
 @dataclass(frozen=True)
@@ -65,10 +60,9 @@ def solve_newton(
 ) -> NewtonResult[EvaluationT]:
     """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance.
 
-    The residual is piecewise smooth. A full step that raises the residual often ends in the piece with the solution,
-    while a line search takes very short steps at every kink. So full steps come first, as long as the lowest norm is
-    improved once in `FULL_STEPS` iterations. Then the iteration returns to the best point and halves its steps
-    until the norm decreases.
+    The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution, while a line
+    search takes very short steps at every kink. So full steps come first, as long as the lowest norm is improved once
+    in `FULL_STEPS` iterations. Then the iteration returns to the best point and halves its steps until the norm falls.
     """
     unknown, current = start, evaluate(start)
     best, best_norm, since_best = (unknown, current), np.inf, 0
@@ -103,7 +97,7 @@ def solve_newton(
 class Bordered:
     """Evaluation of a balance with further equations.
 
-    balance, at: the harmonic balance at the values of the further unknowns, and its evaluation.
+    balance, at: at the values of the further unknowns.
     values, errors (k,): further unknowns, and residuals of the further equations, dimensionless.
     reduced (k, k): derivative of the errors by the values with p eliminated, of the last Newton step; None without one.
     extra: what the problem needs again for its derivatives.
@@ -178,10 +172,9 @@ class OutOfTimeError(Exception):
 
 @dataclass
 class Budget:
-    """Limits of one computation with all its parts, and the iterations that it has taken.
+    """Limits of one computation with all its parts.
 
-    iterations: Newton iterations so far.
-    limit: iterations after which no new step of a search begins.
+    iterations, limit: Newton iterations so far, and those after which no new step of a search begins.
     deadline: CPU time of the thread, s, after which the whole computation ends.
     report: called with a description of the progress, in words, at every change.
     """
@@ -206,8 +199,7 @@ class Budget:
 class Run:
     """Solves of one computation, one after the other. Each raises OutOfTimeError after the deadline of the budget.
 
-    tolerance: of the scaled residual, dimensionless.
-    budget: shared by all parts of the computation.
+    tolerance: of the scaled residual. budget: shared by all parts of the computation.
     solver: keeps a factorisation from solve to solve, which saves time and changes the last bits only.
     """
 

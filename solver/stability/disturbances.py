@@ -42,7 +42,7 @@ _HALF = 0.499  # imaginary part over omega from which a multiplier counts as rea
 
 
 class Monodromy(NamedTuple):
-    """Integration of disturbances through the N samples of a period, with n displacements and p switching pairs.
+    """Integration of disturbances through N samples of a period, with n displacements and p switching pairs.
 
     - response (n, 2n): motion without contact forces from the known parts of acceleration and velocity, m per sample.
     - spread (n, 3p): motion under unit contact forces, m/N.
@@ -64,14 +64,10 @@ class Monodromy(NamedTuple):
         """Size of a disturbance."""
         return 4 * len(self.response)
 
-    def apply(self, disturbance: FloatArray) -> FloatArray:
-        """Disturbances (size, j) a period later."""
-        return pass_period(self, disturbance)
-
 
 @njit(cache=True)
 def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
-    """Disturbances (4n, j) through the N samples of a period."""
+    """Disturbances (4n, j) a period later."""
     n, n_rows = of.response.shape[0], of.inverse.shape[1]
     now, before = disturbance[:n].copy(), disturbance[n : 2 * n].copy()
     speed, speed_before = disturbance[2 * n : 3 * n].copy(), disturbance[3 * n :].copy()
@@ -94,9 +90,9 @@ def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
 
 
 def build_monodromy(joint: Joint, linear: LinearModel, at: Evaluation, n_samples: int) -> Monodromy:
-    """Monodromy of a state at a fixed wear depth, with `n_samples` samples of the contact law.
+    """Monodromy of a state at a fixed wear depth in the structure `linear`, with samples of the contact law.
 
-    linear: the structure in which disturbances move. Raises numpy.linalg.LinAlgError where the structure is singular.
+    Raises numpy.linalg.LinAlgError where the structure is singular.
     """
     fine = replace(joint, basis=build_basis(joint.basis.orders, n_samples))
     state = Balance(fine, at.history, at.wear_depth).evaluate(at.predicted_h)
@@ -147,16 +143,15 @@ def switching_pairs(at: Evaluation) -> tuple[BoolArray, BoolArray]:
 def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     """Floquet multipliers exp(2 pi sigma / omega) of a state of a small real joint without masses on rigid ground.
 
-    None where the eigenvalue problem is large, or where the series is too short to give an exponent. A disturbance
-    x(t) exp(sigma t), with x of the period of the state, obeys the linearised balance of all displacements x and of the
-    predicted forces p of the pairs, with d = d/dt + sigma in place of d/dt:
+    None where the eigenvalue problem is large, or the series too short to give an exponent. A disturbance
+    x(t) exp(sigma t) obeys the linearised balance of all displacements x and of the predicted forces p of the pairs,
+    with d = d/dt + sigma in place of d/dt, in harmonics an eigenvalue problem for sigma:
 
         M d^2 x + C d x + K x + S^T dlambda/dp p = 0,        S x = du/dp p.
 
-    In harmonics this is an eigenvalue problem for sigma. Of the copies `sigma + i k omega` of an exponent, which the
-    truncated series gives ever worse, the ones with the smallest imaginary parts count (Moore, SIAM J. Numer. Anal. 42
-    (2005) 2553). The 196 states of the vibro-impact curve, CPU s and largest error of four multipliers of up to 3.19:
-    2.5 and 0.02, by time integration 11.7 and 0.56.
+    Of the copies `sigma + i k omega` of an exponent, which the truncated series gives ever worse, those with the
+    smallest imaginary parts count (Moore, SIAM J. Numer. Anal. 42 (2005) 2553). The 196 states of the vibro-impact
+    curve, CPU s and largest error of multipliers of up to 3.19: 2.5 and 0.02, by time integration 11.7 and 0.56.
     """
     linear, m, n_rel = joint.model.linear[0], len(joint.basis.synthesis), joint.component_index.size
     n = len(linear.mass)

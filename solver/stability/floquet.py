@@ -1,16 +1,16 @@
 """Stability of a periodic state: the sign of Hill's determinant, and the Floquet multipliers.
 
-A small disturbance p' of a state whose amplitudes vary slowly as exp(sigma t) obeys Hill's equation
+A small disturbance p' of a state with amplitudes that vary slowly as exp(sigma t) obeys Hill's equation
 
     [Z_r(i n w + sigma) du/dp + dlambda/dp] p' = 0.
 
-Its determinant is real for real sigma, that of the Jacobian, Eq. (16), at sigma = 0, and positive for sigma towards
-infinity. So a negative determinant of the Jacobian means an odd number of real, positive growth rates: multipliers on
-the real axis beyond +1, as between two folds of a branch. The sign is tested at each state of a branch (`is_stable`).
+Its determinant is that of the Jacobian, Eq. (16), at sigma = 0, and positive for sigma towards infinity. So a negative
+determinant of the Jacobian means an odd number of real, positive growth rates: multipliers on the real axis beyond +1,
+as between two folds of a branch. The sign is tested at each state of a branch (`is_stable`).
 
-Each period multiplies a disturbance by the monodromy; disturbances with a multiplier outside the unit circle grow. One
-beyond +1 leads to another state, one beyond -1 doubles the period, a complex pair brings a second frequency
-(Neimark-Sacker bifurcation). The multipliers of reported states come from the first method that serves:
+Disturbances with a multiplier outside the unit circle grow: beyond +1 to another state, beyond -1 with twice the
+period, a complex pair with a second frequency (Neimark-Sacker bifurcation). The multipliers of reported states come
+from the first method that serves:
 
 1. the exponents of the linear structure, where no pair slips, opens or closes;
 2. the exponents of Hill's equation, for a small joint that opens and closes;
@@ -38,14 +38,14 @@ from solver.stability.disturbances import (
     build_monodromy,
     hill_multipliers,
     linear_exponents,
+    pass_period,
     switching_pairs,
 )
 from solver.structure.joint import Case, Joint
 
 SMALL_SAMPLES = 512
-"""Samples of the law in a period, for joints of which all multipliers are computed. In 72 scenes with one pair all
-multipliers lie on the right side of 1, with errors below 0.01, or up to 0.16 far below 1. A quarter for larger joints:
-within 0.003 with 48 pairs. At most eight times as many where the structure alone vibrates fast."""
+"""Samples of the law in a period, for joints of which all multipliers are computed: 72 scenes with one pair lie on the
+right side of 1, most within 0.01. A quarter for larger joints: within 0.003 with 48 pairs."""
 
 SAMPLES_A_VIBRATION = 40
 """Samples in a period of the fastest growing vibration of the structure alone, which BDF2 damps by 0.6 %."""
@@ -55,38 +55,36 @@ OPENING_HARMONICS = 19
 harmonics: multiplier 0.95 in place of 2.8)."""
 
 OTHER_BRANCH = 0.05
-"""Relative difference of the vibration above which two states belong to different branches. On the branches of a mass
-at a wall more than 9 harmonics change means and first harmonics by up to 3 %; a corner at which a branch folds back a
-little is no jump."""
+"""Relative difference of the vibration above which two states belong to different branches. At a wall more than 9
+harmonics change means and first harmonics by up to 3 %; a corner at which a branch folds back a little is no jump."""
 
 MOST_ROWS = 600
 """Largest number of displacements of switching pairs: 200 such pairs take 0.4 GB and 10 s."""
 
 SMALLEST_GROWTH = 1e-3
-"""Growth in a period, beyond 1, that counts, and the residual below which a multiplier has converged. Sliding pairs
-that stick have multipliers of 1. The largest multiplier of 48 pairs converges in 20 products."""
+"""Growth in a period, beyond 1, that counts, and residual below which a multiplier has converged. Pairs that stick have
+multipliers of 1. The largest multiplier of 48 pairs converges in 20 products."""
 
 _EPS = float(np.finfo(np.float64).eps)
 
 Stability = Literal["stable", "fold", "period doubling", "Neimark-Sacker", "unknown"]
-"""Stability of a state: stable, or by which kind of disturbance unstable: a growing one ("fold", as between two folds),
-one that changes sign in each period, or one with a second frequency."""
+"""Stable, or the kind of disturbance that grows: one that keeps its sign ("fold", as between two folds), one that
+changes sign in each period, or one with a second frequency."""
 
 
 def is_stable(balance: Balance, at: Evaluation, run: Run) -> bool:
-    """False where a state has an odd number of real multipliers beyond +1 at a fixed wear depth.
+    """False where a state has an odd number of real multipliers beyond +1.
 
-    balance: of the state at a fixed wear depth: the vibration is fast, the wear is slow.
+    balance: of the state at a fixed wear depth, as the vibration is fast and the wear is slow.
     """
     return bool(run.solver.determinant_sign(balance.linearise(at)) >= 0.0)
 
 
 @dataclass(frozen=True)
 class Multipliers:
-    """Multipliers of a state.
+    """Multipliers of a state, largest modulus first; of a large joint the largest ones only; none where not computed.
 
-    - values: largest modulus first; of a large joint the largest ones only; none where not computed.
-    - error: estimated error of the first value by the time steps.
+    error: estimated error of the first value by the time steps.
     """
 
     values: ComplexArray
@@ -114,10 +112,8 @@ def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: 
     """Why a state is unstable at a fixed wear depth; None where it is stable, or where stability is not known.
 
     The outcome is PERIOD_DOUBLED where a disturbance of a switching joint changes sign in each period, else UNSTABLE.
-    every: False leaves out joints that switch, but for small ones that open and close. This is for states between the
-    first and the last of a wear history, where only impacts change the motion of a joint suddenly.
-
-    Raises OutOfTimeError where the time is over.
+    every: False leaves out joints that switch, but for small ones that open and close, for states within a wear
+    history, where only impacts change the motion suddenly. Raises OutOfTimeError.
     """
     switches = bool(switching_pairs(at)[0].any())
     if (not switches and _is_passive(joint.model.harmonic_structure(1))) or (
@@ -147,8 +143,8 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, growing
     - for a joint with more than `MOST_ROWS` displacements of switching pairs;
     - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch.
 
-    growing_only: to see whether something grows, with one number of time steps where nothing does, and of a state with
-    more harmonics on any branch. Raises OutOfTimeError.
+    growing_only: with one number of time steps where nothing grows, and of a state with more harmonics on any branch.
+    Raises OutOfTimeError.
     """
     switching, stuck = switching_pairs(at)
     if not switching.any():
@@ -169,7 +165,6 @@ def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, growing
 
 
 def _is_small(joint: Joint, at: Evaluation) -> bool:
-    """Whether all multipliers are computed."""
     return int(_moving(joint, switching_pairs(at)[1]).sum()) <= SMALL_JOINT
 
 
@@ -239,10 +234,10 @@ def _samples(joint: Joint, at: Evaluation, small: bool) -> int:
 def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
     """All multipliers, or the largest ones, as far as Arnoldi's method has converged."""
     if every:
-        return np.asarray(np.linalg.eigvals(monodromy.apply(np.eye(monodromy.size))), np.complex128)
+        return np.asarray(np.linalg.eigvals(pass_period(monodromy, np.eye(monodromy.size))), np.complex128)
 
     def product(vector: FloatArray) -> FloatArray:
-        return monodromy.apply(vector[:, None])[:, 0]
+        return pass_period(monodromy, vector[:, None])[:, 0]
 
     def settled(values: ComplexArray, residuals: FloatArray) -> bool:
         return bool(residuals[np.argmax(np.abs(values))] < SMALLEST_GROWTH)
@@ -265,10 +260,7 @@ def _moving(joint: Joint, fixed: BoolArray) -> BoolArray:
 
 
 def _is_driven(joint: Joint) -> bool:
-    """Whether a motion grows while all pairs stick, or a vibration while none does: the structure gains energy.
-
-    A motion without vibration that grows without the pairs does not count: a free blade leaves its spinning disk.
-    """
+    """Whether a motion grows while all pairs stick, or a vibration while none does: a free blade leaves its disk."""
     linear, every = joint.model.harmonic_structure(1), np.ones(joint.contact.n_contact, bool)
     stuck, free = (_growing(linear, _moving(joint, pairs).tobytes()) for pairs in (every, ~every))
     return stuck.size > 0 or bool((np.abs(free.imag) > free.real).any())
@@ -284,7 +276,7 @@ def _is_passive(linear: LinearModel) -> bool:
 
 @lru_cache(maxsize=4)
 def _growing(linear: LinearModel, moves: bytes) -> ComplexArray:
-    """Exponents sigma, 1/s, of the growing motions; moves: the bytes of those of `_exponents`, kept for next states."""
+    """Exponents sigma, 1/s, of the growing motions; moves: bytes of those of `linear_exponents`, for the cache."""
     if _is_passive(linear):
         return np.empty(0, complex)
     found = linear_exponents(linear, np.frombuffer(moves, bool))

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, certify
 from solver.accuracy.error_estimate import UNKNOWN
-from solver.accuracy.period_events import lacks_even, left_out
+from solver.accuracy.harmonic_levels import lacks_even, left_out
 from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure

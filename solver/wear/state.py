@@ -21,7 +21,7 @@ _NO_WEAR = 1e-12
 class Choice:
     """The last choice of harmonics and samples, and the state for which they were chosen.
 
-    left_out: fraction of the contact force of this state in harmonics that are left out (`period_events.left_out`).
+    left_out: fraction of the contact force of this state in harmonics that are left out (`harmonic_levels.left_out`).
     estimate: errors of response and wear rate with these harmonics and samples.
     accurate: whether these errors are below rtol; always true for given harmonics and samples.
     """

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.period_events import left_out
+from solver.accuracy.harmonic_levels import left_out
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.continuation.largest_response import accepted_rise, rise_of_response, solve_at_peak
 from solver.continuation.natural import NEAR_ITERATIONS
