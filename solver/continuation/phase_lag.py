@@ -22,8 +22,8 @@ from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Bordered, Run
 from solver.settings import DIFFERENCE, ROUND_OFF
+from solver.structure.condensation import frequency_slope
 from solver.structure.fourier import to_complex
-from solver.structure.frequency_slope import frequency_slope
 from solver.structure.joint import Case, Joint
 
 LARGEST_FREQUENCY_CHANGE = 0.02

@@ -28,8 +28,7 @@ from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
 from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
-from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.wearing_joint import WearingJoint, WearState
 
 
 def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:

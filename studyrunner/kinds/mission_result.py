@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from solver.missions.result import MissionHistory
+from solver.missions.mission import MissionHistory
 from solver.model import FloatArray
 from studyrunner.kinds.missions import Mission
 from studyrunner.kinds.task import PointResult

@@ -107,17 +107,17 @@ class Mission(Task):
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """The history."""
-        from solver.missions import blocks as solver_blocks
+        from solver.missions import mission as solver_mission
         from solver.missions.history import integrate_missions
         from studyrunner.kinds.mission_result import build_mission_result, missions_read
 
         of_joints = {block.joint: block.joint.model(models) for block in self.blocks}
         blocks = tuple(
-            solver_blocks.Block(
+            solver_mission.Block(
                 model=of_joints[block.joint],
                 frequency=block.frequency
                 if block.passage is None
-                else solver_blocks.Passage(block.frequency, *block.passage),
+                else solver_mission.Passage(block.frequency, *block.passage),
                 excitation_amplitude=block.excitation_amplitude,
                 friction_coefficient=block.joint.friction_coefficient,
                 cycles=block.cycles if block.passage is None else None,
@@ -134,7 +134,7 @@ class Mission(Task):
             reached(progress)
             keep(min(next(n_computed) / n_planned, _MOST))
 
-        mission = solver_blocks.Mission(
+        mission = solver_mission.Mission(
             blocks,
             self.wear_coefficient,
             missions_read(self.missions),

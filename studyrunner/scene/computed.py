@@ -9,8 +9,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from solver.packed_model import pack_model, unpack_model
-from solver.packing import Packed, pack, unpack
+from solver.packing import Packed, pack, pack_model, unpack, unpack_model
 from studies.scene_answers import NaturalFrequencies
 from studies.scenes import scene_frequencies, scene_has
 from studyrunner.study.study import Study
@@ -45,7 +44,7 @@ class InMemory(dict[str, Packed]):
 def model_once(study: Study, n_harmonics: int, computed: Computed, build: Callable[[], ReducedModel]) -> ReducedModel:
     """The reduced model of a scene that is not read from a scene file, built or from an earlier run.
 
-    Both are equal to the last bit, and so are all results (`solver.packed_model`).
+    Both are equal to the last bit, and so are all results (`solver.packing`).
     """
     return _once(model_key(study, n_harmonics), computed, build, pack_model, unpack_model)
 
