@@ -41,6 +41,9 @@ Automatic = Literal["auto"]
 Scheme = Literal["explicit", "implicit", "adaptive"]
 """Scheme of the steps on the slow time scale."""
 
+Direction = Literal["up", "down", "ramp"]
+"""Way to the unworn state: up or down along the frequency, or with rising excitation at one frequency."""
+
 Followed = Literal["resonance", "peak"]
 FOLLOWED: tuple[Followed, ...] = get_args(Followed)
 """What the frequency of an excitation may follow."""

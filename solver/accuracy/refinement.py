@@ -6,7 +6,7 @@ error is below `rtol`:
 
 - A state without even harmonics goes on without them.
 - A state in which nothing slips or opens keeps the first harmonic only, which is then exact.
-- Masses that ratchet are brought to rest first (`solver.continuation.ratcheting`).
+- Masses that ratchet are brought to rest first (`solver.continuation.natural`).
 - Where Newton's method diverges from a state with fewer harmonics, new ones begin as those of the force samples.
 """
 

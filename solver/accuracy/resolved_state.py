@@ -10,7 +10,7 @@ import numpy as np
 from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.harmonic_levels import half_wave_symmetric, lacks_even
-from solver.continuation.ratcheting import ratchets, shake_down
+from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.state import State, largest_responses, transfer
 from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Run
