@@ -43,7 +43,7 @@ from solver.continuation.natural import SMOOTH_CHANGE, Lengths, take_step
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.model import FloatArray
-from solver.newton.iteration import SHORTEST_STEP
+from solver.newton.run import SHORTEST_STEP
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF, Scheme
 from solver.structure.joint import Joint
