@@ -182,10 +182,7 @@ class WearingJoint:
         return cycles * self.wear_coefficient / self.area
 
     def begin(self, step_limit: float = math.nan, *, of_reference: bool = False) -> WearState:
-        """The unworn state, or that of the reference sweep where there is one. It is evaluated, not solved again.
-
-        step_limit: largest stable explicit step, cycles; NaN if unknown.
-        """
+        """The unworn state, or that of the reference sweep where there is one, evaluated and not solved again."""
         start = self.start
         state = start.reference if of_reference and start.reference is not None else start.state
         assert state is not None

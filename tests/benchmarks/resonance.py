@@ -16,7 +16,7 @@ from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.settings import FOLLOWED, Followed, FollowedFrequency, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.integrate import Integration, SlowTime
+from solver.wear.integrate import Integrations, SlowTime
 from solver.wear.step import Adaptive, Given
 from studies import build_scene
 from tests.benchmarks.frame import Table, arguments, measure
@@ -63,7 +63,7 @@ def cost(name: str, model: ReducedModel, load: float, between: tuple[float, floa
             follow = None if word == "fixed" else FollowedFrequency(word, *between)
             asked = SlowTime(WEAR, rule, np.array([0.0, cycles]), follow=follow)
             case = build_case(model, FRICTION, start.penalty_omega, settings, start.resolution)
-            runs = [measure(lambda: Integration(case, start, asked).history()) for _ in range(4)]  # noqa: B023
+            runs = [measure(lambda: Integrations(case, start).history(asked)) for _ in range(4)]  # noqa: B023
             whole, n_steps = min(run.seconds for run in runs), len(runs[0].result.course.ends) - 1
             each = 1e3 * whole / n_steps
             first = first or (whole, each)
