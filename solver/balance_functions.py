@@ -10,13 +10,12 @@ from numpy.typing import ArrayLike
 from solver.forced_response import check_case, check_number, worn_model
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import Direction
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.results.periodic_motion import PeriodicMotion, periodic_motion
 from solver.results.state_report import evaluated
-from solver.settings import SolverSettings
+from solver.settings import Direction, SolverSettings
 from solver.structure.joint import Case, build_case
 
 

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.forced_response import check_case, check_number, check_numbers, check_word, worn_model
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import Direction
 from solver.missions.history import integrate_missions
 from solver.missions.mission import Begin, Block, Mission, MissionHistory, Passage
 from solver.model import ReducedModel
@@ -21,6 +20,7 @@ from solver.results.history import WearHistory
 from solver.settings import (
     FOLLOWED,
     TARGETS,
+    Direction,
     Followed,
     FollowedFrequency,
     Scheme,

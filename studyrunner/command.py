@@ -171,11 +171,10 @@ def _follow(ranks: Ranks) -> int:
 def _show_plan(study: Study) -> int:
     from studyrunner.kinds.estimate import largest_memory
     from studyrunner.kinds.kind import build_tasks
-    from studyrunner.plan.plan_text import format_plan
-    from studyrunner.plan.plausibility import doubts_of_study
-    from studyrunner.scene.check_command import remarks_of_study
-    from studyrunner.scene.drawn_contacts import contact_changes
-    from studyrunner.scene.planned_scenes import plan_scenes
+    from studyrunner.plan import doubts_of_study, format_plan
+    from studyrunner.scene.answers import remarks_of_study
+    from studyrunner.scene.pairs import contact_changes
+    from studyrunner.scene.scene_set import plan_scenes
 
     before = largest_memory()
     planned = plan_scenes(study, _SlowSteps().say)
@@ -194,7 +193,7 @@ def _show_plan(study: Study) -> int:
 
 def _check(study: Study) -> int:
     from studyrunner.result.paths import check_output
-    from studyrunner.scene.check_command import check_study_model
+    from studyrunner.scene.answers import check_study_model
 
     picture = Path(f"{study.study.name}.check.png")
     target = check_output("--check", picture, study.files)

@@ -14,7 +14,7 @@ from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import Identity, digest
 from studyrunner.mpi.ranks import Ranks
-from studyrunner.plan.plausibility import doubts_of_study
+from studyrunner.plan import doubts_of_study
 from studyrunner.result.arrays import SmallArray, coordinates, scene_arrays
 from studyrunner.result.creation_date import describe_date
 from studyrunner.result.existing_result import Label, Target
@@ -22,8 +22,8 @@ from studyrunner.result.paths import older_folder, progress_file, remove_leftove
 from studyrunner.result.provenance import compare_with_archived, describe_run
 from studyrunner.result.sample_coordinates import sample_coordinates, worn_coordinate
 from studyrunner.result.software import describe_software
-from studyrunner.scene.check_command import remarks_of_study
-from studyrunner.scene.drawn_contacts import contact_changes
+from studyrunner.scene.answers import remarks_of_study
+from studyrunner.scene.pairs import contact_changes
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import frequencies_of_ratios, merge_facts, pair_arrays, stuck_frequencies_of
 from studyrunner.scene_building import Scenes, build_scenes

@@ -14,8 +14,7 @@ from studyrunner.kinds.task import Keep, Result, Task
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Run, serve_tasks
-from studyrunner.scene_building import SceneBuilt, Scenes, SceneTask, build_scene_task
-from studyrunner.scene_models import ModelCache
+from studyrunner.scene_building import ModelCache, SceneBuilt, Scenes, SceneTask, build_scene_task
 from studyrunner.study.study import Study
 from studyrunner.system.endings import raise_ending
 from studyrunner.system.machine_faults import MachineFaultError, is_fault_of_machine

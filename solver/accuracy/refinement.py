@@ -6,9 +6,9 @@ error is below `rtol`:
 
 - A state without even harmonics goes on without them.
 - A state in which nothing slips or opens keeps the first harmonic only, which is then exact.
-- Masses that ratchet are brought to rest first (`solver.continuation.ratcheting`).
-- Where Newton's method diverges from a state with fewer harmonics, the others are added by homotopy
-  (`solver.continuation.homotopy`), as far as the number of unknowns allows.
+- Masses that ratchet are brought to rest first (`solver.continuation.natural`).
+- Where Newton's method diverges from a state with fewer harmonics, the others start from its force samples, as far as
+  the number of unknowns allows.
 """
 
 from __future__ import annotations
@@ -209,7 +209,7 @@ class _Search:
         cheap = here.unknowns(above) <= EXPENSIVE_UNKNOWNS and self._allowed(here, above)
         if richer is None and here.case.settings.harmonics == "auto" and cheap:
             # impacts: Newton's method diverges from a warm start with more harmonics, although the state exists
-            richer, found = here.by_homotopy(above, self.run), 1
+            richer, found = here.with_impacts(above, self.run), 1
         if seeing > 2 and (richer is None or found < seeing):
             return UNKNOWN, richer
         below = shifted(resolution, -1)

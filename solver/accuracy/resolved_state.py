@@ -11,16 +11,15 @@ from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.harmonic_levels import n_unknowns
 from solver.accuracy.period_events import half_wave_symmetric, lacks_even
-from solver.continuation.homotopy import add_harmonics, start_with_tail
-from solver.continuation.ratcheting import ratchets, shake_down
-from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.prolongation import transfer
+from solver.continuation.natural import ratchets, shake_down
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.prolongation import carried_history, transfer
 from solver.harmonic_balance.response_peak import largest_responses
 from solver.harmonic_balance.state import State
 from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, all_orders
-from solver.structure.fourier import to_complex
+from solver.structure.fourier import build_basis, change_orders, to_complex
 from solver.structure.joint import Case, Joint
 
 FAINT_SHARE = 0.1
@@ -39,40 +38,29 @@ class ResolvedState:
     joint: Joint
     point: State
 
-    def solve_at(self, resolution: Resolution, run: Run) -> ResolvedState | None:
-        """The state with other harmonics and samples; None where it is not found."""
-        return self._solved(resolution, run, self.case, self.point.evaluation)
+    def solve_at(self, resolution: Resolution, run: Run, *, from_samples: bool = False) -> ResolvedState | None:
+        """The state with other harmonics and samples; None where it is not found.
 
-    def by_homotopy(self, resolution: Resolution, run: Run) -> ResolvedState | None:
-        """The same state with more harmonics, these raised from nothing; None where the homotopy ends.
-
-        Where the homotopy of all of them at once ends, half of them are raised first.
+        from_samples: new harmonics start from those of the force samples, and not from zero.
         """
-        found = self._in_one_homotopy(resolution, run)
+        if from_samples and 2 * resolution.highest >= self.case.resolution.samples:
+            return None
+        case, known = self.case.at(resolution), self.point.evaluation
+        joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
+        balance, start = (_from_samples if from_samples else transfer)(self.case, joint, known)
+        point = run.fresh().state(balance, start, self.point.parameter)
+        # the mean position of a mass depends a little on the harmonics
+        return None if point is None else replace(self, case=case, joint=joint, point=point).at_rest(run)
+
+    def with_impacts(self, resolution: Resolution, run: Run) -> ResolvedState | None:
+        """The state with more harmonics, which start from the force samples, at once or half of them first."""
+        found = self.solve_at(resolution, run, from_samples=True)
         middle = (self.case.resolution.highest + resolution.highest) // 2
         orders = tuple(order for order in resolution.orders if order <= middle)
         if found is not None or orders in (self.case.resolution.orders, resolution.orders):
             return found
-        half = self._in_one_homotopy(Resolution(orders, resolution.samples), run)
-        return None if half is None else half.solve_at(resolution, run) or half._in_one_homotopy(resolution, run)
-
-    def _in_one_homotopy(self, resolution: Resolution, run: Run) -> ResolvedState | None:
-        known, found = self.point.evaluation, None
-        if 2 * resolution.highest < self.case.resolution.samples:
-            found = self._solved(resolution, run, self.case, known, with_tail=True)
-        led = None if found is not None else add_harmonics(self.case, self.joint, known, resolution, run)
-        return found if led is None else self._solved(resolution, run, replace(self.case, resolution=resolution), led)
-
-    def _solved(
-        self, resolution: Resolution, run: Run, old: Case, known: Evaluation, *, with_tail: bool = False
-    ) -> ResolvedState | None:
-        """The state solved from a known one of the case `old`; with_tail: as `start_with_tail`."""
-        case = self.case.at(resolution)
-        joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
-        balance, start = (start_with_tail if with_tail else transfer)(old, joint, known)
-        point = run.fresh().state(balance, start, self.point.parameter)
-        # the mean position of a mass depends a little on the harmonics
-        return None if point is None else replace(self, case=case, joint=joint, point=point).at_rest(run)
+        half = self.solve_at(Resolution(orders, resolution.samples), run, from_samples=True)
+        return half and (half.solve_at(resolution, run) or half.solve_at(resolution, run, from_samples=True))
 
     def at_rest(self, run: Run) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
@@ -140,3 +128,24 @@ class ResolvedState:
         """Slip work, N m, below which its error has less weight: a fraction of the work of the excitation."""
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
         return SMALL_WORK * abs(self.joint.structure.input_work(motion))
+
+
+def _from_samples(old: Case, joint: Joint, evaluation: Evaluation) -> tuple[Balance, FloatArray]:
+    """As `transfer`; the new harmonics of the force are those of its samples, and move the structure.
+
+    Zeros would remove the impacts that the samples contain.
+    """
+    balance = Balance(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
+    orders, known = joint.basis.orders, old.resolution.orders
+    force = joint.to_relative(evaluation.force_t @ build_basis(orders, evaluation.force_t.shape[2]).analysis)
+    motion_h, force_h = (
+        change_orders(joint.to_relative(part), known, orders)
+        for part in (evaluation.displacement_h, evaluation.force_h)
+    )
+    for place in np.flatnonzero(~np.isin(orders, known)):
+        both = slice(2 * place + 1, 2 * place + 3)
+        force_h[:, both] = force[:, both]
+        amplitude = force[:, 2 * place + 1] - 1j * force[:, 2 * place + 2]
+        moved = -np.linalg.solve(joint.structure.moving.matrix(int(place)), amplitude)
+        motion_h[:, 2 * place + 1], motion_h[:, 2 * place + 2] = moved.real, -moved.imag
+    return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))

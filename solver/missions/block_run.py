@@ -16,9 +16,8 @@ from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
-from solver.loading_history.path_of_states import KEPT_NODES
 from solver.loading_history.start_states import follow_line
-from solver.loading_history.sweep_start import Direction
+from solver.loading_history.sweep import KEPT_NODES
 from solver.missions.mission import Block, Mission
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
@@ -27,7 +26,7 @@ from solver.packing import in_rows, packable
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
 from solver.results.verdict import first_cut_off
-from solver.settings import Resolution, SolverSettings
+from solver.settings import Direction, Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
 from solver.wear.integrate import Integrations, Like, SlowTime

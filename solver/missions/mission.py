@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from solver.contact.wear_law import ARCHARD, WearLaw
-from solver.loading_history.sweep_start import Direction
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.presentation import PresentedHistory
-from solver.settings import SolverSettings, WearTarget
+from solver.settings import Direction, SolverSettings, WearTarget
 
 Begin = Literal["ramp", "up", "down", "continue"]
 """How a block begins: from the static state by a ramp of the excitation or by a sweep, or from the last block."""

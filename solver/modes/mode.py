@@ -22,8 +22,7 @@ from solver.continuation.natural import NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.prolongation import transfer
 from solver.harmonic_balance.state import State, final_history, history_at_rest
-from solver.loading_history.path import FREE_STEP, choose_resolution, largest_change
-from solver.loading_history.path_of_states import Step
+from solver.loading_history.path import FREE_STEP, Step, choose_resolution, largest_change
 from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, modal_model

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, friction_limit
-from solver.continuation.first_state import RELIEF, relieved_history
-from solver.continuation.static_state import predicted_at_rest, solve_static_state
+from solver.continuation.first_state import RELIEF, predicted_at_rest, relieved_history, solve_static_state
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State
 from solver.loading_history.path import FREE_STEP

@@ -20,7 +20,7 @@ from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.path_of_states import Path, Step
+from solver.loading_history.path import Path, Step
 from solver.loading_history.sweep import Sweep
 from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel

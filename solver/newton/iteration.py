@@ -18,8 +18,8 @@ FULL_STEPS = 6
 three, too, the static states of the dovetail are equal."""
 
 SHORTEST_STEP = 1.0 / 128.0
-"""Shortest step as a fraction of the full step: seven halvings. With six a random scene (`THROWN_OFF` in
-`tests/solver/test_homotopy.py`) gets no accurate state. Also the shortest natural step over the range to the target
+"""Shortest step as a fraction of the full step: seven halvings. With six a random scene (seed 53 of
+`tests/random_scenes.py`) gets no accurate state. Also the shortest natural step over the range to the target
 (where a shorter one is needed, the branch is assumed to fold), and the shortest relaxation step in periods."""
 
 

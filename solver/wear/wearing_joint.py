@@ -1,7 +1,7 @@
 """A joint that wears: its state, from which a history goes on, and what all states of a history have in common.
 
-A followed frequency is an unknown with one more equation: a given phase lag of the vibration
-(`solver.continuation.phase_lag`), or that of the largest amplitude (`solver.continuation.largest_response`).
+A followed frequency is an unknown with one more equation: a given phase lag of the vibration, or that of the largest
+amplitude (`solver.continuation.phase_lag`).
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ import numpy as np
 from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.accuracy.period_events import left_out
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
-from solver.continuation.largest_response import accepted_rise, rise_of_response, solve_at_peak
 from solver.continuation.natural import NEAR_ITERATIONS
-from solver.continuation.phase_lag import solve_at_lag
+from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import FloatArray

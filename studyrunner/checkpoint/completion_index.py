@@ -13,8 +13,7 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from studyrunner.checkpoint.records import empty_record, record_of
 from studyrunner.checkpoint.store import PROGRESS, RESULTS, STARTS, Store
-from studyrunner.kinds.task import Identity, Result, StartResult, Task, digest, unpack_start
-from studyrunner.kinds.task_plan import TaskPlan
+from studyrunner.kinds.task import Identity, Result, StartResult, Task, TaskPlan, digest, unpack_start
 
 MOST_OF_OTHERS = 2.0**30
 """Largest size, bytes, of results of other studies that are kept under the same name."""

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES
+from studyrunner.scene.answers import SceneVariable
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import PairArrays
-from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
 

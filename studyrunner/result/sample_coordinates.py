@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from studyrunner.coordinates import COORDINATES
 from studyrunner.result.arrays import SmallArray
-from studyrunner.scene.drawn_contacts import drawn_pairs, scatters_pairs, worn_depth
+from studyrunner.scene.pairs import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import block_of_input, draw_inputs

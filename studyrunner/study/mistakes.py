@@ -60,10 +60,11 @@ class Mistakes:
 @contextmanager
 def scene_errors(source: str, path: Path | None) -> Iterator[None]:
     """SceneError and OSError become UserError. source: the study file. path: the scene file, None of bundled scenes."""
-    place, prefix = (source, "scene.") if path is None else (str(path), "")
+    place = source if path is None else str(path)
     try:
         yield
     except SceneError as error:
+        prefix = "" if path is not None else "outputs." if error.key == "variables" else "scene."
         raise UserError(place, prefix + error.key, Verbatim(error.value), error.remedy) from None
     except OSError as error:
         raise UserError(place, "the scene file", None, f"give a file that can be read: {error.strerror}") from None

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel
 
-from studyrunner.scatter.drawn_values import Drawn, ScatteredPairs, drawn
+from studyrunner.scatter.draws import Drawn, ScatteredPairs, drawn
 from studyrunner.scatter.section import OF_PAIRS, Scattered
 from studyrunner.study.kinds import NUMBERS
 from studyrunner.study.mission import MissionBlock

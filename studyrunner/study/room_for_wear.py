@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from studies.scenes import scene_with_room
 from studies.scenes.half_space.room_for_wear import ExpectedWear
-from studyrunner.scatter.drawn_values import largest_draw
 from studyrunner.study.study import Study
 
 _FAR = 3.1
@@ -59,7 +60,7 @@ def expected_wear(study: Study) -> ExpectedWear:
 
     def largest(name: str, own: float) -> float:
         scattered = None if study.scatter is None else study.scatter.inputs.get(name)
-        return own if scattered is None else largest_draw(scattered, own, _FAR)
+        return own if scattered is None else float(scattered.distribution.at(np.array(own), np.array(_FAR)))
 
     law, until = study.wear_law, study.slow_time.until or {}
     factor = sum(largest(f"surfaces_{label}", value) for label, value in law.surfaces) if law.surfaces else 1.0

@@ -5,7 +5,6 @@ They look at what the study file gives, and at complete studies.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any, get_args
 
@@ -99,8 +98,7 @@ def size_of_result(study: Study) -> Iterator[Wrong]:
     if "nodal_diameter" in study.dimensions and "natural_frequency" in study.scene_variables:
         remedy = "leave it out: it has a dimension nodal_diameter of its own; a study without this axis gives it"
         yield Wrong("outputs.variables", "natural_frequency", remedy)
-    n_points = math.prod(len(values) for values in study.dimensions.values())
-    if n_points > _MOST_POINTS:
+    if (n_points := study.n_points) > _MOST_POINTS:
         longest = max(study.dimensions, key=lambda name: len(study.dimensions[name]))
         remedy = f"give fewer values: there are {n_points:.3g} points, and a study has at most {_MOST_POINTS}"
         key = "scatter.samples" if longest == "sample" else f"axes.{longest}"

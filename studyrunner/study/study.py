@@ -179,6 +179,11 @@ class Study(Section):
         return {**found, "modal_amplitude": self.axes.modal_amplitude, "cycle": worn}
 
     @property
+    def n_points(self) -> int:
+        """Number of points of the result."""
+        return math.prod(len(values) for values in self.dimensions.values())
+
+    @property
     def axes_of_parts(self) -> dict[str, tuple[float | str, ...]]:
         """Names and values of the axes whose points are parts of the study (`realise`): the last axes of the result."""
         samples = {} if self.scatter is None else {"sample": tuple(range(self.scatter.realisations))}

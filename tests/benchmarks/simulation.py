@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studyrunner.kinds.task import PointResult, Result, StartResult, Task
-from studyrunner.kinds.task_plan import TaskPlan
+from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi.cost_model import CostKeys, CostModel, Measurement
 from studyrunner.mpi.dispatch import Assignment, Dispatcher

@@ -11,8 +11,7 @@ from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.records import record_type
 from studyrunner.checkpoint.store import Store
-from studyrunner.kinds.task import Identity, Index, Keep, PointResult, Result, StartResult, Task, digest
-from studyrunner.kinds.task_plan import TaskPlan
+from studyrunner.kinds.task import Identity, Index, Keep, PointResult, Result, StartResult, Task, TaskPlan, digest
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study

@@ -22,9 +22,9 @@ from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates, scene_arrays
 from studyrunner.result.provenance import POINTS_LEFT, describe_run
 from studyrunner.result.view import Result, open_for_report
+from studyrunner.scene.answers import SceneVariable
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import pair_arrays
-from studyrunner.scene.variables import SceneVariable
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, COUNTS, KEPT, LOOP_COMPONENTS, LOOPS, OF_SAMPLES, USUAL, Variable
 from tests.studyrunner.fakes import FACTS

@@ -8,7 +8,7 @@ import xarray as xr
 
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result.sample_coordinates import sample_coordinates
-from studyrunner.scene.drawn_contacts import contact_changes
+from studyrunner.scene.pairs import contact_changes
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.statistics.study_statistics import worn_volume_statistics
@@ -59,9 +59,9 @@ def test_scatter_of_the_wear_coefficient_alone_is_one_history():
     study = read_study("sdof_slider", given)
     plan = build_tasks(study, 2)
     assert (len(plan.sweeps), len(plan.results)) == (1, 1)
-    (cause,) = plan.left_out
-    assert cause.n_points == 63
-    assert "adaptive" in cause.reason
+    ((reason, n_points),) = plan.left_out.items()
+    assert n_points == 63
+    assert "adaptive" in reason
     samples = compute("sdof_slider", "w.nc", *given)
     assert samples.newton_iterations.min() == samples.newton_iterations.max()
     for sample in (3, 40):

@@ -11,10 +11,9 @@ from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
 from studyrunner.scene import computed
+from studyrunner.scene.answers import build_scene_variables, exact_answers
 from studyrunner.scene.computed import InMemory
 from studyrunner.scene.scene import build_study_scene
-from studyrunner.scene.scene_variables import exact_answers
-from studyrunner.scene.variables import build_scene_variables
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, fake_histories
 from tests.studyrunner.results import build_dataset, write_dataset

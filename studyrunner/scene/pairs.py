@@ -7,9 +7,9 @@ from collections.abc import Hashable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.scatter.drawn_values import ScatteredPairs
+from studyrunner.scatter.draws import ScatteredPairs
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import SceneSet, check_blocks
+from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import draw_pairs, is_of_pairs
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, WrongValueError
@@ -29,7 +29,11 @@ def contact_changes(
     """
     if not study.mission:
         return _of_parts(study, scenes, facts)
-    check_blocks(study, scenes, facts)
+    for numbers in scenes.of_blocks:
+        for block, number in zip(study.mission, numbers, strict=True):
+            if facts[numbers[0]].pairs != facts[number].pairs:
+                remedy = f"give parameters with which it has the contact pairs of {study.mission[0].name}, which wear"
+                raise UserError(study.source, f"mission.{block.name}", None, remedy)
     of_blocks = []
     for place in range(len(study.mission)):
         variants = tuple(variant.block_studies[place] for variant in study.variants or (study,))
@@ -65,7 +69,7 @@ def drawn_pairs(
             values = own.gap, own.friction_coefficient
             key = own.pairs, *(None if each is None else each.tobytes() for each in values)
             if key not in drawn:
-                drawn[key] = pair_values(variant, own) if scatters_pairs(study) else {}
+                drawn[key] = _pair_values(variant, own) if scatters_pairs(study) else {}
             yield variant, own, {name: each[sample] for name, each in drawn[key].items()}
 
 
@@ -85,7 +89,7 @@ def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
         raise UserError(study.source, "scene.worn.depth", error.value, error.remedy) from None
 
 
-def pair_values(study: Study, facts: SceneFacts) -> _Values:
+def _pair_values(study: Study, facts: SceneFacts) -> _Values:
     """Values (n_samples, n_contact) of the inputs that belong to pairs. study: with one scene. Raises UserError."""
     friction = facts.friction_coefficient
     if friction is None:

@@ -1,26 +1,29 @@
-"""The values that the samples of a study draw of its inputs."""
+"""The values that the samples of a study draw of its inputs, and designs of samples in the unit cube.
+
+By hand: a column of `scipy.stats.qmc` depends on the number of columns; its plain Sobol' sequence is used.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cholesky
 
-from studyrunner.scatter.design import unit_design
-from studyrunner.scatter.section import Array, Distribution, Scattered, ScatterSection
+from studyrunner.scatter.section import Array, Distribution, Method, Scattered, ScatterSection
 from studyrunner.user_error import WrongValueError
 
 _ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
 _NOT_BELOW_ZERO = ("friction_coefficient", "surfaces_", "threshold", "wear_coefficient")
 
 _NUGGET = 1e-8
-"""Share of the variance of a field that is independent from pair to pair.
+"""Share of the variance of a field that is independent from pair to pair: its Cholesky factor exists then for any
+positions; a value changes by 1e-4 standard deviations."""
 
-Its Cholesky factor exists then for any positions; a value changes by 1e-4 standard deviations.
-"""
+_DIGITS = 30
+"""Binary digits of a Sobol' sequence in scipy."""
 
 
 @dataclass(frozen=True)
@@ -78,11 +81,6 @@ def drawn(section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: S
     return found
 
 
-def largest_draw(scattered: Scattered, own: float, score: float) -> float:
-    """The value of an input so many standard deviations up, or the same share of a uniform one. own: study's value."""
-    return float(scattered.distribution.at(np.array(own), np.array(score)))
-
-
 def _field(name: str, length: float, pairs: ScatteredPairs) -> Array:
     """Factor L (n_pairs, n_pairs) of a Gaussian field L z of unit variance, z independent.
 
@@ -110,3 +108,60 @@ def _check(name: str, scattered: Scattered, draw: Drawn, own: ArrayLike) -> None
     if (smallest < 0.0 and name.startswith(_NOT_BELOW_ZERO)) or (smallest <= 0.0 and name in _ABOVE_ZERO):
         remedy = f"give less width, or lognormal: a sample draws {smallest:.3g}, which {name} cannot be"
         raise WrongValueError(shown, remedy, f"scatter.{name}")
+
+
+def unit_design(method: Method, seed: int, samples: int, dimensions: int, groups: Sequence[int] = ()) -> Array:
+    """Points (rows, dimensions) in the unit cube, without its surface.
+
+    A column depends on its number, the seed and the method alone. Except with "latin_hypercube" the first rows are the
+    design of fewer samples. "sobol" is scrambled by a random lower triangular matrix and a digital shift (Matousek
+    1998). With "saltelli" (Saltelli et al. 2010) each base sample has 2 + len(groups) rows: A, B, and for each group of
+    columns A with this group from B. groups: numbers of columns that vary together; each alone if empty.
+
+    Raises WrongValueError where a Sobol' sequence has not so many columns.
+    """
+    if method == "saltelli":
+        return _saltelli(seed, samples, groups or (1,) * dimensions)
+    if method == "sobol":
+        return _sobol(seed, samples, dimensions)
+    columns = np.empty((dimensions, samples))
+    for number, column in enumerate(columns):
+        rng = np.random.default_rng([seed, number])
+        # strictly inside: a normal distribution has no value at 0
+        column[:] = np.maximum(rng.random(samples), 2.0**-53)
+        if method == "latin_hypercube":
+            column[:] = (rng.permutation(samples) + column) / samples
+    return columns.T
+
+
+def _sobol(seed: int, samples: int, dimensions: int) -> Array:
+    from scipy.stats import qmc  # where it is used: it takes a while to load
+
+    if dimensions > qmc.Sobol.MAXDIM:
+        remedy = f'give "random": a Sobol\' sequence has at most {qmc.Sobol.MAXDIM} columns, {dimensions} are drawn'
+        raise WrongValueError("sobol", remedy, "scatter.method")
+    power = max(samples - 1, 0).bit_length()
+    plain = qmc.Sobol(dimensions, scramble=False, bits=_DIGITS).random_base2(power)[:samples]
+    whole = (plain * 2.0**_DIGITS).astype(np.int64)
+    design = np.empty((samples, dimensions))
+    for column in range(dimensions):
+        rng = np.random.default_rng([seed, column])
+        scrambled = np.full(samples, rng.integers(2**_DIGITS))
+        for digit in range(_DIGITS):
+            # a digit changes itself and, at random, those behind it
+            changed = 2**digit + rng.integers(2**digit)
+            scrambled ^= np.where(whole[:, column] >> digit & 1, changed, 0)
+        design[:, column] = (scrambled + 0.5) / 2.0**_DIGITS
+    return design
+
+
+def _saltelli(seed: int, samples: int, groups: Sequence[int]) -> Array:
+    # A and B of one column stand side by side, so that further columns change neither
+    both = _sobol(seed, samples, 2 * sum(groups))
+    first, second = both[:, 0::2], both[:, 1::2]
+    design = np.repeat(first[:, None], 2 + len(groups), axis=1)
+    design[:, 1] = second
+    ends = np.cumsum(groups)
+    for group, (begin, end) in enumerate(zip(ends - groups, ends, strict=True)):
+        design[:, 2 + group, begin:end] = second[:, begin:end]
+    return design.reshape(-1, sum(groups))
