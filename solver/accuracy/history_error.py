@@ -139,14 +139,12 @@ def _known(outputs: Both, found: HistoryError, unknown: BoolArray, area: FloatAr
 def error_of_target(
     target: WearTarget, at: float, other: float, depth: FloatArray, error: HistoryError, rate: float, area: FloatArray
 ) -> float:
-    """Estimated error of a life: of the count at which a history reaches its target, in the unit of the counts.
-
-    The larger one of the difference to the other solution and of the time that the error of the wear takes.
+    """Estimated error of the count at which a history reaches its target: its difference to the other solution, or the
+    time that the error of the wear takes, if that is longer.
 
     at, other: counts at which both solutions reach the target; inf or NaN where the other one does not.
-    depth (n_contact,): at the target, m; error: of the history at two counts, of which the target is the second.
-    rate: growth per count of the largest depth, m, or of the worn volume, m3, of which a resonance is a function.
-    area (n_contact,): m2.
+    depth (n_contact,): at the target, m. error: of the history at two counts, of which the target is the second.
+    rate: growth per count of the largest depth, m, or of the worn volume, m3. area (n_contact,): m2.
     """
     if target.quantity == "wear_depth":
         # any pair may have the largest depth within its error

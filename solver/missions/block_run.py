@@ -240,12 +240,11 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
 
 
 def _again(case: BlockCase, begun: Begun) -> StartState | None:
-    """The state at other depths than `begun`, with its errors, through the nodes of its sweep.
+    """The state at other depths than `begun`, with its errors, through the nodes of its sweep; else None.
 
-    With nodes of its own, the sweep of each mission would leave other static friction forces: the wear of a mission
-    would jump from depth to depth by the error of the sweep. Where each pair slips or opens within the period, the
-    state keeps nothing of its way, and follows from the depths alone. None where the way has jumped over a fold, where
-    there is no stable state, or where the vibration has changed so much that the way may lead to another branch.
+    With other nodes in each mission, the wear of a mission would jump from depth to depth by the error of the sweep.
+    Where each pair slips or opens within the period, the state follows from the depths alone. None where the way has
+    jumped over a fold, where there is no stable state, or where the way may lead to another branch.
     """
     start, run = begun.start, case.run
     if start is None or start.state is None or start.branch > 0:
@@ -297,9 +296,8 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, every_node: i
 def _continued(case: BlockCase, carried: StartState) -> StartState:
     """The state of a block that keeps the tangential history of the block before, or why there is none.
 
-    carried: state at the end of the block before. It is solved first at the depth before the block, which a longer or
-    an extrapolated step may have changed. Then amplitude and frequency change, one after the other, the frequency at
-    the smaller of both amplitudes. Raises OutOfTimeError, LinAlgError.
+    carried: state at the end of the block before, solved first at the depth before the block. Then amplitude and
+    frequency change, one after the other, the frequency at the smaller amplitude. Raises OutOfTimeError, LinAlgError.
     """
     before, run, frequency = carried.state, case.run, case.block.steady[0]
     assert before is not None

@@ -56,17 +56,15 @@ MOST_FREQUENCIES = 400
 
 FINEST_INTERVAL = 0.1
 """Longest interval of frequencies that is never divided, over sqrt(|df/dt|): a tenth of zeta f where the sweep rate is
-1. Slider without damping, 1 to 10 000 Hz at 10 Hz/s, once: a result after 89 CPU seconds; without this limit the first
-of two solutions was not finished after 100."""
+1. Slider without damping, 1 to 10 000 Hz at 10 Hz/s: 89 CPU seconds; without this limit not finished after 100."""
 
 FREQUENCY_ERROR = 0.25
 """Allowed error of the wear of a passage by its frequencies, as a fraction of rtol."""
 
 LARGEST_SWEEP_RATE = 1.0
-"""|df/dt| / (zeta f)^2 above which a message says how fast a passage is. Wear over that of the steady states,
-integrated in time, and the estimated error: slider 0.999 to 1.000 and 3.4 % at 1, 0.994 to 0.996 and 9 % at 3, 0.967 to
-0.972 and 29 % at 10; dovetail (mesh 1) 0.983 and 5 % at 1.9, 0.95 and 15 % at 6.3, 0.91 and 45 % at 19, 0.95 and 100 %
-at 63."""
+"""|df/dt| / (zeta f)^2 above which a message says how fast a passage is. Wear, integrated in time, over that of the
+steady states, and the estimated error: slider 0.999 and 3.4 % at 1, 0.995 and 9 % at 3, 0.97 and 29 % at 10; dovetail
+(mesh 1) 0.983 and 5 % at 1.9, 0.95 and 15 % at 6.3, 0.91 and 45 % at 19, 0.95 and 100 % at 63."""
 
 
 @dataclass(frozen=True)

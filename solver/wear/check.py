@@ -1,9 +1,8 @@
-"""Check of a state of a wearing joint: whether it is a result (certificate, harmonics, stability), and the last one.
+"""Check of a state of a wearing joint: whether it is a result, and whether it is the last one.
 
-A history ends at a last count, at a target, where nothing wears any more, or where wear goes on without end. In a
-steady state every pair that slips carries no force. The slowest pair determines how fast a history approaches this
-state. So the history ends where the wear rate of every pair is below a fraction of the largest rate of this pair. A
-joint that slips everywhere under a load that nothing else carries has no steady state: its wear rate is constant.
+In a steady state every pair that slips carries no force, and the slowest pair determines how fast a history approaches
+this state. So a history to the end of wear ends where the wear rate of every pair is below a fraction of its largest
+one. A joint that slips everywhere under a load that nothing else carries has no steady state: its rate is constant.
 """
 
 from __future__ import annotations

@@ -161,8 +161,7 @@ class Course:
     def after(self, cycle: float, report: StateReport, rate: FloatArray, error: float) -> Course:
         """The course with another step.
 
-        cycle: count at its end. report: of its state. rate (n_contact,): m per cycle. error: local error of the step,
-        as worn volume, m3.
+        cycle: at its end. report: of its state. rate (n_contact,): m per cycle. error: local error of the step, m3.
         """
         nodes = (*self.nodes, Node(cycle, report, rate, error + (self.nodes[-1].local if self.nodes else 0.0)))
         resolutions = self.resolutions
@@ -212,10 +211,9 @@ class Course:
         return found
 
     def even_counts(self, n_outputs: int) -> FloatArray:
-        """Counts (n_outputs,) that divide the progress of the history evenly, up to its end or its target.
+        """Counts (n_outputs,) to the end or the target, evenly spaced in the shares of worn volume and cycles together.
 
-        The progress is the fraction of the worn volume plus that of the cycles: neither a burst of wear nor a long calm
-        phase is missed.
+        So neither a burst of wear nor a long calm phase is missed.
         """
         end = self.nodes[-1].cycle if math.isnan(self.reached) else self.reached
         whole = float(self.dense.at(np.array([end]))[0] @ self.area)

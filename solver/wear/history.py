@@ -35,17 +35,11 @@ def integrate_together(
 
     Each is that which it would be alone. All those with given steps are compared with one adaptive history.
 
-    Parameters
-    ----------
-    model, friction_coefficient, settings, start
-        The case, and the unworn state at the start of the histories.
-    asked
-        Steps of each history; they differ in nothing else but their counts up to one last count.
-    keep
-        Called from time to time with the progress.
-    resume
-        Progress, as given to `keep`, of a computation of some of these histories, which goes on from there. The results
-        are equal to the last bit, except `run_time`.
+    model, friction_coefficient, settings, start: the case, and the unworn state at the start of the histories.
+    asked: steps of each history; they differ in nothing else but their counts up to one last count.
+    keep: called from time to time with the progress.
+    resume: progress, as given to `keep`, of a computation of some of these histories, which goes on from there. The
+        results are equal to the last bit, except `run_time`.
     """
     known = start.state is not None
     case = build_case(model, friction_coefficient, start.penalty_omega, settings, start.resolution) if known else None

@@ -1,15 +1,13 @@
 """The integration of a wear history over the slow time, and of its reference solution, step by step.
 
 The reference solution is a second computation whose difference, pair by pair, is taken for the error. It starts from
-another sweep: a third of the nodes, placed between those of the fine sweep (`solver.loading_history`). It is coarser in
-all: its steps on the slow time have twice the tolerance, and it has the next lower harmonics (the next higher ones
-where the harmonics are few) with the samples that belong to them. Some events make an error grow: pairs stick again, a
-resonance passes, a branch ends. The difference to the reference solution grows as well, a sum of local errors does not.
+another sweep, with a third of the nodes (`solver.loading_history`), and is coarser in all: its steps have twice the
+tolerance, and it has the next lower harmonics and samples. Where pairs stick again, a resonance passes or a branch
+ends, errors grow. The difference to the reference solution grows as well, a sum of local errors does not.
 
-A history with given Euler steps has no reference solution of its own: it is compared with the adaptive history, whose
-errors are known, and which all given steps share. A coarser history with the same steps errs as they do: where a pair
-only just slips (dovetail, 16 pairs, 212.5 Hz) it sticks with implicit steps, 1.89 mm3, with steps of 250 cycles 1.90;
-the truth is 2.03.
+A history with given Euler steps is compared with the adaptive history, which all given steps share. A coarser history
+with the same steps errs as they do: where a pair only just slips (dovetail, 16 pairs, 212.5 Hz) it sticks with implicit
+steps, 1.89 mm3, with steps of 250 cycles 1.90; the truth is 2.03.
 """
 
 from __future__ import annotations
@@ -105,7 +103,7 @@ class SlowTime:
     def adaptive_to(self, reached: float, rtol: float) -> SlowTime:
         """The adaptive history with which one with given steps is compared, that has come to the count `reached`.
 
-        Equal for all histories with given steps to one last count; to another end it is no longer than needed.
+        Equal for all given steps to one last count; to another end it is no longer than needed.
         """
         known = self.end < math.inf and self.until is None
         never = None if self.until is None else replace(self.until, value=math.inf)
@@ -267,8 +265,8 @@ class Integrations:
 def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
     """Harmonics and samples of the reference solution: those of the next lower level.
 
-    With one harmonic alone a joint that slips is another joint. So the reference solution of a history with three
-    harmonics or one has the next higher level, where the model has matrices for it.
+    With one harmonic alone a joint that slips is another joint: three harmonics or one become more, where the model has
+    matrices for them.
     """
     richer = shifted(resolution, 1)
     if resolution.highest <= FIRST_HARMONICS and model.holds(richer.highest):
@@ -280,10 +278,9 @@ def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
 def begin_reference(work: WearingJoint, step_limit: float) -> WearState:
     """The unworn state of the reference solution.
 
-    The state of the reference sweep differs from the start state in its tangential history. Even a small difference may
-    decide whether a pair goes on slipping while the joint wears. So the state is solved with twice the difference
-    (dovetail, 212.5 Hz: the worn volume is 0.082 or 0.106 mm3; both sweeps lead to 0.082, twice their difference to
-    0.097). Where this state is not found, the state of the reference sweep is taken.
+    The state of the reference sweep has another tangential history, which may decide whether a pair goes on slipping
+    while the joint wears. So the state is solved with twice the difference (dovetail, 212.5 Hz: 0.082 or 0.106 mm3;
+    both sweeps lead to 0.082, twice their difference to 0.097); where it is not found, that of the sweep is taken.
     """
     begun, fine, reference = work.begin(step_limit, of_reference=True), work.start.state, work.start.reference
     if fine is None or reference is None:

@@ -272,8 +272,8 @@ class WearingJoint:
     def frequency_error(self, state: WearState) -> float:
         """Error of a followed frequency, Hz, by the relative error of the response; 0 for a given one.
 
-        The phase of the vibration, and so the phase lag, is wrong by as much as the amplitude. The amplitude is flat at
-        its maximum: every amplitude that is less than the largest one by its error may be the largest one.
+        The phase lag is wrong by as much as the amplitude. Every amplitude that is less than the largest one by its
+        error may be the largest one.
         """
         if self.follow is None:
             return 0.0

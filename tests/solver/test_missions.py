@@ -96,24 +96,6 @@ def test_depths_of_a_table_count_from_the_unworn_joint():
 # --- exact volumes ---
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("order", [1, -1])
-def test_gross_slip_wears_by_the_stroke_times_the_load_in_any_order(order):
-    """V = k_w N s with the slip path s of a period: no wear acts back on a constant normal force."""
-    model = scene("sdof_slider", normal_stiffness=0.0)
-    amplitudes, cycles = ((10.0, 14.0), (3e3, 5e3))
-    blocks = tuple(Block(model, 160.0, *of, "continue") for of in zip(amplitudes, (FRICTION,) * 2, cycles, strict=True))
-    history = integrate(blocks[::order], 6)
-    once = [march_wear(model, 160.0, load, FRICTION, WEAR, 1.0, settings=SETTINGS) for load in amplitudes]
-    exact = np.array([6.0 * n * one.wear_rate[0] for n, one in zip(cycles, once, strict=True)])[::order]
-    np.testing.assert_allclose(history.block_volume[-1], exact, rtol=1e-6)
-    # the slip path is four amplitudes
-    amplitude = float(np.abs(history.response_end[-1, 0, 0]))
-    assert exact[0] / (6.0 * cycles[::order][0]) == pytest.approx(WEAR * 10.0 * 4.0 * amplitude, rel=0.05)
-    assert history.outcome is Outcome.CONVERGED
-    assert history.steps.tolist() == [1, 1, 2, 2]
-
-
 def exact_growth(blocks, missions):
     """Volumes worn by each block (n_block,), m3, by Den Hartog's form and the differential equation of the depth."""
     p = SliderParameters()
@@ -323,18 +305,6 @@ def test_a_step_is_of_second_order_and_its_error_is_known(monkeypatch):
         errors.append(apart)
     assert errors[0] < 1e-12 * float(nodes[-1].depth @ mission.area)
     assert 6.0 < errors[4] / errors[3] < 8.5
-
-
-def test_an_interrupted_mission_goes_on_to_the_last_bit(exact_blocks):
-    mission, kept = known_blocks((0, 100, 301), 3.0), list[Packed]()
-    whole = integrate_missions(mission, keep=kept.append)
-    left = len(exact_blocks)
-    for place in (0, 1, 5, len(kept) // 2, len(kept) - 2, len(kept) - 1):
-        exact_blocks.clear()
-        assert equal(integrate_missions(mission, resume=kept[place]), whole)
-        assert len(exact_blocks) < left
-        left = len(exact_blocks)
-    assert left == 0
 
 
 def test_a_target_ends_the_missions(exact_blocks):
