@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, certify
 from solver.accuracy.error_estimate import UNKNOWN
-from solver.accuracy.period_events import lacks_even, left_out
+from solver.accuracy.harmonic_levels import lacks_even, left_out
 from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
@@ -89,7 +89,7 @@ def full_check(
         return Failure(Outcome.ADRIFT)
     if _vibrates_otherwise(state):
         if (unstable := find_instability(work.case, work.at(state), at, work.run, False)) is not None:
-            return Failure(unstable.outcome, unstable.sentence)
+            return unstable
         state = replace(state, judged_h=at.predicted_h)
     return state, reported
 
@@ -158,8 +158,7 @@ def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
     if free_slide(joint, at) is None and not work.is_stable(joint, at):
         return Failure(Outcome.UNSTABLE)
-    unstable = find_instability(work.case, joint, at, work.run, True)
-    return None if unstable is None else Failure(unstable.outcome, unstable.sentence)
+    return find_instability(work.case, joint, at, work.run, True)
 
 
 def why_ended(work: WearingJoint, state: WearState, course: Course) -> Failure | None:
