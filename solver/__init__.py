@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from solver.forced_response import FrequencyResponse as FrequencyResponse
     from solver.forced_response import frequency_response as frequency_response
     from solver.mission_history import integrate_mission as integrate_mission
-    from solver.missions.blocks import Block as Block
-    from solver.missions.blocks import Passage as Passage
-    from solver.missions.result import MissionHistory as MissionHistory
+    from solver.missions.mission import Block as Block
+    from solver.missions.mission import MissionHistory as MissionHistory
+    from solver.missions.mission import Passage as Passage
     from solver.model import ReducedModel as ReducedModel
     from solver.model_from_matrices import build_model as build_model
     from solver.nonlinear_modes import Backbone as Backbone
@@ -51,13 +51,13 @@ if TYPE_CHECKING:
 # Loaded at the first use: rooms import each other through this package, and loading numba takes a while.
 _PLACES = {
     "Backbone": "nonlinear_modes",
-    "Block": "missions.blocks",
+    "Block": "missions.mission",
     "FrequencyResponse": "forced_response",
     "HarmonicBalance": "balance_functions",
-    "MissionHistory": "missions.result",
+    "MissionHistory": "missions.mission",
     "ModalResponse": "single_mode_theory",
     "Outcome": "outcome",
-    "Passage": "missions.blocks",
+    "Passage": "missions.mission",
     "PeriodicMotion": "results.periodic_motion",
     "ReducedModel": "model",
     "ResponseCurve": "whole_response",

@@ -11,11 +11,9 @@ from numpy.typing import ArrayLike
 
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.forced_response import check_case, check_number, check_numbers, check_word
-from solver.loading_history.sweep_start import Direction
-from solver.missions.blocks import Begin, Block, Mission, Passage
 from solver.missions.history import integrate_missions
-from solver.missions.result import MissionHistory
-from solver.settings import TARGETS, SolverSettings, WearTarget
+from solver.missions.mission import Begin, Block, Mission, MissionHistory, Passage
+from solver.settings import TARGETS, Direction, SolverSettings, WearTarget
 from solver.structure.joint import friction_of_pairs
 
 

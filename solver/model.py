@@ -90,7 +90,7 @@ class LinearModel:
         return LinearModel(*(np.conj(part) for part in parts))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ReducedModel:
     """A scene: linear structure(s), the contact pairs on them and the names of the responses.
 
@@ -122,6 +122,16 @@ class ReducedModel:
         if 2 * wrapped > self.n_sectors:
             return self.linear[self.n_sectors - wrapped].conjugate
         return self.linear[wrapped]
+
+    def __repr__(self) -> str:
+        """Three lines: sizes, contact pairs, responses."""
+        contact, words = self.contact, (name or "without a name" for name in dict.fromkeys(self.contact.surface))
+        wave = f", nodal diameter {self.nodal_diameter} of {self.n_sectors} sectors" if self.n_sectors else ""
+        return (
+            f"ReducedModel: {len(self.linear[0].mass)} displacements{wave}\n"
+            f"  contact pairs      {contact.n_contact} on {contact.area.sum():.6g} m2, surfaces {', '.join(words)}\n"
+            f"  responses          {', '.join(self.response_names)}"
+        )
 
     def holds(self, n_harmonics: int) -> bool:
         """Whether the scene has the nodal diameters of all harmonics 0..n_harmonics."""

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
+from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.nonlinear_modes import Backbone
 
 
@@ -61,7 +61,14 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
         belong together.
     """
     linear = model.harmonic_structure(1)
-    order = _usable(mode, excitation_amplitude, len(linear.mass))
+    if not 0.0 < excitation_amplitude < np.inf:
+        raise ValueError(f"excitation_amplitude: give a finite number above 0 instead of {excitation_amplitude!r}")
+    if mode.shape.shape[1] != len(linear.mass):
+        raise ValueError("mode: give a mode of this model: the number of its displacements is another one")
+    _, order = np.unique(mode.amplitude, return_index=True)
+    order = order[np.isfinite(mode.frequency[order])]
+    if len(order) < 2:
+        raise ValueError("mode: give a mode with a state at two amplitudes or more")
     known = np.log(mode.amplitude[order])
     at = np.unique(np.concatenate([np.linspace(*ends, points + 1) for ends in pairwise(known.tolist())]))
 
@@ -72,33 +79,19 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
 
     size = np.exp(at)
     omega, zeta = 2.0 * np.pi * between(mode.frequency)[:, 0].real, between(mode.damping_ratio)[:, 0].real
-    shape = between(mode.shape / mode.amplitude[:, None])
+    shape, shown = (between(part / mode.amplitude[:, None]) for part in (mode.shape, mode.response))
     force = excitation_amplitude * (shape.conj() @ linear.load_harmonic)
     # Omega^4 - 2 middle Omega^2 + omega^4 = |force|^2 / a^2
     middle = omega**2 * (1.0 - 2.0 * zeta**2)
     inside = middle**2 - omega**4 + (np.abs(force) / size) ** 2
-    with np.errstate(invalid="ignore"):
-        sides = [np.sqrt(middle + sign * np.sqrt(inside)) for sign in (-1.0, 1.0)]
-    shown = between(mode.response / mode.amplitude[:, None])
-    parts = []
-    for number, excited in enumerate(sides):
-        rows = np.flatnonzero(np.isfinite(excited))[:: 1 - 2 * number]
+    parts: list[tuple[np.ndarray, ...]] = []
+    for direction in (1, -1):
+        with np.errstate(invalid="ignore"):
+            excited = np.sqrt(middle - direction * np.sqrt(inside))
+        rows = np.flatnonzero(np.isfinite(excited))[::direction]
         at_rows, own = excited[rows], omega[rows]
         coordinate = force[rows] / (own**2 - at_rows**2 + 2j * zeta[rows] * own * at_rows)
         parts.append((at_rows / (2.0 * np.pi), size[rows], coordinate[:, None] * shown[rows], zeta[rows]))
-    nothing = tuple(np.full((1, *part.shape[1:]), np.nan, part.dtype) for part in parts[0])
-    curve = [parts[0], nothing, parts[1]] if inside[-1] > 0.0 else parts
-    return ModalResponse(*(np.concatenate(each) for each in zip(*curve, strict=True)))
-
-
-def _usable(mode: Backbone, excitation_amplitude: float, n_displacements: int) -> IntArray:
-    """Indices of the amplitudes that have a state, ascending in amplitude. Raises ValueError as `modal_response`."""
-    if not 0.0 < excitation_amplitude < np.inf:
-        raise ValueError(f"excitation_amplitude: give a finite number above 0 instead of {excitation_amplitude!r}")
-    if mode.shape.shape[1] != n_displacements:
-        raise ValueError("mode: give a mode of this model: the number of its displacements is another one")
-    _, order = np.unique(mode.amplitude, return_index=True)
-    order = order[np.isfinite(mode.frequency[order])]
-    if len(order) < 2:
-        raise ValueError("mode: give a mode with a state at two amplitudes or more")
-    return np.asarray(order)
+    if inside[-1] > 0.0:
+        parts.insert(1, tuple(np.full((1, *part.shape[1:]), np.nan, part.dtype) for part in parts[0]))
+    return ModalResponse(*(np.concatenate(each) for each in zip(*parts, strict=True)))

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.forced_response import check_case, check_number, check_numbers, check_word, worn_model
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import Direction
 from solver.model import ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import (
     FOLLOWED,
     TARGETS,
+    Direction,
     Followed,
     FollowedFrequency,
     Scheme,
@@ -25,10 +25,9 @@ from solver.settings import (
     WearTarget,
 )
 from solver.structure.joint import friction_of_pairs
-from solver.wear.control import steps_of
 from solver.wear.history import integrate_wear
-from solver.wear.solutions import SlowTime
-from solver.wear.wearing_joint import Fixed, Following
+from solver.wear.integrate import SlowTime
+from solver.wear.step import steps_of
 
 
 def march_wear(
@@ -135,8 +134,7 @@ def march_wear(
     _, start = next(follow_branch(model, friction, load, follow or np.array([at]), sweep, settings))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
     steps = steps_of(scheme, length, settings.rtol)
-    where = Fixed() if follow is None else Following(follow)
-    asked = SlowTime(per_pressure, steps, read_at, law=law, until=until, where=where)
+    asked = SlowTime(per_pressure, steps, read_at, law=law, until=until, follow=follow)
     return integrate_wear(model, friction, settings, start, asked)
 
 

@@ -18,12 +18,9 @@ from solver.newton.run import Run
 from solver.settings import FollowedFrequency, SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case
-from solver.wear.check import Checked, FullCheck
-from solver.wear.control import Given, WearLine
-from solver.wear.course import Course
-from solver.wear.integrate import Integration
-from solver.wear.state import WearState
-from solver.wear.wearing_joint import Following, WearingJoint
+from solver.wear.check import full_check
+from solver.wear.step import Given, WearLine
+from solver.wear.wearing_joint import WearingJoint, WearState
 
 
 @dataclass(frozen=True)
@@ -51,18 +48,20 @@ def followed_states(
     ((_, start),) = follow_branch(model, 0.5, load, follow, "up", settings)
     assert start.state is not None, start.message
     case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
-    work = WearingJoint(case, start, wear_coefficient, where=Following(follow))
-    states, errors, check = [], [], FullCheck()
-
-    def recorded(work: WearingJoint, state: WearState) -> Checked | Failure:
-        checked = check(work, state)
-        if not isinstance(checked, Failure):
-            states.append(checked[0])
-            errors.append(checked[1].excitation_frequency_error)
-        return checked
-
-    line = WearLine(work, Given(float(cycles[1] - cycles[0])), float(cycles[-1]))
-    Integration(line, recorded, lambda *_: None, 1e4).begin(work.begin, Course(work.area, False, cycles))
+    work = WearingJoint(case, start, wear_coefficient, follow=follow)
+    states, errors = list[WearState](), list[float]()
+    line, after = WearLine(work, Given(float(cycles[1] - cycles[0])), float(cycles[-1])), work.at_followed(work.begin())
+    while True:
+        assert isinstance(after, WearState)
+        checked = full_check(work, after)
+        assert not isinstance(checked, Failure)
+        states.append(checked[0])
+        errors.append(checked[1].excitation_frequency_error)
+        if states[-1].cycle >= cycles[-1] * (1.0 - 1e-12):
+            break
+        step = line.step(states[-1])
+        assert not isinstance(step, Failure)
+        after = step.state
     return FollowedStates(work, tuple(states), tuple(errors))
 
 

@@ -1,7 +1,8 @@
-"""Estimated errors of a wear history, from its difference to the reference solution."""
+"""Estimated errors of a history of wear or of missions, from its difference to the reference solution."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from solver.model import ComplexArray, FloatArray
+from solver.settings import WearTarget
 
 HISTORY_SAFETY = 1.5
 """Error of a history over its difference to the reference solution. Dovetail, 16 and 48 pairs, all schemes, steps of
@@ -138,6 +140,28 @@ def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray
     response = of_state("response_error", _response_change(outputs), adaptive.response)
     rate = of_state("wear_rate_error", _rate_change(outputs), adaptive.wear_rate)
     return HistoryError(relative, of_pairs, response, rate, _frequency_error(outputs, 1.0, adaptive.frequency))
+
+
+def error_of_target(
+    target: WearTarget, at: float, other: float, depth: FloatArray, error: HistoryError, rate: float, area: FloatArray
+) -> float:
+    """Estimated error of a life: of the count at which a history reaches its target, in the unit of the counts.
+
+    The larger one of the difference to the other solution and of the time that the error of the wear takes.
+
+    at, other: counts at which both solutions reach the target; inf or NaN where the other one does not.
+    depth (n_contact,): at the target, m; error: of the history at two counts, of which the target is the second.
+    rate: growth per count of the largest depth, m, or of the worn volume, m3, of which a resonance is a function.
+    area (n_contact,): m2.
+    """
+    if target.quantity == "wear_depth":
+        # any pair may have the largest depth within its error
+        wrong = float((depth + error.wear_depth[1]).max(initial=0.0) - depth.max(initial=0.0))
+    else:
+        wrong = float(error.worn_volume[1] * (depth @ area))
+    by_wear = 0.0 if wrong == 0.0 else wrong / rate if rate > 0.0 else math.inf
+    apart = abs(other - at)
+    return max(by_wear, HISTORY_SAFETY * apart if math.isfinite(apart) else 0.0)
 
 
 def _frequency_error(both: Both, safety: float, known: FloatArray | float) -> FloatArray:

@@ -1,8 +1,8 @@
-"""Natural continuation of a converged state along one parameter, and constants that all searches share.
+"""Natural steps along a parameter, shakedown of sliding masses by such steps, and constants that all searches share.
 
-The parameter is the frequency, the excitation amplitude, a homotopy parameter or the fraction of a step on the slow
-time scale. The *change* of the vibration is `vibration_change` of two states, relative to the first one. A state that
-is found is exact to the tolerance for all values of the constants.
+The parameter is the frequency, the load, or the fraction of a change of the tangential history or of the wear depth.
+The *change* of the vibration is `vibration_change` of two states, relative to the first one. A state that is found is
+exact to the tolerance for all values of the constants.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from solver.contact.coulomb import STICK
-from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import BalanceAt, State, final_history, vibration_change
-from solver.newton.iteration import MOST_ITERATIONS, SHORTEST_STEP
-from solver.newton.run import Run
+from solver.model import FloatArray
+from solver.newton.run import MOST_ITERATIONS, SHORTEST_STEP, Run
+from solver.structure.joint import Joint
 
 ATTEMPTS = 25
 """Most attempts of a search that comes closer with each of them: natural steps that fail, solves for the phase lag of
@@ -34,23 +35,16 @@ resonance is a change of 2."""
 
 
 def follow_naturally(
-    balance_at: BalanceAt,
-    start: State,
-    target: float,
-    run: Run,
-    keep_history: bool = False,
-    fine: float = np.inf,
+    balance_at: BalanceAt, start: State, target: float, run: Run, fine: float = np.inf
 ) -> tuple[State, bool]:
     """Step the parameter to the target; returns the last state, and whether it is at the target.
 
     Steps are halved where Newton's method needs many iterations. The first Newton iteration from the last state is a
     tangent predictor (for wear: Eq. (19)), so that no other predictor is needed.
 
-    balance_at, start, target, run: balance at a value of the parameter; first state, with its parameter; last value of
-    the parameter; limits.
-    keep_history: keeps the tangential history of the start, for intermediate states that are no states of the joint.
-    fine: step length, in the unit of the parameter. A longer step is accepted only if the vibration changes little over
-    the step: where each step leaves a history to the next step, the state at the target depends on the steps.
+    balance_at: balance at a value of the parameter. start: first state, with its parameter.
+    fine: length of the parameter. A longer step is accepted only if the vibration changes little over the step: where
+    each step leaves a history to the next one, the state at the target depends on the steps.
     """
     state, whole, shortest = start, target - start.parameter, SHORTEST_STEP
     if np.isfinite(fine) and whole != 0.0:
@@ -65,8 +59,8 @@ def follow_naturally(
         result = run.solve(balance, state.evaluation.predicted_h, most)
         smooth = abs(reach - state.parameter) <= fine or _is_smooth(state.evaluation, result.evaluation)
         if result.converged and smooth:
-            history = state.history if keep_history else final_history(balance, result.evaluation)
-            state, done, fraction = State(result.evaluation, history, reach), ahead, min(2.0 * fraction, 1.0)
+            state = State(result.evaluation, final_history(balance, result.evaluation), reach)
+            done, fraction = ahead, min(2.0 * fraction, 1.0)
             continue
         fraction = 0.5 * (ahead - done)
         failures += not result.converged
@@ -79,3 +73,38 @@ def _is_smooth(before: Evaluation, after: Evaluation) -> bool:
     """Whether the vibration changes so little between two states that no step between them is needed."""
     linear = bool((before.status_t == STICK).all() and (after.status_t == STICK).all())
     return vibration_change(before, after) <= (LINEAR_CHANGE if linear else SMOOTH_CHANGE)
+
+
+def ratchets(joint: Joint, at: Evaluation, fraction: float) -> bool:
+    """Whether the work of ratcheting in a period exceeds a fraction of the slip work.
+
+    A very small stiffness holds the mean position of a mass on a slider (`penalty.mean`), and drag c its mean velocity.
+    Where the vibration lets the mass slip to a mean position u_0 that differs from that of its history, the law
+    ratchets by 2 pi / omega penalty.mean (u_0 - history) / c in each period, although the Fourier series are periodic.
+    This slip counts as wear, but its work, mean normal force times ratcheting, is not in the balance of energy.
+    """
+    work = float(np.abs(at.force_h[:, 0, 0]) @ np.hypot(*joint.law.drift(at).T))
+    return work > fraction * float(at.slip_work.sum())
+
+
+def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
+    """State after shakedown of the masses, which slip to and fro or stick in the end, at an unchanged wear depth.
+
+    The mean position u_0 becomes the new history, with which only a part of the ratcheting is left, and so on until its
+    work is at most a fraction of the slip work. The last state found where this does not end.
+    """
+    run, worn = run.fresh(), state.evaluation.wear_depth
+    for _ in range(ATTEMPTS):
+        if not ratchets(joint, state.evaluation, fraction):
+            break
+        before = state.evaluation.history
+        shift = joint.law.origin(state.evaluation.displacement_h[:, 1:, 0] - before)
+
+        def balance_at(part: float, _: FloatArray, before: FloatArray = before, shift: FloatArray = shift) -> Balance:
+            return Balance(joint, before + part * shift, worn)
+
+        moved, arrived = follow_naturally(balance_at, State(state.evaluation, before, 0.0), 1.0, run)
+        if not arrived:
+            break
+        state = State(moved.evaluation, moved.history, state.parameter)
+    return state

@@ -1,7 +1,7 @@
 """One step along a line of states, as long as allowed: along frequency, load, amplitude, cycles or missions.
 
-A judge compares a step with what is allowed: the change of the state over the step, or its local error. The next length
-follows from this ratio. Where no step is found, the line has one rescue; where this fails, too, the line ends.
+The length follows from the change of the state over a step, or its local error, over the one allowed. Where no step is
+found, the line has one rescue; where this fails, too, the line ends.
 """
 
 from __future__ import annotations
@@ -45,8 +45,7 @@ class Line(Protocol[HereT, EndT]):
 class Lengths:
     """The rule for the length of a step.
 
-    order: power of the length with which the judged quantity grows.
-    safety: length of the next step over the one that would just be allowed, and largest factor on a refused step.
+    order: power of the length with which the judged quantity grows. safety: as `STEP_SAFETY`.
     shortest: shortest step. rescue: length at and below which a step that is not found is left to the rescue.
     """
 
@@ -63,10 +62,7 @@ class Lengths:
 
 
 def take_step(line: Line[HereT, EndT], here: HereT, length: float, lengths: Lengths) -> tuple[EndT, float] | Failure:
-    """The end of one step from a state and the length of the next step, or why there is none.
-
-    length: of the first attempt.
-    """
+    """The end of one step and the length of the next one, or why there is none; length: of the first attempt."""
     length = max(length, lengths.shortest)
     while True:
         end = line.attempt(here, length)

@@ -37,13 +37,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.reference import RTOL_RATIO
 from solver.clock import computing_time
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import Failure
+from solver.harmonic_balance.state import Failure, largest_responses
 from solver.loading_history.start_states import follow_line
 from solver.missions.block_run import Begun, BlockCase, BlockRun
-from solver.missions.blocks import Passage
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
 from solver.outcome import Outcome
@@ -52,8 +49,8 @@ from solver.results.history import StartState
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.structure.fourier import to_complex
 from solver.structure.joint import friction_of_pairs
+from solver.wear.integrate import RTOL_RATIO, Like
 from solver.wear.rate_slope import rate_slope
-from solver.wear.solutions import Like
 
 FIRST_FREQUENCIES = 17
 """Frequencies before those that are added."""
@@ -107,7 +104,7 @@ class Swept:
 
 def run_passage(case: BlockCase) -> BlockRun | Failure:
     """Compute a passage, as `block_run.run_block`."""
-    passage, swept = passage_of(case), find_states(case)
+    passage, swept = case.block.passage, find_states(case)
     if isinstance(swept, Failure):
         return swept
     ascending, area = swept.states, case.mission.area
@@ -138,13 +135,6 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
     return in_rows(found)
 
 
-def passage_of(case: BlockCase) -> Passage:
-    """The passage of a block."""
-    passage = case.block.frequency
-    assert isinstance(passage, Passage)
-    return passage
-
-
 def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Wear (n_contact,), m, of a passage through states in this order, and its derivative by the depth before.
 
@@ -172,7 +162,7 @@ def _slope(case: BlockCase, state: SweptState) -> FloatArray:
     work, begun = case.begin(state.start)
     at, pairs = begun.point.evaluation, wears | (case.depth > 0.0)
     slope = rate_slope(work.at(begun), at, work.gain(1.0), work.wearing, pairs, work.run)
-    return np.asarray(slope * state.frequency / passage_of(case).rate)
+    return np.asarray(slope * state.frequency / case.block.passage.rate)
 
 
 def parts_of(states: Sequence[SweptState]) -> FloatArray:
@@ -184,7 +174,7 @@ def parts_of(states: Sequence[SweptState]) -> FloatArray:
 
 def find_states(case: BlockCase) -> Swept | Failure:
     """The states of one passage at the depth before it, as many as its wear needs."""
-    passage, area = passage_of(case), case.mission.area
+    passage, area = case.block.passage, case.mission.area
     aim = FREQUENCY_ERROR * (1.0 if case.like is None else RTOL_RATIO) * case.mission.settings.rtol
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
@@ -214,7 +204,7 @@ def _negligible(case: BlockCase, states: list[SweptState]) -> float:
     Wear by round-off is compared with the wear if friction took up all work of the excitation.
     """
     size = max(float(np.abs(state.response).max()) for state in states)
-    work = np.pi * case.block.excitation_amplitude * size * passage_of(case).cycles
+    work = np.pi * case.block.excitation_amplitude * size * case.block.passage.cycles
     so_far = float(case.depth @ case.mission.area)
     return max(NEGLIGIBLE * so_far, ROUND_OFF * case.mission.wear_coefficient * work)
 
@@ -262,7 +252,7 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
 
 def states_at(case: BlockCase, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    passage, found = passage_of(case), []
+    passage, found = case.block.passage, []
     line = case.line(passage.sweep)
     if case.like is not None:
         # errors of a reference solution are not used
@@ -295,5 +285,5 @@ def delay_of(case: BlockCase, states: Sequence[SweptState]) -> tuple[float, floa
     mode = next((found for found in modes if found is not None), None)
     if mode is None:
         return 0.0, 0.0
-    width, rate = mode.damping_ratio * mode.omega / (2.0 * math.pi), passage_of(case).rate
+    width, rate = mode.damping_ratio * mode.omega / (2.0 * math.pi), case.block.passage.rate
     return (rate / width**2, rate / (2.0 * math.pi * width)) if width > 0.0 else (math.inf, math.inf)

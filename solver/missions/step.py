@@ -30,10 +30,10 @@ import numpy as np
 
 from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockRun
-from solver.missions.course import MissionNode
 from solver.model import FloatArray
 from solver.outcome import Outcome
-from solver.wear.control import allowed_error
+from solver.packing import packable
+from solver.wear.step import allowed_error
 
 RunMission = Callable[[FloatArray, bool], tuple[BlockRun, ...] | Failure]
 """Computes the blocks of a mission: depth before (n_contact,), m, and whether slopes are asked for."""
@@ -43,6 +43,30 @@ MOST_ITERATIONS = 6
 
 DEPTH_TOLERANCE = 0.1
 """Error of the depth before the mission, as worn volume, over the allowed error of the step."""
+
+
+@packable
+@dataclass(frozen=True)
+class MissionNode:
+    """The end of a step over missions, of which the last mission was computed.
+
+    mission: missions computed so far.
+    growth (n_block, n_contact): depth worn by each block so far, m.
+    rate (n_block, n_contact): depth worn by each block in the last mission, m; in the first node in the first mission.
+    local (n_contact,): sum of the local errors of the steps and of the errors of the blocks so far, m.
+    runs: the blocks of the last mission; without values in the first node.
+    """
+
+    mission: int
+    growth: FloatArray
+    rate: FloatArray
+    local: FloatArray
+    runs: tuple[BlockRun, ...]
+
+    @property
+    def depth(self) -> FloatArray:
+        """Worn depth (n_contact,), m."""
+        return np.asarray(self.growth.sum(axis=0))
 
 
 @dataclass(frozen=True)

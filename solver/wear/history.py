@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.accuracy.history_error import Both, HistoryError, error_of_given_steps, history_error
-from solver.accuracy.target_error import error_of_wear, target_error
+from solver.accuracy.history_error import Both, HistoryError, error_of_given_steps, error_of_target, history_error
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
@@ -20,10 +19,8 @@ from solver.results.verdict import first_cut_off, judge, last_error
 from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
 from solver.wear.course import unknown_course
-from solver.wear.integrate import Ended
-from solver.wear.interpolation import TargetSearch
-from solver.wear.solutions import Saved, SlowTime, Solutions
-from solver.wear.state import WearState
+from solver.wear.integrate import Ended, Integration, Saved, SlowTime
+from solver.wear.wearing_joint import WearState
 
 ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
 """Ends of a history after which no reference solution is integrated, and of a reference solution that end a history."""
@@ -98,11 +95,6 @@ class Done:
     reference: Ended | None
     seconds: float
 
-    @property
-    def iterations(self) -> int:
-        """Newton iterations of both."""
-        return self.fine.iterations + (0 if self.reference is None else self.reference.iterations)
-
 
 @packable
 @dataclass(frozen=True)
@@ -141,16 +133,16 @@ class _Integrations:
         """A history with its reference solution; spent: CPU seconds of its time limit that are gone."""
         if asked.name not in self._done:
             saved = self._resumed.saved if self._resumed.name == asked.name else None
-            solutions = Solutions(self._case, self._start, asked, lambda saved: self._save(asked.name, saved), saved)
-            solutions.began -= spent
-            fine, reference = solutions.history(), None
+            integration = Integration(self._case, self._start, asked, lambda now: self._save(asked.name, now), saved)
+            integration.began -= spent
+            fine, reference = integration.history(), None
             if fine.state is None:
                 fine = replace(fine, course=unknown_course(self._case.model, len(asked.loops)))
             if asked.adaptive and _is_compared(asked, fine):
-                reference = solutions.reference(fine, _counts(asked, fine))
+                reference = integration.reference(fine, _counts(asked, fine))
                 if reference.failure.outcome in ENDS_ALL:
                     fine = replace(fine, failure=reference.failure)
-            self._done[asked.name] = Done(asked.name, fine, reference, solutions.spent - spent)
+            self._done[asked.name] = Done(asked.name, fine, reference, integration.spent - spent)
         return self._done[asked.name]
 
     def _save(self, name: str, saved: Saved) -> None:
@@ -162,7 +154,7 @@ class _Integrations:
 
 def _is_compared(asked: SlowTime, fine: Ended) -> bool:
     """Whether a history is compared with another one: without a step the errors of the start state suffice."""
-    steps = len(fine.course.ends) > 1 or asked.where.follows
+    steps = len(fine.course.ends) > 1 or asked.follow is not None
     return fine.state is not None and steps and fine.failure.outcome not in ENDS_ALL
 
 
@@ -173,7 +165,7 @@ def _counts(asked: SlowTime, fine: Ended) -> FloatArray:
     return np.zeros(asked.cycles.n_outputs) if fine.state is None else fine.course.even_counts(asked.cycles.n_outputs)
 
 
-def _compare(integrated: tuple[Done, ...], counts: FloatArray, follows: bool) -> tuple[Both, HistoryError]:
+def _compare(integrated: tuple[Done, ...], counts: FloatArray, *, follows: bool) -> tuple[Both, HistoryError]:
     """A history beside what it is compared with at ascending counts, and its errors there.
 
     integrated: as from `_Integrations.of`. follows: whether the frequency of the excitation follows the structure.
@@ -187,7 +179,7 @@ def _compare(integrated: tuple[Done, ...], counts: FloatArray, follows: bool) ->
     if adaptive.fine.state is None:
         adaptive = integrated[0]
     area, course = history.course.area, adaptive.fine.course
-    both, steps = (at(adaptive.fine, adaptive.reference, each) for each in (counts, course.cycles))
+    both, steps = (at(adaptive.fine, adaptive.reference, each) for each in (counts, course.dense.counts))
     error = history_error(both, steps, area)
     if adaptive is integrated[0]:
         return both, error
@@ -200,9 +192,10 @@ def _assembled(model: ReducedModel, start: StartState, asked: SlowTime, integrat
     fine, area, counts = integrated[0].fine, model.contact.area, _counts(asked, integrated[0].fine)
     failures = (each.fine.failure for each in integrated[1:] if each.fine.failure.outcome in ENDS_ALL)
     failure, state = next(failures, fine.failure), fine.state
-    both, error = _compare(integrated, counts, asked.where.follows)
+    both, error = _compare(integrated, counts, follows=asked.follow is not None)
     own, target = both.fine, fine.course.reached
     ends_at_target = target <= asked.end
+    solutions = [each for done in integrated for each in (done.fine, done.reference) if each is not None]
     return WearHistory(
         **{name: value for name, value in own.items() if name not in ("local", "depth_rate")}
         | {
@@ -219,7 +212,7 @@ def _assembled(model: ReducedModel, start: StartState, asked: SlowTime, integrat
         worn_volume=own["wear_depth"] @ area,
         reference_volume=both.other("wear_depth") @ area,
         error_estimate=math.nan,
-        newton_iterations=start.newton_iterations + sum(each.iterations for each in integrated),
+        newton_iterations=start.newton_iterations + sum(each.iterations for each in solutions),
         run_time=start.run_time + sum(each.seconds for each in integrated),
         last_cycle=math.nan if state is None else min(fine.course.ends[-1], float(counts[-1])),
         branch=start.branch,
@@ -249,12 +242,10 @@ def _target_error(integrated: tuple[Done, ...], asked: SlowTime) -> float:
     other = integrated[-1].reference if len(integrated) == 1 else integrated[-1].fine
     if other is None or until is None:
         return math.inf
-    at, area = course.reached, course.area
-    both, error = _compare(integrated, np.array([0.0, at]), asked.where.follows)
+    at, by_interpolation = course.reach(until)
+    both, error = _compare(integrated, np.array([0.0, at]), follows=asked.follow is not None)
     depth = both.fine["wear_depth"][1]
-    known_to = error_of_wear(until.quantity, depth, error.wear_depth[1], float(error.worn_volume[1] * (depth @ area)))
-    weights = np.arange(area.size) == depth.argmax() if until.quantity == "wear_depth" else area
+    weights = np.arange(depth.size) == depth.argmax() if until.quantity == "wear_depth" else course.area
     rate = min(float(rates @ weights) for rates in (both.fine["depth_rate"][1], course.nodes[-1].rate))
-    count = TargetSearch(until, area, smooth=True).count(other.course.nodes)
-    by_resonance = TargetSearch(until, area, course.smooth).by_resonance(course.nodes, at)
-    return target_error(at, count, known_to, rate) + course.reached_within + by_resonance
+    ahead = other.course.reach_ahead(until)
+    return error_of_target(until, at, ahead, depth, error, rate, course.area) + by_interpolation

@@ -20,7 +20,7 @@ from solver.contact.coulomb import STICK
 from solver.continuation.natural import follow_naturally
 from solver.continuation.transient import SEARCH_ITERATIONS, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
+from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.results.verdict import HELD_FORCE
@@ -28,8 +28,7 @@ from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
 from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
-from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.wearing_joint import WearingJoint, WearState
 
 
 def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
@@ -57,18 +56,16 @@ def _held(work: WearingJoint, state: WearState, worn: FloatArray, *, drifts: boo
         return None
     joint, before = work.case.held(hold).joint(state.omega, work.excitation_amplitude), state.depth
 
-    def balance_at(fraction: float, history: FloatArray) -> Balance:
-        return Balance(joint, history, before + fraction * (worn - before))
+    def balance_at(fraction: float, _: FloatArray) -> Balance:
+        return Balance(joint, state.point.history, before + fraction * (worn - before))
 
-    start = replace(state.point, parameter=0.0)
-    found, arrived = follow_naturally(balance_at, start, 1.0, work.run, keep_history=True)
+    found, arrived = follow_naturally(balance_at, replace(state.point, parameter=0.0), 1.0, work.run)
     there = found.evaluation
     if not arrived or not work.is_stable(joint, there) or creeps(joint, hold, there):
         return None
     if vibration_change(at, there) > OTHER_BRANCH:
         return None
-    point = State(there, final_history(balance_at(1.0, start.history), there))
-    return replace(state, point=point, hold=hold, held_from=state.cycle)
+    return replace(state, point=State(there, found.history), hold=hold, held_from=state.cycle)
 
 
 def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:

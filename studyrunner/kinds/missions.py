@@ -42,7 +42,7 @@ from studyrunner.study.study import Study
 from studyrunner.system.progress import count
 
 if TYPE_CHECKING:
-    from solver.missions.result import MissionHistory
+    from solver.missions.mission import MissionHistory
     from solver.model import FloatArray, ReducedModel
 
 TIME = "to a factor of three, if every block wears"
@@ -114,16 +114,16 @@ class Mission(Task):
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """The history."""
-        from solver.missions import blocks as solver_blocks
+        from solver.missions import mission as of_solver
         from solver.missions.history import integrate_missions
 
         of_joints = {block.joint: block.joint.model(models) for block in self.blocks}
         blocks = tuple(
-            solver_blocks.Block(
+            of_solver.Block(
                 model=of_joints[block.joint],
                 frequency=block.frequency
                 if block.passage is None
-                else solver_blocks.Passage(block.frequency, *block.passage),
+                else of_solver.Passage(block.frequency, *block.passage),
                 excitation_amplitude=block.excitation_amplitude,
                 friction_coefficient=block.joint.friction_coefficient,
                 cycles=block.cycles if block.passage is None else None,
@@ -144,7 +144,7 @@ class Mission(Task):
         # with those before, for the wear of one
         read = tuple(sorted({0, 1} | kept | {max(number - 1, 0) for number in kept}))
         begin = cast("Literal['up', 'down', 'ramp']", self.begin)
-        mission = solver_blocks.Mission(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, begin)
+        mission = of_solver.Mission(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, begin)
         history = integrate_missions(mission, note, self.resume)
         raise_fault(history.outcome, history.message)
         yield PointResult(self.points(0), _values(self, history), progress=reached.after(history.outcome))

@@ -36,7 +36,7 @@ from studyrunner.mpi.cost_model import CostKeys
 if TYPE_CHECKING:
     from solver.model import ReducedModel
     from solver.results.history import StartState
-    from solver.wear.solutions import SlowTime
+    from solver.wear.integrate import SlowTime
 
 AT_REST = "history at rest"
 """Most general group of histories in which nothing wears, see `CostModel`."""
@@ -235,9 +235,8 @@ class History(JointTask):
 
     def _asked(self, integrated: Integrated) -> SlowTime:
         """What the solver integrates."""
-        from solver.wear.control import steps_of
-        from solver.wear.solutions import SlowTime
-        from solver.wear.wearing_joint import Fixed, Following
+        from solver.wear.integrate import SlowTime
+        from solver.wear.step import steps_of
 
         counts: NDArray[np.float64] | ToTheEnd
         if self.to_the_end is not None and not integrated.unworn:
@@ -253,7 +252,7 @@ class History(JointTask):
             law=self.law,
             until=self.until,
             loops=self.loops,
-            where=Fixed() if self.follow is None else Following(self.follow),
+            follow=self.follow,
         )
 
     def describe(self, place: int) -> str:

@@ -51,6 +51,8 @@ class Certainty:
         advice = f": {self.advice}" if self.advice else ""
         if self.n_points == 1 and not self.n_short:
             return f"the {self.of} is {known} ({aim}){advice}"
+        if self.n_points == 1:
+            return f"the {self.of} is not known: the point was not computed to the end"
         text = f"{self.n_known} of {count(self.n_points, self.of)} are known within {aim}"
         text += f", {self.n_short} not computed to the end" if self.n_short else ""
         text += f", {self.n_unknown} without an estimate" if self.n_unknown else ""
@@ -127,12 +129,11 @@ def tell_ends(result: Result) -> str:
     return f"{text}, {n_without} without a result." if n_without else f"{text}."
 
 
-def describe_ended(result: Result, number: int) -> list[str]:
-    """The first points that ended in this way, each with cycle, error and message."""
-    found = np.argwhere(result.dataset["outcome"].values == number)
+def list_ended(result: Result, number: int) -> dict[str, list[tuple[int, ...]]]:
+    """Points that ended in this way, by what is to be said of each beside the outcome; the text may be empty."""
     messages = result.dataset["message"].values if result.has("message") else None
-    lines = []
-    for index in found[:_MOST_NAMED]:
+    found: dict[str, list[tuple[int, ...]]] = {}
+    for index in np.argwhere(result.dataset["outcome"].values == number):
         place = tuple(index.tolist())
         said = "" if messages is None else str(messages[place])
         if result.held[place] and result.counted[:-1] not in said:
@@ -141,11 +142,21 @@ def describe_ended(result: Result, number: int) -> list[str]:
             is_known = 0.0 < result.errors[place] <= WELL_ENOUGH
             known = f"worn volume known within {show_error(result, place)}" if is_known else ""
             said = ", ".join(filter(None, (end, known, said)))
-        where = result.describe(result.point_at(place))
-        lines += [f"{where}: {said}"] if said else []
-    if len(found) > _MOST_NAMED and lines:
-        lines.append(f"and {len(found) - _MOST_NAMED} more")
-    return lines
+        found.setdefault(said, []).append(place)
+    return found
+
+
+def describe_ended(result: Result, number: int) -> list[str]:
+    """The first points that ended in this way, with cycle, error and message; points with the same text in one line."""
+    axes = (*result.varying, *result.fixed)
+    texts = list_ended(result, number)
+    lines = []
+    for said, places in list(texts.items())[:_MOST_NAMED]:
+        named = [result.describe(result.point_at(place), axes) for place in places[:_MOST_NAMED]]
+        named += [f"{count(len(places) - _MOST_NAMED, 'more point')}"] if len(places) > _MOST_NAMED else []
+        lines.append(": ".join(filter(None, ("; ".join(named), said))))
+    left = sum(map(len, list(texts.values())[_MOST_NAMED:]))
+    return [line for line in (*lines, f"and {count(left, 'more point')}" if left else "") if line]
 
 
 def advise_ended(result: Result, number: int) -> list[str]:

@@ -9,13 +9,12 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from solver.packed_model import pack_model, unpack_model
-from solver.packing import Packed, pack, unpack
+from solver.packing import Packed, pack, pack_model, unpack, unpack_model
 from studies.scene_answers import NaturalFrequencies
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, scene_frequencies, scene_has
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
-from studyrunner.system.source_digest import package_digest
+from studyrunner.system.machine import package_digest
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -53,7 +52,7 @@ def harmonics_to_build(study: Study) -> int:
 def model_once(study: Study, computed: Computed, build: Callable[[], ReducedModel]) -> ReducedModel:
     """The reduced model of a scene that is not read from a scene file, built or from an earlier run.
 
-    Both are equal to the last bit, and so are all results (`solver.packed_model`).
+    Both are equal to the last bit, and so are all results (`solver.packing`).
     """
     return _once(model_key(study), computed, build, pack_model, unpack_model)
 

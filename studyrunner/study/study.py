@@ -13,8 +13,6 @@ from pydantic import Field
 from solver.contact.wear_law import WearLaw
 from solver.settings import TARGETS, Automatic, FollowedFrequency, WearTarget
 from studyrunner.coordinates import COORDINATES, SCENE
-from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS, OF_MISSIONS_BY_DEFAULT, OF_SAMPLED_MISSIONS
-from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.scatter.section import ScatterSection
 from studyrunner.study.mission import OWN_AXES, MissionBlock
 from studyrunner.study.scene_axes import SceneAxis
@@ -32,7 +30,19 @@ from studyrunner.study.sections import (
 )
 from studyrunner.study.study_of_result import Archived
 from studyrunner.values import Section
-from studyrunner.variables import ASKED, KEPT, OF_SAMPLES, USUAL, Variable
+from studyrunner.variables import (
+    ASKED,
+    KEPT,
+    OF_A_MISSION,
+    OF_A_MODE_POINT,
+    OF_MISSIONS,
+    OF_MISSIONS_BY_DEFAULT,
+    OF_MODES,
+    OF_SAMPLED_MISSIONS,
+    OF_SAMPLES,
+    USUAL,
+    Variable,
+)
 
 
 @dataclass(frozen=True)

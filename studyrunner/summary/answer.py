@@ -13,9 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, describe_ended
+from studyrunner.result.certainty import Certainty, advise_ended, certainty_of, list_ended
 from studyrunner.result.points import COMPLETE_WORDS
 from studyrunner.result.scene_pairs import contact_pairs
 from studyrunner.result.units import show_number
@@ -70,7 +69,8 @@ class Failure:
     n_points: int
     sentence: str
     advice: str
-    first: str  # the first of these points, in words
+    where: str  # the first of these points in words, empty where the study has one point
+    reason: str  # its message
 
 
 @dataclass(frozen=True)
@@ -132,28 +132,24 @@ def _samples(result: Result) -> Samples | None:
     place = np.unravel_index(int(np.argmax(medians.values)), medians.shape)
     point = {str(name): int(index) for name, index in zip(medians.dims, place, strict=True)}
     where = result.describe(point, [name for name in result.varying if name != SAMPLE])
-    point_of_all = last.isel(point)
-    return Samples(where, int(medians.size), describe_volumes(point_of_all), describe_ranking(point_of_all))
+    of_all = last.isel(point)
+    return Samples(where, int(medians.size), describe_volumes(of_all), describe_ranking(of_all))
 
 
 def _modes(result: Result) -> tuple[ModeRange, ...]:
     numbers = [name for name in result.varying if name != "mode" and result.dataset[name].dtype.kind in "iuf"]
     ends = {name: (show_number(float(result.dataset[name].values[place])) for place in (0, -1)) for name in numbers}
     over = ", ".join(f"{name.replace('_', ' ')} {' to '.join(each)}" for name, each in ends.items())
-    place, found = result.axes.index("mode"), []
+    axis, found = result.axes.index("mode"), []
     for index, number in enumerate(result.dataset["mode"].values.tolist()):
-        computed = result.computed.take(index, axis=place)
-        frequency, damping = (
-            _ends(result.read(name).values.take(index, axis=place)[computed] if result.has(name) else np.zeros(0))
-            for name in ("natural_frequency", "damping_ratio")
-        )
+        computed = result.computed.take(index, axis=axis)
+        ranges = {}
+        for name in ("natural_frequency", "damping_ratio"):
+            values = result.read(name).values.take(index, axis=axis)[computed] if result.has(name) else np.zeros(0)
+            ranges[name] = (float(values.min()), float(values.max())) if values.size else (math.nan, math.nan)
+        frequency, damping = ranges.values()
         found.append(ModeRange(int(number), over, frequency, damping, int(computed.sum()), computed.size))
     return tuple(found)
-
-
-def _ends(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Smallest and largest value; NaN where there are none."""
-    return (float(values.min()), float(values.max())) if values.size else (np.nan, np.nan)
 
 
 def _failures(result: Result) -> tuple[Failure, ...]:
@@ -163,15 +159,14 @@ def _failures(result: Result) -> tuple[Failure, ...]:
         ending = result.endings[number]
         if ending.word == "converged":
             continue
-        is_complete = ending.word in COMPLETE_WORDS
-        lines = describe_ended(result, number)
-        if ending.word == "sensitive" or not lines:
-            # what the message of a sensitive one holds is no result
-            place = np.argwhere(result.dataset["outcome"].values == number)[0]
-            lines = [where_is(result, result.point_at(place))]
-        first = re.split(r"[.:](?:\s|$)", ending.sentence)[0]
+        reason, (place, *_) = next(iter(list_ended(result, number).items()))
+        sentence = re.split(r"[.:](?:\s|$)", ending.sentence)[0]
         advice = " ".join(advise_ended(result, number)[:1]).rstrip(".")
-        found.append(Failure(ending.word, is_complete, n_points, first, advice, lines[0]))
+        where = where_is(result, result.point_at(place)) if result.varying else ""
+        # what the message of a sensitive one holds is no result
+        reason = "" if ending.word == "sensitive" else reason
+        is_complete = ending.word in COMPLETE_WORDS
+        found.append(Failure(ending.word, is_complete, n_points, sentence, advice, where, reason))
     found.sort(key=lambda each: (each.is_complete, -each.n_points))
     return tuple(found)
 
@@ -183,19 +178,18 @@ def _not_small(result: Result) -> str:
     so that mass, stiffness and the places of the pairs stay as they were designed. The width is the side of a square as
     large as the smallest contact surface.
     """
+    if not result.has("largest_wear_depth"):
+        return ""
     pairs = contact_pairs(result, result.shown_point())
     areas = [float(np.nansum(pairs.area[pairs.surface == surface])) for surface in np.unique(pairs.surface)]
     width = math.sqrt(min((area for area in areas if area > 0.0), default=math.inf))
-    if not result.has("largest_wear_depth"):
+    ratios = np.nan_to_num(np.where(result.computed, result.read("largest_wear_depth").values, 0.0) / width)
+    if ratios.max() <= SMALL:
         return ""
-    ratios = np.where(result.computed, result.read("largest_wear_depth").values, 0.0) / width
-    largest = np.nanmax(np.nan_to_num(ratios))
-    if largest <= SMALL:
-        return ""
-    point = result.point_at(np.unravel_index(int(np.nanargmax(ratios)), ratios.shape))
+    point = result.point_at(np.unravel_index(int(np.argmax(ratios)), ratios.shape))
     return (
-        f"the method assumes shallow wear, but the depth is {largest:.2g} of the contact width at"
-        f" {result.describe(point)}: take fewer cycles, and check that wear_coefficient is in 1/Pa"
+        f"the method assumes shallow wear, but the depth is {ratios.max():.2g} of the contact width at"
+        f" {where_is(result, point)}: take fewer cycles, and check that wear_coefficient is in 1/Pa"
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,7 +14,7 @@ from studyrunner.result.points import WELL_ENOUGH
 from studyrunner.result.scene_pairs import contact_pairs, last_depth, tells_depth
 from studyrunner.result.view import NO_VOLUME, Result
 
-_NO_SLIP = 1e-12  # m, round-off: less than the size of an atom
+_NO_MOTION = 1e-12  # m, round-off: less than the size of an atom
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Number:
 class Deepest:
     """The deepest pair of a point; None and NaN where the file holds no depths of single pairs, or no places."""
 
-    depth: Number  # m, with the error of this pair
+    depth: Number  # m
     pair: int | None = None  # index along `contact`
     surface: str = ""
     position: tuple[float, ...] = (math.nan,) * 3  # m
@@ -44,7 +45,7 @@ class MostWear:
     where: str  # the point in words
     n_compared: int  # cases that it is the largest of
     n_left_out: int  # cases without a known worn volume, which may wear more
-    count: float  # cycles or missions, inf for the final state
+    count: float  # cycles or missions
     volume: Number  # m3
     deepest: Deepest
     blocks: tuple[tuple[str, float], ...] = ()  # of missions, share of each block
@@ -67,7 +68,7 @@ class Vibration:
     followed: str  # "resonance" or "peak", whose frequency changes while the joint wears; else empty
     # Hz, followed: first and last; else where the unworn joint responds most, NaN at the ends of the frequencies
     frequency: tuple[float, Number]
-    amplitude: tuple[Number, Number]  # m, of the unworn and of the worn joint
+    amplitude: tuple[Number, Number]  # m, of the unworn and of the worn joint; 0 where the joint does not move
     peak: float = math.nan  # m, of the unworn joint at frequency[0]
 
 
@@ -107,59 +108,45 @@ def most_wear(result: Result) -> MostWear | NothingWore | None:
     if worn.max() <= NO_VOLUME:
         return _nothing(result, best)
     place = np.unravel_index(int(np.argmax(worn)), worn.shape)
-    point = result.point_at(place)
-    volume, at = float(worn[place]), result.last_kept(point)
+    point, volume = result.point_at(place), float(worn[place])
+    at, blocks = result.last_kept(point), result.blocks
+    # points that differ in more than steps
+    known = xr.DataArray(best, dims=result.axes).any(result.numerical).values
+    shares: tuple[tuple[str, float], ...] = ()
+    if blocks is not None and "block_worn_volume" in blocks:
+        own = blocks["block_worn_volume"].isel(point).isel(cycle=at)
+        shares = tuple(zip(own["block"].values.tolist(), (own.values / volume).tolist(), strict=True))
     return MostWear(
-        point,
-        where_is(result, point),
-        *_count_cases(result),
-        float(result.counts(point)[at]),
-        Number(volume, volume * float(result.errors[place])),
-        _deepest(result, point, at),
-        _blocks(result, point, volume),
+        point=point,
+        where=where_is(result, point),
+        n_compared=int(known.sum()),
+        n_left_out=int(known.size - known.sum()),
+        count=float(result.counts(point)[at]),
+        volume=Number(volume, volume * float(result.errors[place])),
+        deepest=_deepest(result, point, at),
+        blocks=shares,
     )
-
-
-def _count_cases(result: Result) -> tuple[int, int]:
-    """Number of cases with a worn volume that is known, and without: points that differ in more than steps."""
-    best = xr.DataArray(result.best_known, dims=result.axes)
-    known = best.any(result.numerical)
-    return int(known.sum()), int(known.size - known.sum())
 
 
 def _deepest(result: Result, point: dict[str, int], at: int) -> Deepest:
+    def read(name: str, *index: int) -> float:
+        return float(result.at(name, point, at).values[index]) if result.has(name) else math.nan
+
     if not tells_depth(result):
-        own = result.at("largest_wear_depth", point).values if result.has("largest_wear_depth") else math.nan
-        return Deepest(Number(float(own)))
+        return Deepest(Number(read("largest_wear_depth")))
     depth = np.nan_to_num(last_depth(result, point), nan=0.0)
-    pair = int(np.argmax(depth))
-    error = math.nan
-    if result.has("wear_depth_error"):
-        error = float(result.at("wear_depth_error", point, at).values[pair])
-    elif result.has("wear_depth_max_error"):
-        error = float(result.at("wear_depth_max_error", point, at).values)
-    pairs, share, of_area = contact_pairs(result, point), math.nan, math.nan
+    pair, pairs = int(np.argmax(depth)), contact_pairs(result, point)
+    error = read("wear_depth_error", pair) if result.has("wear_depth_error") else read("wear_depth_max_error")
+    share = of_area = math.nan
     if result.has("contact_surface", "contact_area", "contact_edge"):
         own, edge = pairs.surface == pairs.surface[pair], result.at("contact_edge", point).values != 0
         if edge[own].any() and depth[own].any():
-            share, of_area = (
-                float(each[own & edge].sum() / each[own].sum()) for each in (depth * pairs.area, pairs.area)
-            )
-    return Deepest(
-        Number(float(depth[pair]), error),
-        int(result.dataset["contact"].values[pair]),
-        str(pairs.surface[pair]) if result.has("contact_surface") else "",
-        tuple(pairs.position[pair].tolist()),
-        share,
-        of_area,
-    )
-
-
-def _blocks(result: Result, point: dict[str, int], volume: float) -> tuple[tuple[str, float], ...]:
-    if result.blocks is None or "block_worn_volume" not in result.blocks:
-        return ()
-    own = result.blocks["block_worn_volume"].isel(point).isel(cycle=result.last_kept(point))
-    return tuple(zip(own["block"].values.tolist(), (own.values / volume).tolist(), strict=True))
+            ratios = (each[own & edge].sum() / each[own].sum() for each in (depth * pairs.area, pairs.area))
+            share, of_area = map(float, ratios)
+    surface = str(pairs.surface[pair]) if result.has("contact_surface") else ""
+    number = int(result.dataset["contact"].values[pair])
+    place = tuple(pairs.position[pair].tolist())
+    return Deepest(Number(float(depth[pair]), error), number, surface, place, share, of_area)
 
 
 def _nothing(result: Result, best: NDArray[np.bool_]) -> NothingWore:
@@ -167,20 +154,18 @@ def _nothing(result: Result, best: NDArray[np.bool_]) -> NothingWore:
     if result.has("slip_range"):
         largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=(1, 2)))
         slip = float(largest[best].max())
-    return NothingWore(0.0 if slip < _NO_SLIP else slip, _all_points(result))
-
-
-def _all_points(result: Result) -> str:
     n_points, n_computed = result.computed.size, int(np.count_nonzero(result.computed))
-    one = result.varying[0] if len(result.varying) == 1 else ""
-    words = {"frequency": "frequencies", "sample": "samples"}.get(one, "points")
+    words = "points"
+    if len(result.varying) == 1:
+        words = {"frequency": "frequencies", "sample": "samples"}.get(result.varying[0], words)
     at = "in" if words == "samples" else "at"
     if n_computed < n_points:
-        return f"{at} {n_computed} of {n_points} {words}, the others have no result"
-    if n_points > 1:
-        return f"{at} all {n_points} {words}"
-    where = where_is(result, result.shown_point())
-    return f"at {where}" if where else "at the only point"
+        where = f"{at} {n_computed} of {n_points} {words}, the others have no result"
+    elif n_points > 1:
+        where = f"{at} all {n_points} {words}"
+    else:
+        where = f"at {where_is(result, result.shown_point()) or 'the only point'}"
+    return NothingWore(0.0 if slip < _NO_MOTION else slip, where)
 
 
 def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibration | None:
@@ -189,28 +174,21 @@ def vibration_of(result: Result, wear: MostWear | NothingWore | None) -> Vibrati
     place = tuple(point[name] for name in result.axes)
     if result.blocks is not None or not result.has("response_amplitude") or not result.computed[place]:
         return None
-    last = result.last_kept(point)
-    amplitude = result.at("response_amplitude", point, [0, last]).transpose("cycle", "response").values
+    ends: Any = [0, result.last_kept(point)]
+    amplitude = result.at("response_amplitude", point, ends).transpose("cycle", "response").values
     of = int(np.argmax(amplitude[0]))
-    errors = np.full(2, np.nan)
-    if result.has("response_error"):
-        errors = np.asarray(result.at("response_error", point, [0, last]).values, dtype=float)
-    new, worn = (_known(*each) for each in zip(amplitude[:, of].tolist(), errors.tolist(), strict=True))
-    ends = new, worn
+    values = np.where(amplitude[:, of] > _NO_MOTION, amplitude[:, of], 0.0)
+    errors = result.at("response_error", point, ends).values if result.has("response_error") else np.full(2, np.nan)
+    values = np.where((errors > WELL_ENOUGH) & (values > 0.0), np.nan, values)
+    new, worn = map(Number, values.tolist(), (errors * values).tolist())
     name, where = result.responses[of], where_is(result, point)
     if result.followed and result.has("excitation_frequency"):
-        first, end = result.at("excitation_frequency", point, [0, last]).values.tolist()
-        error = math.nan
-        if result.has("excitation_frequency_error"):
-            error = float(result.at("excitation_frequency_error", point, last).values)
-        return Vibration(name, where, result.followed, (first, Number(end, error)), ends)
+        first, last = result.at("excitation_frequency", point, ends).values.tolist()
+        followed_error = "excitation_frequency_error"
+        error = float(result.at(followed_error, point, ends[1])) if result.has(followed_error) else math.nan
+        return Vibration(name, where, result.followed, (first, Number(last, error)), (new, worn))
     frequency, peak = _peak(result, point, of)
-    return Vibration(name, where, "", (frequency, Number(math.nan)), ends, peak)
-
-
-def _known(value: float, error: float) -> Number:
-    """A number with its relative error; NaN where that says that it is not known."""
-    return Number(math.nan if error > WELL_ENOUGH else value, error * value)
+    return Vibration(name, where, "", (frequency, Number(math.nan)), (new, worn), peak)
 
 
 def _peak(result: Result, point: dict[str, int], of: int) -> tuple[float, float]:
@@ -236,18 +214,14 @@ def shortest_life(result: Result) -> Life | None:
     (quantity, target), *_ = until.items()
     found = result.computed & ~result.ended("sensitive")
     lives, errors = (result.read(name).values for name in ("cycles_to_target", "cycles_to_target_error"))
-    beyond = int(np.count_nonzero(found & np.isnan(lives)))
     unsure = found & (errors > WELL_ENOUGH * lives)
+    counts = int(np.count_nonzero(found & np.isnan(lives))), int(np.count_nonzero(unsure))
     lives = np.where(found & ~unsure, lives, np.nan)
-    n_unsure = int(np.count_nonzero(unsure))
     if np.isnan(lives).all():
-        return Life(str(quantity), float(target), Number(math.nan), "", beyond, n_unsure)
+        return Life(str(quantity), float(target), Number(math.nan), "", *counts)
     place = np.unravel_index(int(np.nanargmin(lives)), lives.shape)
-    error = float(errors[place])
-    point = result.point_at(place)
-    return Life(
-        str(quantity), float(target), Number(float(lives[place]), error), where_is(result, point), beyond, n_unsure
-    )
+    shortest = Number(float(lives[place]), float(errors[place]))
+    return Life(str(quantity), float(target), shortest, where_is(result, result.point_at(place)), *counts)
 
 
 def compare_meshes(result: Result) -> MeshChange | None:
@@ -259,12 +233,11 @@ def compare_meshes(result: Result) -> MeshChange | None:
     at = at or ("at equal frequency ratio" if "frequency_ratio" in result.axes else "")
     if not at or "mesh" not in result.varying or not result.wears or not result.has("worn_volume"):
         return None
-    meshes = result.dataset["mesh"].values.astype(float)
+    meshes, axis = result.dataset["mesh"].values.astype(float), result.axes.index("mesh")
     two = np.argsort(meshes)[-2:]
-    volumes = np.where(result.best_known, result.worn, np.nan).take(two, axis=result.axes.index("mesh"))
-    coarse, fine = np.moveaxis(volumes, result.axes.index("mesh"), 0)
-    larger = np.fmax(coarse, fine)
-    apart = np.abs(fine - coarse) / np.where(larger > NO_VOLUME, larger, np.nan)
+    volumes = np.where(result.best_known, result.worn, np.nan).take(two, axis=axis)
+    larger = np.fmax.reduce(volumes, axis=axis)
+    apart = np.abs(np.diff(volumes, axis=axis).squeeze(axis)) / np.where(larger > NO_VOLUME, larger, np.nan)
     if np.isnan(apart).all():
         return None
     return MeshChange((meshes[two[0]], meshes[two[1]]), at, float(np.nanmedian(apart)), float(np.nanmax(apart)))

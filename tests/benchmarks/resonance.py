@@ -16,9 +16,8 @@ from solver.loading_history.start_states import follow_branch
 from solver.model import ReducedModel
 from solver.settings import FOLLOWED, Followed, FollowedFrequency, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.control import Adaptive, Given
-from solver.wear.solutions import SlowTime, Solutions
-from solver.wear.wearing_joint import FIXED, Following
+from solver.wear.integrate import Integration, SlowTime
+from solver.wear.step import Adaptive, Given
 from studies import build_scene
 from tests.benchmarks.frame import Table, arguments, measure
 from tests.followed_states import at_maximum, followed_states, in_quadrature, responses_around
@@ -61,10 +60,10 @@ def cost(name: str, model: ReducedModel, load: float, between: tuple[float, floa
     for rule in (Adaptive(settings.rtol), Given(step)):
         first = None
         for word, start in (("fixed", fixed), *((word, followed) for word in FOLLOWED)):
-            where = FIXED if word == "fixed" else Following(FollowedFrequency(word, *between))
-            asked = SlowTime(WEAR, rule, np.array([0.0, cycles]), where=where)
+            follow = None if word == "fixed" else FollowedFrequency(word, *between)
+            asked = SlowTime(WEAR, rule, np.array([0.0, cycles]), follow=follow)
             case = build_case(model, FRICTION, start.penalty_omega, settings, start.resolution)
-            runs = [measure(lambda: Solutions(case, start, asked).history()) for _ in range(4)]  # noqa: B023
+            runs = [measure(lambda: Integration(case, start, asked).history()) for _ in range(4)]  # noqa: B023
             whole, n_steps = min(run.seconds for run in runs), len(runs[0].result.course.ends) - 1
             each = 1e3 * whole / n_steps
             first = first or (whole, each)

@@ -21,9 +21,9 @@ from solver.results.history import PeriodicState, StartState, WearHistory
 from solver.results.state_report import periodic_state
 from solver.settings import Resolution, Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.structure.joint import Case, Joint, build_case
-from solver.wear.control import steps_of
 from solver.wear.history import integrate_wear
-from solver.wear.solutions import SlowTime
+from solver.wear.integrate import SlowTime
+from solver.wear.step import steps_of
 from studies.scenes import build_scene, scene_parameters
 
 STIFFNESS = 1e7  # N/m

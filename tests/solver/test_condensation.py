@@ -7,9 +7,8 @@ import pytest
 
 from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
 from solver.structure import condensation
-from solver.structure.condensation import build_structure, relative_indices
+from solver.structure.condensation import build_structure, frequency_slope, relative_indices
 from solver.structure.fourier import change_orders, from_complex, to_complex
-from solver.structure.frequency_slope import frequency_slope
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 from tests.solver.models import MASS, OMEGA, STIFFNESS, cyclic_model, definite, random_model, scene
 

@@ -12,7 +12,6 @@ from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import FollowedFrequency, Scheme, SolverSettings
-from solver.wear.wearing_joint import Following
 from tests.followed_states import at_maximum, followed_states, in_quadrature, responses_around
 from tests.references import slider_orbit
 from tests.solver.models import march_wear as march_from
@@ -114,7 +113,7 @@ def test_an_interrupted_history_is_equal_to_the_last_bit(word, monkeypatch):
     kept: list[Packed] = []
 
     def history(resume=None):
-        asked = {"keep": kept.append, "resume": resume, "where": Following(follow)}
+        asked = {"keep": kept.append, "resume": resume, "follow": follow}
         return march_from(model, 0.5, slider_start(word), WEAR, 1e3, "implicit", CYCLES, settings, **asked)
 
     whole = history()

@@ -14,9 +14,9 @@ from solver.contact.wear_law import WearLaw, WearTable
 from solver.harmonic_balance.state import Failure
 from solver.missions import integrate as integrating
 from solver.missions.block_run import Begun, BlockCase, BlockRun, run_block
-from solver.missions.blocks import Mission
-from solver.missions.course import MissionCourse
 from solver.missions.history import integrate_missions
+from solver.missions.integrate import MissionCourse
+from solver.missions.mission import Mission
 from solver.missions.passage import (
     FIRST_FREQUENCIES,
     MOST_FREQUENCIES,
@@ -34,7 +34,7 @@ from solver.missions.step import Step, attempt_step
 from solver.packing import Packed
 from solver.results.history import StartState
 from solver.settings import Resolution, WearTarget
-from solver.wear.solutions import Like
+from solver.wear.integrate import Like
 from studies.scenes.closed_forms.den_hartog import DenHartogSlider
 from studies.scenes.sdof_slider import Parameters as SliderParameters
 from tests.solver.models import scene

@@ -20,10 +20,10 @@ from solver.harmonic_balance.state import Failure
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import Scheme, SolverSettings
-from solver.wear.check import FullCheck
-from solver.wear.control import Adaptive, Given, WearLine
+from solver.wear import integrate
 from solver.wear.history import integrate_together, integrate_wear
-from solver.wear.solutions import SlowTime
+from solver.wear.integrate import SlowTime
+from solver.wear.step import Adaptive, Given, WearLine
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import exact_depths_of_motion
 
@@ -90,12 +90,12 @@ def test_the_error_of_the_slider_holds_the_exact_answer(scheme, step):
 
 @pytest.mark.slow
 def test_what_was_computed_of_a_history_that_ends_is_kept(monkeypatch):
-    whole, own = worn("implicit", 1000.0), FullCheck.__call__
+    whole, own = worn("implicit", 1000.0), integrate.full_check
 
-    def give_up(self, work, state):
-        return own(self, work, state) if state.cycle <= 12_000.0 else Failure(Outcome.CERTIFICATE_FAILED)
+    def give_up(work, state, **more):
+        return own(work, state, **more) if state.cycle <= 12_000.0 else Failure(Outcome.CERTIFICATE_FAILED)
 
-    monkeypatch.setattr(FullCheck, "__call__", give_up)
+    monkeypatch.setattr(integrate, "full_check", give_up)
     model, found = start()
     ended = march_wear(model, 0.5, found, WEAR, 1000.0, "implicit", CYCLES, GIVEN)
     assert ended.outcome is Outcome.CERTIFICATE_FAILED

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver.accuracy.certificate import certify
-from solver.continuation.static_state import solve_static_state
+from solver.continuation.first_state import solve_static_state
 from solver.newton.run import Run
 from solver.results.state_report import periodic_state, report_state
 from solver.settings import FINE_SAMPLES, SolverSettings, all_orders

@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.period_events import left_out
+from solver.accuracy.harmonic_levels import left_out
 from solver.harmonic_balance.state import Failure
 from solver.march.steps import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.outcome import Outcome
 from solver.packing import in_rows, pack, unpack
 from solver.settings import Scheme, SolverSettings
-from solver.wear import control
+from solver.wear import step as control
 from solver.wear.check import chosen_for_another
-from solver.wear.control import Adaptive, Given, LargestDepth, WearLine
-from solver.wear.state import Choice
-from solver.wear.step import Step
+from solver.wear.step import Adaptive, Given, LargestDepth, Step, WearLine
+from solver.wear.wearing_joint import Choice
 from tests.solver.worn_slider import AREA, END, begun
 
 SCHEMES: tuple[Scheme, ...] = ("explicit", "implicit")

@@ -11,8 +11,7 @@ from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.wearing_joint import WearingJoint, WearState
 from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, march_wear, scene
 

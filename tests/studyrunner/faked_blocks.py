@@ -8,9 +8,9 @@ import pytest
 from solver.harmonic_balance.state import Failure
 from solver.missions import integrate
 from solver.missions.block_run import BlockRun
-from solver.missions.blocks import Passage
+from solver.missions.mission import Passage
 from solver.outcome import Outcome
-from solver.wear.solutions import Like
+from solver.wear.integrate import Like
 
 STUDY = """
 [study]

@@ -111,6 +111,20 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
 # --- nothing wore ---
 
 
+def test_a_failure_of_a_single_point_names_its_reason_and_no_axes():
+    reason = "no step was short enough at cycle 3000"
+    study = ("axes.frequency=190", "axes.scheme=adaptive")
+    made = wearing(*study, outcome=lambda _: FAILED, message=lambda _: reason, last_cycle=lambda _: 3000.0)
+    (line, _) = summary_lines(summary(made))
+    assert line.endswith(reason)
+    assert "190" not in line
+
+
+def test_a_joint_that_does_not_move_has_no_amplitude_of_round_off():
+    made = wearing("axes.frequency=100", volume=lambda _: 0.0, response_amplitude=lambda _: np.full((21, 1), 4e-25))
+    assert any("does not move" in line for line in summary_lines(summary(made)))
+
+
 def test_nothing_wore_says_why():
     still = summary(wearing("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive", volume=lambda _: 0.0))
     assert still.wear == NothingWore(0.0, "at all 3 frequencies")
@@ -222,7 +236,7 @@ def test_points_that_failed_or_were_never_estimated_are_not_known():
         ("inaccurate", True, 1),
         ("sensitive", True, 1),
     ]
-    assert "computed up to 5000 cycles" in found.failures[0].first.replace("\N{NO-BREAK SPACE}", "")
+    assert "computed up to 5000 cycles" in found.failures[0].reason.replace("\N{NO-BREAK SPACE}", "")
 
 
 def test_the_summary_is_short_whatever_came_out():
