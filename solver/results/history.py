@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
+from solver.model import ComplexArray, FloatArray, IntArray
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.presentation import PresentedHistory
@@ -91,7 +91,6 @@ class WearHistory(PresentedHistory):
     - reference_volume (n_output,): m3, worn volume of the reference solution; NaN beyond the end of this solution.
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
       certificate of the states, all relative; NaN where not estimated.
-    - stable (n_output,): bool.
     - harmonics_used, samples_used (n_output,): int, 0 where there is no state.
     - last_cycle: count up to which the point was computed, whatever ended the history; NaN where there is no state.
     - jump_cycle: first cycle count at which the branch was lost, NaN if never.
@@ -137,7 +136,6 @@ class WearHistory(PresentedHistory):
     wear_rate_error: FloatArray
     harmonics_used: IntArray
     samples_used: IntArray
-    stable: BoolArray
     worn_volume_error: FloatArray
     wear_depth_error: FloatArray
     last_cycle: float = math.nan
