@@ -27,7 +27,7 @@ from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import NEGLIGIBLE
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, Joint, static_joint, viscous_joint
 

@@ -13,8 +13,7 @@ from solver.contact.coulomb import STICK
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import BalanceAt, State, final_history, vibration_change
 from solver.model import FloatArray
-from solver.newton.iteration import MOST_ITERATIONS, SHORTEST_STEP
-from solver.newton.run import Run
+from solver.newton.run import MOST_ITERATIONS, SHORTEST_STEP, Run
 from solver.structure.joint import Joint
 
 ATTEMPTS = 25

@@ -2,7 +2,7 @@
 
 With the first harmonics x of all displacements and F of the excitation, `F^H x = |F^H x| exp(-i lag)`. The lag rises
 from 0 below a resonance to pi above; the excitation does most work in phase resonance, at the lag pi/2. The frequency
-is the further unknown of a bordered balance (`solver.newton.bordering`), in an implicit step with the wear depth that
+is the further unknown of a bordered balance (`solver.newton.run`), in an implicit step with the wear depth that
 grows with the motion, and the further equation is
 
     sin(arg(F^H x) + lag) = 0.
@@ -25,9 +25,8 @@ import numpy as np
 from solver.continuation.natural import ATTEMPTS
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.model import ComplexArray, FloatArray
-from solver.newton.bordering import Bordered
 from solver.newton.linear_solver import FORCING
-from solver.newton.run import Run
+from solver.newton.run import Bordered, Run
 from solver.settings import DIFFERENCE, NEGLIGIBLE, ROUND_OFF
 from solver.structure.condensation import FrequencySlope, frequency_slope
 from solver.structure.fourier import to_complex

@@ -29,11 +29,10 @@ from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, final_history
 from solver.model import ComplexArray, FloatArray, LinearModel, Matrix
-from solver.newton.iteration import SHORTEST_STEP
-from solver.newton.run import Run
+from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.condensation import CondensedStructure, condense, relative_indices, whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness

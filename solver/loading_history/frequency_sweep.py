@@ -233,7 +233,7 @@ class FrequencySweep:
         if not certify(joint, point.evaluation).holds(self.settings.tolerance):
             return self.without_state(Outcome.CERTIFICATE_FAILED, "", case.resolution, estimate)
         if unstable := find_instability(case, joint, point.evaluation, self.run, self.every):
-            return self.without_state(unstable.outcome, unstable.sentence, case.resolution, estimate)
+            return self.without_state(unstable.outcome, unstable.message, case.resolution, estimate)
         reference = self._reference(nodes, case, point)
         if reference is not None:
             estimate = estimate + state_difference(case, joint, point, reference)

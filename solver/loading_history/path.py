@@ -13,20 +13,19 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.period_events import left_out, nothing_happens
+from solver.accuracy.harmonic_levels import left_out, nothing_happens
 from solver.accuracy.refinement import KEPT_FRACTION, NODE_UNKNOWNS, Refined, refine
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.prolongation import carried_history
-from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
+from solver.harmonic_balance.state import State, carried_history, history_at_rest, vibration_change, vibration_size
 from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, first_resolution
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3

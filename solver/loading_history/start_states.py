@@ -33,7 +33,7 @@ from solver.outcome import Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
 from solver.settings import Direction, FollowedFrequency, SolverSettings
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 
 
 def follow_branch(

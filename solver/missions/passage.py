@@ -38,8 +38,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.clock import computing_time
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import Failure
+from solver.harmonic_balance.state import Failure, largest_responses
 from solver.loading_history.start_states import follow_line
 from solver.missions.block_run import Begun, BlockCase, BlockRun
 from solver.model import ComplexArray, FloatArray

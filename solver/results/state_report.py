@@ -10,8 +10,7 @@ from numba import njit
 from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import State, largest_responses
 from solver.model import ComplexArray, FloatArray
 from solver.packing import packable
 from solver.results.history import PeriodicState

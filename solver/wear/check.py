@@ -15,7 +15,7 @@ import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, certify
 from solver.accuracy.error_estimate import UNKNOWN
-from solver.accuracy.period_events import lacks_even, left_out
+from solver.accuracy.harmonic_levels import lacks_even, left_out
 from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
@@ -159,8 +159,7 @@ def _vibrates_otherwise(state: WearState) -> bool:
 
 def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failure | None:
     """Instability of a state by its Floquet multipliers, None if stable; every: as in `find_instability`."""
-    unstable = find_instability(work.case, work.at(state), state.point.evaluation, work.run, every)
-    return None if unstable is None else Failure(unstable.outcome, unstable.sentence)
+    return find_instability(work.case, work.at(state), state.point.evaluation, work.run, every)
 
 
 def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:

@@ -44,7 +44,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.march.steps import Lengths, take_step
 from solver.model import FloatArray
-from solver.newton.iteration import SHORTEST_STEP
+from solver.newton.run import SHORTEST_STEP
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF, Scheme
 from solver.structure.joint import Joint

@@ -12,20 +12,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
-from solver.accuracy.period_events import left_out
+from solver.accuracy.harmonic_levels import left_out
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import FloatArray
-from solver.newton.iteration import MOST_ITERATIONS
-from solver.newton.run import Run
+from solver.newton.run import MOST_ITERATIONS, Run
 from solver.outcome import Outcome, in_digits
 from solver.packing import packable
 from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.rate_slope import explicit_step_limit
 

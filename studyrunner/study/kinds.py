@@ -5,10 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS, OF_MISSIONS_BY_DEFAULT, OF_SAMPLED_MISSIONS
-from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.study.sections import SOLVER_AXES, AxesSection, SlowTimeSection, WearSection
-from studyrunner.variables import ASKED, KEPT, OF_SAMPLES, USUAL, Variable
+from studyrunner.variables import (
+    ASKED,
+    KEPT,
+    OF_A_MISSION,
+    OF_A_MODE_POINT,
+    OF_MISSIONS,
+    OF_MISSIONS_BY_DEFAULT,
+    OF_MODES,
+    OF_SAMPLED_MISSIONS,
+    OF_SAMPLES,
+    USUAL,
+    Variable,
+)
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,6 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.settings import TARGETS, Followed
 from studyrunner.coordinates import SCENE
-from studyrunner.mission_variables import OF_MISSIONS
-from studyrunner.mode_variables import OF_MODES
 from studyrunner.scatter.section import ScatterSection
 from studyrunner.study.mistakes import nearest_name
 from studyrunner.user_error import WrongValueError
@@ -35,7 +33,7 @@ from studyrunner.values import (
     listed,
     once,
 )
-from studyrunner.variables import ASKED, KEPT
+from studyrunner.variables import ASKED, KEPT, OF_MISSIONS, OF_MODES
 
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""

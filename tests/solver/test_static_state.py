@@ -14,11 +14,11 @@ from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.condensation import condense
 from solver.structure.joint import build_case
-from studies.finite_element.elements.solid_mesh import Material
-from studies.finite_element.joint.pairing import ContactSurfaces
-from studies.finite_element.joint.surfaces import surface_of_faces
+from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
+from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene
+from studies.finite_element.surfaces import surface_of_faces
 from tests.benchmarks.random_decks import run_deck
 from tests.random_decks import equilibrium_possible, law_errors, random_deck
 from tests.solver.models import dovetail, scene

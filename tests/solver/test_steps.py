@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.period_events import left_out
+from solver.accuracy.harmonic_levels import left_out
 from solver.harmonic_balance.state import Failure
 from solver.march.steps import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.outcome import Outcome

@@ -16,7 +16,7 @@ from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.joint import build_case
 from tests.references import coulomb_orbit
 from tests.solver.models import converged_state, crossings, first_point, scene

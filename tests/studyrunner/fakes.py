@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from solver.packing import Packed
-from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.checkpoint.records import record_type
+from studyrunner.checkpoint.completion_index import CompletionIndex, record_type
 from studyrunner.checkpoint.store import Store
 from studyrunner.kinds.task import Identity, Index, Keep, PointResult, Result, StartResult, Task, TaskPlan, digest
 from studyrunner.kinds.wear import History, Sweep

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm, qmc
 
 from solver.outcome import Outcome
-from studyrunner.checkpoint.records import variable_sizes
+from studyrunner.checkpoint.completion_index import variable_sizes
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates, scene_arrays

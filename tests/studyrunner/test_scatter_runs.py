@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from studyrunner.kinds.kind import build_tasks
-from studyrunner.result.sample_coordinates import sample_coordinates
+from studyrunner.result.arrays import sample_coordinates
 from studyrunner.scene.pairs import contact_changes
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes

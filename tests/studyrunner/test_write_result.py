@@ -13,8 +13,8 @@ from studyrunner.accessor import FretwearAccessor
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
 from studyrunner.result.arrays import coordinates, scene_arrays
-from studyrunner.result.paths import progress_file
 from studyrunner.result.provenance import describe_run
+from studyrunner.result.target import Target
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
 from studyrunner.system import files
@@ -47,10 +47,10 @@ def write(results, path, *overrides):
 
 def write_study(study, results, path, of_scene=()):
     plan = build_tasks(study, FACTS.n_displacements)
-    completion = fake_completion(study, plan, results, progress_file(path))
+    completion = fake_completion(study, plan, results, Target(path).progress)
     arrays = [*coordinates(study, FACTS, pair_arrays(study, [FACTS])), *scene_arrays(study, of_scene)]
     with contextlib.closing(completion.store):
-        return writing.write_result(study, FACTS, completion, path, arrays, describe_run(study, FACTS))
+        return writing.write_result(study, FACTS, completion, Target(path), arrays, describe_run(study, FACTS))
 
 
 @pytest.fixture
@@ -148,7 +148,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     with pytest.raises(StorageError, match="disk full"):
         write(fake_results(), path)
     assert path.read_text(encoding="utf-8") == "an earlier result"
-    assert sorted(tmp_path.iterdir()) == [path, progress_file(path)]
+    assert sorted(tmp_path.iterdir()) == [path, Target(path).progress]
 
 
 def test_the_examples_of_readme_and_pages_run(tmp_path, monkeypatch):
