@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
+from solver.model import ComplexArray, FloatArray, IntArray
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.presentation import PresentedHistory
@@ -84,7 +84,7 @@ class WearHistory(PresentedHistory):
       and the joint wears.
     - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end.
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
-      certificate of the states, all relative; NaN where not estimated. stable (n_output,): bool.
+      certificate of the states, all relative; NaN where not estimated.
     - harmonics_used, samples_used (n_output,): int.
     - last_cycle: count up to which the point was computed; NaN where there is no state.
     - jump_cycle: first cycle count at which the branch was lost, NaN if never.
@@ -129,7 +129,6 @@ class WearHistory(PresentedHistory):
     wear_rate_error: FloatArray
     harmonics_used: IntArray
     samples_used: IntArray
-    stable: BoolArray
     worn_volume_error: FloatArray
     wear_depth_error: FloatArray
     last_cycle: float = math.nan

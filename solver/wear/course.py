@@ -186,8 +186,8 @@ class Course:
     def read(self, counts: FloatArray) -> dict[str, Any]:
         """Values at ascending counts (n,), by name; beyond the last step NaN, whole numbers 0.
 
-        - Names and shapes of `INTERPOLATED`, of `CERTIFIED`, `wear_depth`, `harmonics_used`, `samples_used` and
-          `stable` as in `WearHistory`.
+        - Names and shapes of `INTERPOLATED`, of `CERTIFIED`, `wear_depth`, `harmonics_used` and `samples_used` as in
+          `WearHistory`.
         - `wear_rate` (n,): m3 per cycle; `depth_rate` (n, n_contact): of each pair, m per cycle.
         - `local` (n,): sum of the local errors, m3.
         """
@@ -205,7 +205,6 @@ class Course:
         at_end = [reports[place] for place in end]
         found["harmonics_used"] = np.array([report.resolution.highest for report in at_end])
         found["samples_used"] = np.array([report.resolution.samples for report in at_end])
-        found["stable"] = np.array([report.certificate.stable for report in at_end])
         for values in found.values():
             values[counts > dense.counts[-1]] = np.nan if values.dtype.kind in "fc" else 0
         return found

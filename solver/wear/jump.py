@@ -75,7 +75,7 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
     joint, last = work.at(state), state.point
-    found = relax_to_periodic(work.case, joint, worn, last.evaluation, joint, last.history, work.run)
+    found = relax_to_periodic(work.case, joint, worn, last, joint, work.run)
     if isinstance(found, Outcome):
         return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners

@@ -36,10 +36,9 @@ import numpy as np
 
 from solver.contact.coulomb import STICK
 from solver.contact.law import Marched
-from solver.continuation.natural import SMOOTH_CHANGE
+from solver.continuation.natural import SMOOTH_CHANGE, Lengths, take_step
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, vibration_change
-from solver.march.steps import Lengths, take_step
 from solver.model import FloatArray
 from solver.newton.run import SHORTEST_STEP
 from solver.outcome import Outcome

@@ -7,8 +7,8 @@ import pytest
 
 from solver.accuracy.error_estimate import Estimate
 from solver.accuracy.harmonic_levels import left_out
+from solver.continuation.natural import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.harmonic_balance.state import Failure
-from solver.march.steps import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.outcome import Outcome
 from solver.settings import Scheme, SolverSettings
 from solver.wear import step as control
