@@ -200,9 +200,9 @@ class WearingJoint:
             # the stability of a start state has been checked
             judged_h=at.predicted_h,
         )
-        return self.noted(begun)
+        return self.with_rates(begun)
 
-    def noted(self, state: WearState) -> WearState:
+    def with_rates(self, state: WearState) -> WearState:
         """The state with its wear rates, and with the limit of the explicit step from the first state that wears on."""
         at = state.point.evaluation
         volumes = self.rate(at) * self.area
