@@ -27,7 +27,6 @@ from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import NEGLIGIBLE
-from solver.stability.floquet import is_stable
 from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, Joint, static_joint, viscous_joint
 
@@ -79,7 +78,7 @@ def solve_first_state(
         if begun is None:
             continue
         raised, arrived = follow_naturally(balance_at, begun, 1.0, run)
-        if arrived and is_stable(balance_at(1.0, raised.evaluation.history), raised.evaluation, run):
+        if arrived and run.is_stable(balance_at(1.0, raised.evaluation.history), raised.evaluation):
             return raised
         unstable |= arrived
     whole = case.joint(omega, excitation_amplitude)
