@@ -215,7 +215,7 @@ def _integrated(joint: Joint, at: Evaluation, growing_only: bool, rtol: float) -
 
 
 def _samples(joint: Joint, at: Evaluation, small: bool) -> int:
-    """Samples of a period for the time integration: enough for vibrations that grow in the structure alone."""
+    """Samples of a period: up to eight times as many for vibrations that grow in the structure alone."""
     switching, stuck = switching_pairs(at)
     growing = (_growing(joint.model.linear[0], _moving(joint, pairs).tobytes()) for pairs in (stuck, stuck | switching))
     fastest = max(float(np.abs(of.imag).max(initial=0.0)) for of in growing) / joint.omega
