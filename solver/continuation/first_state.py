@@ -78,7 +78,7 @@ def solve_first_state(
     whole = balance_at(1.0, rest.history)
     if (sliding := _sliding_start(whole, rest)) is not None:
         slid = run.state(whole, sliding, 1.0, NEAR_ITERATIONS)
-        if slid is not None and is_stable(balance_at(1.0, slid.evaluation.history), slid.evaluation, run):
+        if slid is not None and run.is_stable(balance_at(1.0, slid.evaluation.history), slid.evaluation):
             return slid
     for fraction in (0.0, *RELIEF):
         relieved = Balance(quiet, relieved_history(quiet, static, fraction), wear_depth)
