@@ -20,7 +20,7 @@ from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.presentation import NOT_IN_DATASETS, PresentedCurve
 from solver.settings import Direction, SolverSettings
-from solver.stability.floquet import Multipliers, Stability, find_multipliers, is_stable
+from solver.stability.floquet import Multipliers, Stability, find_multipliers
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case
 
@@ -185,7 +185,7 @@ def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency
             estimate = refine(case, joint.omega, joint.excitation_amplitude, point, run).estimate.response
             error[index] = estimate if np.isfinite(estimate) else np.inf
         found.append(find_multipliers(case, joint, at, run))
-        stability.append(found[-1].stability(odd=not is_stable(balance, at, run.fresh())))
+        stability.append(found[-1].stability(odd=not run.fresh().is_stable(balance, at)))
         balances.append(functions_of(balance, at.predicted_h, Outcome.CONVERGED, ""))
     return ResponseCurve(
         parameter="frequency" if over_frequency else "excitation_amplitude",

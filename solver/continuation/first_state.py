@@ -27,7 +27,6 @@ from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import NEGLIGIBLE
-from solver.stability.floquet import is_stable
 from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, Joint, static_joint, viscous_joint
 
@@ -79,7 +78,7 @@ def solve_first_state(
     whole = balance_at(1.0, rest.history)
     if (sliding := _sliding_start(whole, rest)) is not None:
         slid = run.state(whole, sliding, 1.0, NEAR_ITERATIONS)
-        if slid is not None and is_stable(balance_at(1.0, slid.evaluation.history), slid.evaluation, run):
+        if slid is not None and run.is_stable(balance_at(1.0, slid.evaluation.history), slid.evaluation):
             return slid
     for fraction in (0.0, *RELIEF):
         relieved = Balance(quiet, relieved_history(quiet, static, fraction), wear_depth)
@@ -87,7 +86,7 @@ def solve_first_state(
         if begun is None:
             continue
         raised, arrived = follow_naturally(balance_at, begun, 1.0, run)
-        if arrived and is_stable(balance_at(1.0, raised.evaluation.history), raised.evaluation, run):
+        if arrived and run.is_stable(balance_at(1.0, raised.evaluation.history), raised.evaluation):
             return raised
         unstable |= arrived
     settled = relax_to_periodic(case, whole.joint, wear_depth, rest, quiet, run)

@@ -24,7 +24,6 @@ from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, first_resolution
-from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3
@@ -173,7 +172,7 @@ class LoadingPath:
         while not run.budget.exhausted:
             end, arrived = follow_naturally(self.balance_at, state, target, run, fine=fine)
             balance = self.balance_at(end.parameter, end.evaluation.history)
-            if arrived and is_stable(balance, end.evaluation, run):
+            if arrived and run.is_stable(balance, end.evaluation):
                 return Step(end, tuple(folds))
             # natural steps may have passed the start of an unstable part: then the search begins before them
             end = state if arrived else end
@@ -281,4 +280,4 @@ def choose_resolution(case: Case, joint: Joint, point: State, run: Run) -> Refin
 def _stable(balance: Balance, begin: FloatArray, target: float, run: Run) -> State | None:
     """Stable state of a balance near a predicted force (n_rel, m), N; None where none is found."""
     found = run.state(balance, begin, target, NEAR_ITERATIONS)
-    return found if found is not None and is_stable(balance, found.evaluation, run) else None
+    return found if found is not None and run.is_stable(balance, found.evaluation) else None
