@@ -1,4 +1,4 @@
-"""The unworn joint along its frequency or its excitation: from a stable state to a stable state.
+"""What a sweep goes along, and the unworn joint along its frequency or its excitation.
 
 `LoadingPath.solve` solves one balance, which starts on the parabola through the last three states. Where Newton's
 method fails or the state is unstable, `LoadingPath.rescue` goes on by smaller natural steps to the end of the branch.
@@ -21,7 +21,6 @@ from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State, carried_history, history_at_rest, vibration_change, vibration_size
 from solver.model import FloatArray
-from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, first_resolution
@@ -42,16 +41,16 @@ SHORTEST_STEP = 2e-5
 resonance in such steps."""
 
 CHANGE_PER_RTOL = 20.0
-"""Largest relative change of the vibration in a step, over rtol. Dovetail of 48 pairs, compared with steps twenty times
-as short, 211 to 212.5 Hz: errors of the motion up to 0.8 % with a largest change of 0.2, up to 0.1 % with 0.05."""
+"""Largest relative change of the vibration in a step, over rtol."""
 
 CHANGE_LIMITS = (0.05, 0.2)
-"""Limits of the largest change, see above. Blade root of the deck `blade_root`, rtol 5e-2: the wear rates with 0.2 and
-0.03 differ by 0.04 %, for 620 and 1680 iterations."""
+"""Limits of this change. Dovetail of 48 pairs, 211 to 212.5 Hz, compared with steps twenty times as short: errors of
+the motion up to 0.8 % with a largest change of 0.2, up to 0.1 % with 0.05. Blade root of the deck `blade_root`: the
+wear rates with 0.2 and 0.03 differ by 0.04 %, for 620 and 1680 iterations."""
 
 SMALL_VIBRATION = 0.3
-"""Fraction of the friction limits: changes of a smaller vibration are relative to this fraction. With 1 the error of
-the motion at 211 Hz is three times as large, with 0 there are a few nodes more."""
+"""Fraction of the friction limits to which changes of a smaller vibration are relative. With 1 the error of the motion
+of the dovetail at 211 Hz is three times as large, with 0 there are a few nodes more."""
 
 LEAST_SLIP = 1e-3
 """Slip of a pair over its motion above which it forgets its history."""
@@ -78,10 +77,6 @@ class Path(Protocol[S]):
     @property
     def steps(self) -> tuple[float, float, float]:
         """Shortest and longest step, and the one at which a state that is not found is left to `rescue`."""
-
-    @property
-    def node_tolerance(self) -> float:
-        """Tolerance of the scaled residual of a node; results are solved to that of the settings."""
 
     def ahead(self, parameter: float, length: float) -> float:
         """The parameter a step farther, or back where the length is below 0."""
@@ -154,11 +149,6 @@ class LoadingPath:
         """As in Path, over the frequency or the whole load."""
         return SHORTEST_STEP, LONGEST_STEP, FREE_STEP
 
-    @property
-    def node_tolerance(self) -> float:
-        """As in Path."""
-        return max(self.case.settings.tolerance, FORCING * self.case.settings.rtol)
-
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path; a ramp ends at its whole load."""
         if self.omega is None:
@@ -189,7 +179,7 @@ class LoadingPath:
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
             joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
-            settled = relax_to_periodic(self.case, joint, balance.wear_depth, end.evaluation, before, end.history, run)
+            settled = relax_to_periodic(self.case, joint, balance.wear_depth, end, before, run)
             if isinstance(settled, Outcome):
                 return settled
             # a fold with a smaller change is a corner of the branch

@@ -18,11 +18,10 @@ import numpy as np
 from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, predicted_at_rest, relieved_history, solve_static_state
-from solver.continuation.natural import NEAR_ITERATIONS
+from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import Failure, State, final_history, history_at_rest, transfer
 from solver.loading_history.path import FREE_STEP, Step, choose_resolution, largest_change
-from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
 from solver.newton.run import Bordered, Run
@@ -119,11 +118,6 @@ class NonlinearMode:
         """As in Path: where a smaller ratio is needed the mode is lost; with a tenth of the step modes are equal."""
         shortest = math.log1p(FREE_STEP)
         return shortest, math.log(LARGEST_STEP_RATIO), shortest
-
-    @property
-    def node_tolerance(self) -> float:
-        """As in Path."""
-        return self.case.settings.tolerance
 
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path."""
