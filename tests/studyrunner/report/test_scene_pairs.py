@@ -10,8 +10,7 @@ import pytest
 from studies.scene_answers import SurfaceMesh
 from studyrunner.report.contents import draw_report
 from studyrunner.report.figures.flanks import find_flanks
-from studyrunner.report.page.data import build_page_data
-from studyrunner.report.page.root import build_root_numbers
+from studyrunner.report.page.data import build_page_data, build_root_numbers
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.vtu import find_writer
 from studyrunner.report.selection import choose
