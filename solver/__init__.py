@@ -30,10 +30,11 @@ if TYPE_CHECKING:
     from solver.compliant_contact import with_contact_stiffness as with_contact_stiffness
     from solver.forced_response import FrequencyResponse as FrequencyResponse
     from solver.forced_response import frequency_response as frequency_response
-    from solver.mission_history import integrate_mission as integrate_mission
-    from solver.missions.blocks import Block as Block
-    from solver.missions.blocks import Passage as Passage
-    from solver.missions.result import MissionHistory as MissionHistory
+    from solver.histories import integrate_mission as integrate_mission
+    from solver.histories import march_wear as march_wear
+    from solver.missions.mission import Block as Block
+    from solver.missions.mission import MissionHistory as MissionHistory
+    from solver.missions.mission import Passage as Passage
     from solver.model import ReducedModel as ReducedModel
     from solver.model_from_matrices import build_model as build_model
     from solver.nonlinear_modes import Backbone as Backbone
@@ -44,20 +45,19 @@ if TYPE_CHECKING:
     from solver.settings import SolverSettings as SolverSettings
     from solver.single_mode_theory import ModalResponse as ModalResponse
     from solver.single_mode_theory import modal_response as modal_response
-    from solver.wear_history import march_wear as march_wear
     from solver.whole_response import ResponseCurve as ResponseCurve
     from solver.whole_response import response_curve as response_curve
 
 # Loaded at the first use: rooms import each other through this package, and loading numba takes a while.
 _PLACES = {
     "Backbone": "nonlinear_modes",
-    "Block": "missions.blocks",
+    "Block": "missions.mission",
     "FrequencyResponse": "forced_response",
     "HarmonicBalance": "balance_functions",
-    "MissionHistory": "missions.result",
+    "MissionHistory": "missions.mission",
     "ModalResponse": "single_mode_theory",
     "Outcome": "outcome",
-    "Passage": "missions.blocks",
+    "Passage": "missions.mission",
     "PeriodicMotion": "results.periodic_motion",
     "ReducedModel": "model",
     "ResponseCurve": "whole_response",
@@ -67,8 +67,8 @@ _PLACES = {
     "balance_of": "balance_functions",
     "build_model": "model_from_matrices",
     "frequency_response": "forced_response",
-    "integrate_mission": "mission_history",
-    "march_wear": "wear_history",
+    "integrate_mission": "histories",
+    "march_wear": "histories",
     "modal_response": "single_mode_theory",
     "response_curve": "whole_response",
     "with_contact_stiffness": "compliant_contact",

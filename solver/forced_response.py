@@ -9,16 +9,15 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.harmonic_balance.response_peak import largest_responses
+from solver.harmonic_balance.state import largest_responses
 from solver.loading_history.start_states import follow_branch
-from solver.loading_history.sweep_start import Direction
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome, known_to
 from solver.presentation import PresentedResponse
 from solver.results.history import StartState
 from solver.results.state_report import evaluated
 from solver.results.verdict import describe_cut_off, first_cut_off
-from solver.settings import SolverSettings
+from solver.settings import Direction, SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case, friction_of_pairs
 
@@ -30,13 +29,10 @@ class FrequencyResponse(PresentedResponse):
     - frequency (n_frequency,): Hz, as given.
     - response (n_frequency, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)).
     - response_peak (n_frequency, n_response): largest magnitude over a period, m.
-    - response_error (n_frequency,): estimated relative error.
-    - outcome: how the computation of each point ended.
-    - message: details of each outcome.
-    - branch (n_frequency,): number of folds at which the sweep has jumped before it reached the point.
-    - fold_frequency (n_frequency,): frequency of the last of these folds, Hz; NaN if there is none.
-
-    The responses and their errors are NaN where no state was found.
+    - response_error (n_frequency,): estimated relative error. NaN as the responses where no state was found.
+    - outcome, message: how the computation of each point ended, and details.
+    - branch, fold_frequency (n_frequency,): number of folds at which the sweep has jumped before it reached the point,
+      and frequency of the last of them, Hz; NaN if there is none.
     """
 
     frequency: FloatArray
@@ -66,9 +62,8 @@ def frequency_response(
     model: from `build_model`, `studies.build_scene` or `studies.read_scene`.
     frequency: (n_frequency,) or one number, Hz, in any order. The state at a frequency does not depend on the others.
     excitation_amplitude: N, multiplies the unit harmonic load of the model.
-    friction_coefficient: one number for all pairs, or (n_contact,) for each pair. None for a model with its own.
+    friction_coefficient: one number for all pairs, or (n_contact,). None for a model with its own.
     sweep: way to a state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
-    settings: the defaults of `SolverSettings` if not given.
     wear_depth: (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
 
     Raises ValueError where a number is out of its range, where the model lacks nodal diameters that the harmonics need,
@@ -122,7 +117,7 @@ def check_case(
     sweep: Direction,
     settings: SolverSettings,
 ) -> tuple[float, float | FloatArray | None]:
-    """Checked excitation amplitude and friction coefficient. Raises ValueError where an argument is not allowed."""
+    """Checked excitation amplitude and friction coefficient. Raises ValueError."""
     load = check_number("excitation_amplitude", excitation_amplitude, least=0.0)
     friction = check_friction(model, friction_coefficient)
     check_word("sweep", sweep, get_args(Direction))
@@ -149,10 +144,7 @@ def check_settings(model: ReducedModel, settings: SolverSettings) -> None:
 
 
 def worn_model(model: ReducedModel, wear_depth: ArrayLike | None) -> ReducedModel:
-    """The model of a joint that is worn by a depth (n_contact,), m, which opens its pairs; as given for None.
-
-    Raises ValueError where there is no depth for each pair, or where a depth is negative.
-    """
+    """The model whose pairs a wear depth (n_contact,), m, has opened; as given for None. Raises ValueError."""
     if wear_depth is None:
         return model
     depth = check_numbers("wear_depth", wear_depth, least=0.0)

@@ -1,7 +1,4 @@
-"""The model of a joint: a reduced linear structure and the contact pairs on the structure.
-
-A scene gives these frozen dataclasses to the solver and nothing else. All values are in SI units.
-"""
+"""The model of a joint: a reduced linear structure and the contact pairs on it. All values are in SI units."""
 
 from __future__ import annotations
 
@@ -90,7 +87,7 @@ class LinearModel:
         return LinearModel(*(np.conj(part) for part in parts))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ReducedModel:
     """A scene: linear structure(s), the contact pairs on them and the names of the responses.
 
@@ -109,12 +106,9 @@ class ReducedModel:
     nodal_diameter: int = 0
 
     def harmonic_structure(self, harmonic: int) -> LinearModel:
-        """Linear model in which a harmonic moves.
+        """Linear model in which a harmonic moves: that of nodal diameter `n d` modulo N, conjugate above N/2.
 
-        Harmonic n of a travelling wave of nodal diameter d has the interblade phase `2 pi n d / N`. The wave moves in
-        nodal diameter `n d` modulo N; above N/2 this is the conjugate of nodal diameter N - n d.
-
-        Raises KeyError where the scene does not hold that nodal diameter.
+        Raises KeyError where the scene does not have that nodal diameter.
         """
         if self.n_sectors == 0 or self.nodal_diameter == 0:
             return self.linear[0]
@@ -122,6 +116,16 @@ class ReducedModel:
         if 2 * wrapped > self.n_sectors:
             return self.linear[self.n_sectors - wrapped].conjugate
         return self.linear[wrapped]
+
+    def __repr__(self) -> str:
+        """Three lines: sizes, contact pairs, responses."""
+        contact, words = self.contact, (name or "without a name" for name in dict.fromkeys(self.contact.surface))
+        wave = f", nodal diameter {self.nodal_diameter} of {self.n_sectors} sectors" if self.n_sectors else ""
+        return (
+            f"ReducedModel: {len(self.linear[0].mass)} displacements{wave}\n"
+            f"  contact pairs      {contact.n_contact} on {contact.area.sum():.6g} m2, surfaces {', '.join(words)}\n"
+            f"  responses          {', '.join(self.response_names)}"
+        )
 
     def holds(self, n_harmonics: int) -> bool:
         """Whether the scene has the nodal diameters of all harmonics 0..n_harmonics."""

@@ -1,24 +1,24 @@
-"""Values of the solver as text and plain arrays for a file: the state of a wear history or of a sweep.
+"""Values of the solver as text and plain arrays for a file: the state of a history or of a sweep, a reduced model.
 
 `unpack(pack(value))` is equal to `value` to the last bit, and its arrays are stored by rows (C order). The memory order
-of an array determines the order of sums over the array, and so their last bits. A computation that is to be continued
-to the last bit therefore continues from the unpacked value itself.
+of an array determines the last bits of sums over it: a computation that may be resumed goes on from the unpacked value.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.outcome import Outcome
 
 T = TypeVar("T")
 
-_CLASSES: dict[str, type[Any]] = {}
+_CLASSES: dict[str, type[Any]] = {each.__name__: each for each in (ContactInterface, LinearModel, ReducedModel)}
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,25 @@ def unpack(packed: Packed) -> Any:
 def in_rows(value: T) -> T:
     """The value with all arrays stored by rows (C order), as `unpack` returns them."""
     return cast("T", unpack(pack(value)))
+
+
+def pack_model(model: ReducedModel) -> Packed | None:
+    """The model; None where arrays are not stored by rows: the last bits of all results would change.
+
+    No bundled scene has such arrays.
+    """
+    values = [value for part in (*model.linear.values(), model.contact) for value in vars(part).values()]
+    if not all(value.flags.c_contiguous for value in values if isinstance(value, np.ndarray)):
+        return None
+    return pack((tuple(model.linear.items()), replace(model, linear={})))
+
+
+def unpack_model(packed: Packed) -> ReducedModel:
+    """The model that was packed, equal to the last bit; errors as `unpack`, where it does not describe a model."""
+    linear, model = unpack(packed)
+    if not isinstance(model, ReducedModel):
+        raise TypeError(type(model).__name__)
+    return replace(model, linear=dict(linear))
 
 
 def _described(value: object, arrays: list[NDArray[np.generic]]) -> object:

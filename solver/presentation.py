@@ -14,38 +14,26 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-_OF_VALUES = {
-    "worn_volume": ("", "m3"),
-    "reference_volume": ("", "m3"),
-    "wear_rate": ("", "m3 per cycle"),
-    "wear_depth": ("contact", "m"),
-    "wear_depth_error": ("contact", "m"),
-    "mean_pressure": ("contact", "Pa"),
-    "slip_range": ("contact", "m"),
-    "open_fraction": ("contact", "1"),
-    "slip_fraction": ("contact", "1"),
-    "response": ("response", "m"),
-    "response_mean": ("response", "m"),
-    "response_peak": ("response", "m"),
-    "shape": ("displacement", "m"),
-    "loop_displacement": ("loop phase component", "m"),
-    "loop_force": ("loop phase component", "N"),
-    "frequency": ("", "Hz"),
-    "frequency_error": ("", "Hz"),
-    "fold_frequency": ("", "Hz"),
-    "excitation_frequency": ("", "Hz"),
-    "excitation_frequency_error": ("", "Hz"),
-    "run_time": ("", "s"),
-    "block_volume": ("block", "m3"),
-    "block_volume_error": ("block", "1"),
-    "response_begin": ("block response", "m"),
-    "response_end": ("block response", "m"),
-    "response_peak_begin": ("block response", "m"),
-    "response_peak_end": ("block response", "m"),
-    "amplitude": ("", "m kg^0.5"),
-    "excitation_amplitude": ("", "N"),
+_UNITS = {
+    "m3": "worn_volume reference_volume block_volume",
+    "m3 per cycle": "wear_rate",
+    "m": "wear_depth wear_depth_error slip_range response response_mean response_peak shape loop_displacement"
+    " response_begin response_end response_peak_begin response_peak_end",
+    "Pa": "mean_pressure",
+    "N": "loop_force excitation_amplitude",
+    "Hz": "frequency frequency_error fold_frequency excitation_frequency excitation_frequency_error",
+    "s": "run_time",
+    "m kg^0.5": "amplitude",
 }
-"""Dimensions after the first one, and unit; of all others no dimension and "1"."""
+_DIMENSIONS = {
+    "contact": "wear_depth wear_depth_error mean_pressure slip_range open_fraction slip_fraction",
+    "response": "response response_mean response_peak",
+    "displacement": "shape",
+    "loop phase component": "loop_displacement loop_force",
+    "block": "block_volume block_volume_error",
+    "block response": "response_begin response_end response_peak_begin response_peak_end",
+}
+"""Dimensions after the first one."""
 
 _OF_MISSIONS = {
     "response_error": ("mission", "block"),
@@ -54,6 +42,14 @@ _OF_MISSIONS = {
     "steps": ("step",),
 }
 """All dimensions of values that belong to blocks or steps of missions."""
+
+
+def _row_of(table: dict[str, str], name: str, otherwise: str) -> str:
+    return next((key for key, names in table.items() if name in names.split()), otherwise)
+
+
+def _unit(name: str) -> str:
+    return _row_of(_UNITS, name, "1")
 
 
 NOT_IN_DATASETS = {"dataset": False}
@@ -72,28 +68,19 @@ class Presented:
     DRAWN: ClassVar[tuple[str, ...]]
 
     def to_xarray(self) -> xr.Dataset:
-        """All values, named as here, in SI units; `outcome` as words. Responses stay complex."""
+        """All values, named as here, in SI units; `outcome` as words.
+
+        A complex `response` stands as `response_amplitude` and `response_phase`, rad, as in a result file.
+        """
         import xarray as xr
 
         name, over = self.OVER
         points = getattr(self, name)
         data: dict[str, Any] = {}
         for field in fields(self):  # type: ignore[arg-type]
-            if field.name == name or not field.metadata.get("dataset", True):
-                continue
-            value = getattr(self, field.name)
-            others, units = _OF_VALUES.get(field.name, ("", "1"))
-            dims = _OF_MISSIONS.get(field.name, ()) if over == "mission" else ()
-            if isinstance(value, tuple):
-                data[field.name] = (over, [str(each) for each in value], {"units": units})
-            elif not isinstance(value, np.ndarray):
-                data[field.name] = ((), str(value) if isinstance(value, Outcome) else value, {"units": units})
-            elif value.size:
-                if not dims and len(value) == 1:
-                    # the same at all points
-                    value = np.broadcast_to(value, (len(points), *value.shape[1:]))
-                data[field.name] = (dims or (over, *others.split()), value, {"units": units})
-        return xr.Dataset(data, {over: (over, points, {"units": _OF_VALUES.get(name, ("", "1"))[1]})})
+            if field.name != name and field.metadata.get("dataset", True):
+                data |= _variables(field.name, getattr(self, field.name), over, len(points))
+        return xr.Dataset(data, {over: (over, points, {"units": _unit(name)})})
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draws the main values over the dimension, into new axes of matplotlib if none are given. Returns the axes."""
@@ -106,7 +93,7 @@ class Presented:
             if name == "worn_volume":
                 error = getattr(self, f"{name}_error")[order] * values
                 panel.fill_between(at[order], values - error, values + error, alpha=0.2)
-            panel.set_ylabel(f"{name.replace('_', ' ')} in {_OF_VALUES.get(name, ('', '1'))[1]}")
+            panel.set_ylabel(f"{name.replace('_', ' ')} in {_unit(name)}")
         axes.set_xlabel(self.OVER[1].replace("_", " "))
         axes.grid(alpha=0.3)
         return axes
@@ -120,10 +107,32 @@ class Presented:
         words = ", ".join(
             f"{number} {outcome}" if len(ends) > 1 else str(outcome) for outcome, number in counts.items()
         )
-        rows = [(name, _span(getattr(self, name), _OF_VALUES.get(name, ("", "1"))[1])) for name in self.SHOWN]
+        rows = [(name, _span(getattr(self, name), _unit(name))) for name in self.SHOWN]
         rows.append(("message", next((text for text in messages if text), "none")))
         first = f"{type(self).__name__}: {self.OVER[1]} {_span(points, '')}: {words}"
         return "\n".join((first, *(f"  {name.replace('_', ' '):<18} {text}" for name, text in rows)))
+
+
+def _variables(name: str, value: Any, over: str, n_points: int) -> dict[str, tuple[Any, Any, dict[str, str]]]:
+    """The variables of one value: dimensions, values, units; two of complex values, none of empty ones."""
+    units = {"units": _unit(name)}
+    if isinstance(value, tuple):
+        return {name: (over, [str(each) for each in value], units)}
+    if not isinstance(value, np.ndarray):
+        return {name: ((), str(value) if isinstance(value, Outcome) else value, units)}
+    dims = _OF_MISSIONS.get(name) if over == "mission" else None
+    if dims is None:
+        dims = (over, *_row_of(_DIMENSIONS, name, "").split())
+        if len(value) == 1:
+            # the same at all points
+            value = np.broadcast_to(value, (n_points, *value.shape[1:]))
+    if not value.size:
+        return {}
+    if np.iscomplexobj(value):
+        first, *rest = name.split("_")
+        amplitude, phase = ("_".join((first, part, *rest)) for part in ("amplitude", "phase"))
+        return {amplitude: (dims, np.abs(value), units), phase: (dims, np.angle(value), {"units": "rad"})}
+    return {name: (dims, value, units)}
 
 
 def _new_axes() -> Axes:
@@ -172,7 +181,7 @@ class PresentedCurve(Presented):
         for size in np.abs(own.response).T:
             (line,) = axes.plot(at, size, ":")
             axes.plot(at, np.where(stable, size, np.nan), color=line.get_color())
-        label = f"{own.parameter.replace('_', ' ')} in {_OF_VALUES[own.parameter][1]}"
+        label = f"{own.parameter.replace('_', ' ')} in {_unit(own.parameter)}"
         axes.set(xlabel=label, ylabel="response in m", title="solid where stable")
         return axes
 

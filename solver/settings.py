@@ -24,10 +24,25 @@ DIFFERENCE = 1e-7
 Derivatives by the frequency agree to 1e-5 with central differences a hundred times as long. With ten and a hundred
 times the value nonlinear modes are equal to 1e-9 and take up to 15 % longer."""
 
+FIRST_HARMONICS = 3
+"""Harmonics of the first state with automatic harmonics: the smallest number that shows friction."""
+
+FEWEST_SAMPLES = 64
+"""Automatic samples in a period. With fewer, they limit the accuracy of a slider with H = 1, and not the harmonics."""
+
+SAMPLES_PER_HARMONIC = 8
+"""Automatic samples in one period of the highest harmonic."""
+
+FINE_SAMPLES = 2048
+"""Points of a period in the search for a missed event and for the largest response: a sine can exceed a limit between
+them by 1e-6 only, and a peak of harmonic 20 is found to 0.05 %."""
+
 Automatic = Literal["auto"]
 Scheme = Literal["explicit", "implicit", "adaptive"]
 """Scheme of the steps on the slow time scale."""
 
+Direction = Literal["up", "down", "ramp"]
+"""Way to the unworn state: up or down along the frequency, or with rising excitation at one frequency."""
 
 Followed = Literal["resonance", "peak"]
 FOLLOWED: tuple[Followed, ...] = get_args(Followed)
@@ -56,7 +71,7 @@ class WearTarget:
 class ToTheEnd:
     """In place of cycle counts: a history until wear has come to an end.
 
-    - n_outputs: number of states that are kept, the first and the last included, spaced evenly in worn volume and
+    - n_outputs: number of states in the result, the first and the last included, spaced evenly in worn volume and
       cycles; at least 2.
     - final_share: the history ends where the wear rate of each pair is below this share of its own largest wear rate so
       far. The largest wear rate of a pair counts as at least `final_share` of the largest of all pairs.
@@ -109,11 +124,7 @@ class SolverSettings:
 @packable
 @dataclass(frozen=True)
 class Resolution:
-    """Harmonics and samples of one solve.
-
-    - orders: harmonics above the static one, ascending, beginning with 1.
-    - samples: number N of time samples, more than twice the highest harmonic.
-    """
+    """Harmonics above the static one, ascending from 1 on, and N time samples, more than twice the highest one."""
 
     orders: tuple[int, ...]
     samples: int
@@ -127,21 +138,6 @@ class Resolution:
 def all_orders(n_harmonics: int) -> tuple[int, ...]:
     """All harmonics from 1 to `n_harmonics`."""
     return tuple(range(1, n_harmonics + 1))
-
-
-FIRST_HARMONICS = 3
-"""Harmonics of the first state with automatic harmonics: the smallest number that shows friction."""
-
-FEWEST_SAMPLES = 64
-"""Automatic samples in a period. With fewer, the samples and not the harmonics limit the accuracy of a slider with
-H = 1."""
-
-SAMPLES_PER_HARMONIC = 8
-"""Automatic samples in one period of the highest harmonic."""
-
-FINE_SAMPLES = 2048
-"""Points of a period in the search for a missed event and for the largest response: a sine can exceed a limit between
-them by 1e-6 only, and a peak of harmonic 20 is found to 0.05 %."""
 
 
 def samples_for(highest: int) -> int:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
+from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.nonlinear_modes import Backbone
 
 
@@ -32,7 +32,7 @@ class ModalResponse:
 
 
 def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: float, points: int = 50) -> ModalResponse:
-    """Response to a harmonic load from a nonlinear mode alone, other modes left out.
+    """Response to a harmonic load from a nonlinear mode alone.
 
     With the natural frequency omega, the damping ratio zeta and the mass-normalised shape phi at the modal amplitude a,
 
@@ -40,28 +40,26 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
 
     is solved for the excitation frequency Omega, as a gives all others: two frequencies below the resonance, none
     above. Krack, Computers and Structures 154 (2015) 59-71; Schwarz and Krack, Journal of Vibration and Acoustics 142
-    (2020). It holds near the resonance, where one mode vibrates. Friction forces do not grow with the
-    frequency as the damping term does: at a distance from the resonance the error of the damping is as large.
+    (2020). Other modes are left out, and friction forces do not grow with the frequency as the damping term does: the
+    response holds near the resonance alone.
 
-    Parameters
-    ----------
-    model
-        The model of the mode, with its harmonic load.
-    mode
-        From `solver.backbone`, at two amplitudes or more that have a state. The load is limited to its amplitudes.
-    excitation_amplitude
-        N, above 0; multiplies the harmonic load of the model.
-    points
-        Points of a side between two amplitudes of the mode; between these values are interpolated over log(amplitude).
+    model: of the mode, with its harmonic load.
+    mode: from `solver.backbone`, at two amplitudes or more that have a state. The load is limited to its amplitudes.
+    excitation_amplitude: N, above 0; multiplies the harmonic load of the model.
+    points: of a side between two amplitudes of the mode; values are interpolated over log(amplitude).
 
-    Raises
-    ------
-    ValueError
-        The mode has fewer than two amplitudes with a state, the excitation is not above 0, or mode and model do not
-        belong together.
+    Raises ValueError where the mode has fewer than two amplitudes with a state, where the excitation is not above 0, or
+    where mode and model do not belong together.
     """
     linear = model.harmonic_structure(1)
-    order = _usable(mode, excitation_amplitude, len(linear.mass))
+    if not 0.0 < excitation_amplitude < np.inf:
+        raise ValueError(f"excitation_amplitude: give a finite number above 0 instead of {excitation_amplitude!r}")
+    if mode.shape.shape[1] != len(linear.mass):
+        raise ValueError("mode: give a mode of this model: the number of its displacements is another one")
+    _, order = np.unique(mode.amplitude, return_index=True)
+    order = order[np.isfinite(mode.frequency[order])]
+    if len(order) < 2:
+        raise ValueError("mode: give a mode with a state at two amplitudes or more")
     known = np.log(mode.amplitude[order])
     at = np.unique(np.concatenate([np.linspace(*ends, points + 1) for ends in pairwise(known.tolist())]))
 
@@ -72,33 +70,19 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
 
     size = np.exp(at)
     omega, zeta = 2.0 * np.pi * between(mode.frequency)[:, 0].real, between(mode.damping_ratio)[:, 0].real
-    shape = between(mode.shape / mode.amplitude[:, None])
+    shape, shown = (between(part / mode.amplitude[:, None]) for part in (mode.shape, mode.response))
     force = excitation_amplitude * (shape.conj() @ linear.load_harmonic)
     # Omega^4 - 2 middle Omega^2 + omega^4 = |force|^2 / a^2
     middle = omega**2 * (1.0 - 2.0 * zeta**2)
     inside = middle**2 - omega**4 + (np.abs(force) / size) ** 2
-    with np.errstate(invalid="ignore"):
-        sides = [np.sqrt(middle + sign * np.sqrt(inside)) for sign in (-1.0, 1.0)]
-    shown = between(mode.response / mode.amplitude[:, None])
-    parts = []
-    for number, excited in enumerate(sides):
-        rows = np.flatnonzero(np.isfinite(excited))[:: 1 - 2 * number]
+    parts: list[tuple[np.ndarray, ...]] = []
+    for direction in (1, -1):
+        with np.errstate(invalid="ignore"):
+            excited = np.sqrt(middle - direction * np.sqrt(inside))
+        rows = np.flatnonzero(np.isfinite(excited))[::direction]
         at_rows, own = excited[rows], omega[rows]
         coordinate = force[rows] / (own**2 - at_rows**2 + 2j * zeta[rows] * own * at_rows)
         parts.append((at_rows / (2.0 * np.pi), size[rows], coordinate[:, None] * shown[rows], zeta[rows]))
-    nothing = tuple(np.full((1, *part.shape[1:]), np.nan, part.dtype) for part in parts[0])
-    curve = [parts[0], nothing, parts[1]] if inside[-1] > 0.0 else parts
-    return ModalResponse(*(np.concatenate(each) for each in zip(*curve, strict=True)))
-
-
-def _usable(mode: Backbone, excitation_amplitude: float, n_displacements: int) -> IntArray:
-    """Indices of the amplitudes that have a state, ascending in amplitude. Raises ValueError as `modal_response`."""
-    if not 0.0 < excitation_amplitude < np.inf:
-        raise ValueError(f"excitation_amplitude: give a finite number above 0 instead of {excitation_amplitude!r}")
-    if mode.shape.shape[1] != n_displacements:
-        raise ValueError("mode: give a mode of this model: the number of its displacements is another one")
-    _, order = np.unique(mode.amplitude, return_index=True)
-    order = order[np.isfinite(mode.frequency[order])]
-    if len(order) < 2:
-        raise ValueError("mode: give a mode with a state at two amplitudes or more")
-    return np.asarray(order)
+    if inside[-1] > 0.0:
+        parts.insert(1, tuple(np.full((1, *part.shape[1:]), np.nan, part.dtype) for part in parts[0]))
+    return ModalResponse(*(np.concatenate(each) for each in zip(*parts, strict=True)))

@@ -14,22 +14,18 @@ from solver.continuation.arc_length import Arc
 from solver.continuation.natural import SMOOTH_CHANGE
 from solver.forced_response import check_case, check_number, check_numbers, worn_model
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import BalanceAt, State
-from solver.loading_history.sweep_start import Direction
+from solver.harmonic_balance.state import BalanceAt, State, largest_responses
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.presentation import NOT_IN_DATASETS, PresentedCurve
-from solver.settings import SolverSettings
-from solver.stability.floquet import Multipliers, Stability, find_multipliers
-from solver.stability.hill import is_stable
+from solver.settings import Direction, SolverSettings
+from solver.stability.floquet import Multipliers, Stability, find_multipliers, is_stable
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case
 
 _LEAST_PART = 0.1  # of the first value: how far a curve may turn back
 _FEWEST_STEPS = 50  # of a curve without folds: enough for a drawing
-_NO_FARTHER = "the curve was followed up to {}: more harmonics or samples may help"
 
 
 @dataclass(frozen=True, repr=False)
@@ -38,8 +34,7 @@ class ResponseCurve(PresentedCurve):
 
     - parameter: "frequency" or "excitation_amplitude", which changes along the curve; the other one is constant.
     - frequency, excitation_amplitude (n_points,): Hz, N.
-    - response (n_points, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)).
-    - response_peak (n_points, n_response): largest magnitude over a period, m.
+    - response, response_peak (n_points, n_response): as in `FrequencyResponse`.
     - response_error (n_points,): estimated relative error by harmonics and samples; inf where unknown, as beside
       folds; NaN where not asked for.
     - is_fold (n_points,): points at which the parameter turns.
@@ -96,19 +91,16 @@ def response_curve(
 ) -> ResponseCurve:
     """The curve of periodic states from one frequency, or one excitation amplitude, to another, through all folds.
 
-    A curve may turn back behind its first value before it comes to the last one, by as much as both are apart.
-    The first state is that of `frequency_response`: swept "up" to the lower or "down" to the upper frequency; for a
-    curve over the amplitude a "ramp". From there arc length follows the curve. Harmonics, samples and the tangential
-    history of the pairs are those of the first state: a slow sweep of a machine, which leaves a history of its own at
-    each frequency, and which jumps at folds, is `frequency_response`.
+    The first state is that of `frequency_response`, swept "up" to the lower or "down" to the upper frequency; for a
+    curve over the amplitude a "ramp". From there arc length follows the curve, with the harmonics, samples and
+    tangential history of the first state: a slow sweep of a machine, which leaves a history of its own at each
+    frequency, and which jumps at folds, is `frequency_response`. A curve may turn back behind its first value before it
+    comes to the last one, by as much as both are apart.
 
-    model, friction_coefficient, settings, wear_depth: as in `frequency_response`. Best give harmonics in the settings:
-    the first state may need fewer than others.
-    frequency, excitation_amplitude: one number for one of them, Hz or N, and two for the other one: first and last
-    value.
+    frequency, excitation_amplitude: one number for one of them, Hz or N, and first and last value of the other one.
+    settings: best with given harmonics, as the first state may need fewer than others.
     most_points: largest number of points. errors: False leaves out `response_error`, which takes most of the time.
-
-    Raises ValueError as `frequency_response`, and where there are not one number and two different ones.
+    All others, and ValueError, as in `frequency_response`.
     """
     settings = SolverSettings() if settings is None else settings
     omegas = 2.0 * np.pi * check_numbers("frequency", frequency, above=0.0)
@@ -132,13 +124,12 @@ def response_curve(
 
     if at is None or not start.outcome.complete:
         branch = _Branch((), (), start.outcome, start.message)
-        return _reported(case, branch, balance_at, over_frequency, errors)
-    begin = State(at, balance.history, float(first))
-    # a branch may turn back behind its start before it comes to the last value
-    back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
-    span = abs(last - first) / (SMOOTH_CHANGE * _FEWEST_STEPS)
-    arc = Arc(balance_at, begin, span, Run(settings.tolerance))
-    branch = _follow_branch(arc, last, back, most, over_frequency)
+    else:
+        # a branch may turn back behind its start before it comes to the last value
+        back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
+        span = abs(last - first) / (SMOOTH_CHANGE * _FEWEST_STEPS)
+        arc = Arc(balance_at, State(at, balance.history, float(first)), span, Run(settings.tolerance))
+        branch = _follow_branch(arc, last, back, most, over_frequency)
     return _reported(case, branch, balance_at, over_frequency, errors)
 
 
@@ -158,31 +149,28 @@ def _follow_branch(arc: Arc, last: float, back: float, most: int, over_frequency
     most: largest number of points.
     """
     points, folds = [arc.start], list[int]()
-
-    def ended(said: str) -> _Branch:
-        at = points[-1].parameter
-        end = f"{at / (2.0 * np.pi):.6g} Hz" if over_frequency else f"{at:.6g} N"
-        return _Branch(tuple(points), tuple(folds), Outcome.BRANCH_LOST, said.format(end))
-
+    said = "the curve was followed up to {}: more harmonics or samples may help"
     for before, reached, fold in arc.steps(float(np.sign(last - arc.start.parameter))):
         if fold is not None:
             if fold is not points[-1] and fold is not reached:
                 points.append(fold)
             folds.append(len(points) - (fold is not reached))
-        for value in (last, back):
-            if (reached.parameter - value) * (before.parameter - value) > 0.0:
-                continue
-            end = arc.state_at(before, reached, value)
+        passed = [at for at in (last, back) if (reached.parameter - at) * (before.parameter - at) <= 0.0]
+        if passed:
+            end = arc.state_at(before, reached, passed[0])
             points.extend([] if end is None else [end])
-            if value == back:
-                return ended("the curve turns back as far as {}: begin farther away")
-            if end is not None:
+            if passed[0] == back:
+                said = "the curve turns back as far as {}: begin farther away"
+            elif end is not None:
                 return _Branch(tuple(points), tuple(folds), Outcome.CONVERGED, "")
-            return ended(_NO_FARTHER)
+            break
         points.append(reached)
         if len(points) >= most:
-            return ended(f"the curve has most_points = {most} points up to {{}}: give more")
-    return ended(_NO_FARTHER)
+            said = f"the curve has most_points = {most} points up to {{}}: give more"
+            break
+    at = points[-1].parameter
+    end_at = f"{at / (2.0 * np.pi):.6g} Hz" if over_frequency else f"{at:.6g} N"
+    return _Branch(tuple(points), tuple(folds), Outcome.BRANCH_LOST, said.format(end_at))
 
 
 def _reported(case: Case, branch: _Branch, balance_at: BalanceAt, over_frequency: bool, errors: bool) -> ResponseCurve:

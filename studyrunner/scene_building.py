@@ -1,34 +1,30 @@
 """The scenes of a run: built once, for all ranks.
 
 A single scene is built by rank 0. Several scenes are built by all ranks side by side, each scene once, and are kept in
-the file of the run. The models go to the ranks with the tasks (`SceneModels`), so that a rank holds few models.
+the file of the run. A task brings the model to a rank that does not have it: as a file that the ranks map
+(`mapped_file`), once in memory on each machine, or the model itself where the rank does not see that file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+import contextlib
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 from solver.packing import Packed
 from studyrunner.checkpoint.store import Store
+from studyrunner.kinds.task import Task
 from studyrunner.mpi.cost_model import CostKeys
-from studyrunner.mpi.mapped_file import ranks_that_see
+from studyrunner.mpi.mapped_file import MappedFile, ranks_that_see, write_mapped
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import Office, serve_tasks
+from studyrunner.scene.answers import SceneVariable, build_scene_variables, exact_answers, join_scene_variables
 from studyrunner.scene.computed import InMemory, keep_model, model_key, read_model
-from studyrunner.scene.scene import (
-    KeptScene,
-    SceneFacts,
-    build_study_scene,
-    describe_scene,
-    harmonics_to_build,
-    scene_to_keep,
-)
+from studyrunner.scene.scene import KeptScene, SceneFacts, build_study_scene, describe_scene, scene_to_keep
 from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
-from studyrunner.scene.scene_variables import exact_answers, join_scene_variables
-from studyrunner.scene.variables import SceneVariable, build_scene_variables
-from studyrunner.scene_models import SceneModels
 from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study
 from studyrunner.system.files import new_partial
@@ -36,6 +32,68 @@ from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
+
+
+MODELS_A_RANK = 2
+"""Models, or sets of models of the blocks of a mission, that a rank holds where a study has several scenes."""
+
+Models = TypeVar("Models")
+
+
+class ModelCache(OrderedDict[tuple[int, ...], Models]):
+    """The models that a rank has computed with last, by the numbers of the scenes that a task needs.
+
+    Rank 0 keeps such a list for each rank, without models.
+    """
+
+    def use(self, scenes: tuple[int, ...]) -> bool:
+        """Whether the models are there; they are then the last to be removed."""
+        if scenes in self:
+            self.move_to_end(scenes)
+        return scenes in self
+
+    def add(self, scenes: tuple[int, ...], models: Models) -> None:
+        """Adds models; removes those that were not used for longest where there are too many."""
+        self[scenes] = models
+        if len(self) > MODELS_A_RANK:
+            self.popitem(last=False)
+
+
+class SceneModels:
+    """Rank 0: which rank has which models, and the files of models in use.
+
+    A rank holds the models of two tasks at most (`ModelCache`) and two tasks at most (`Dispatcher`). So a rank that
+    loses models here, by two later tasks with other models, has done the task that brought these.
+    """
+
+    def __init__(self, read: Callable[[int], ReducedModel], seeing: Collection[int], beside: Path) -> None:
+        """read: the model of a scene. seeing: ranks that see the files. beside: the file that they stand beside."""
+        self._read = read
+        self._seeing = seeing
+        self._beside = beside
+        self._of_ranks: dict[int, ModelCache[None]] = {}
+        self._files: dict[int, MappedFile] = {}
+
+    def with_model(self, rank: int, task: Task) -> Task:
+        """The task as a rank gets it: with the models that the rank does not have."""
+        own = self._of_ranks.setdefault(rank, ModelCache())
+        if own.use(task.scenes):
+            return task
+        own.add(task.scenes, None)
+        used = {number for each in self._of_ranks.values() for scenes in each for number in scenes}
+        for number in self._files.keys() - used:
+            self._files.pop(number).remove()
+        return replace(task, models=tuple(self._hand(rank, number) for number in task.scenes))
+
+    def _hand(self, rank: int, number: int) -> ReducedModel | MappedFile:
+        """The model of a scene as a rank gets it."""
+        if rank not in self._seeing:
+            return self._read(number)
+        if number not in self._files:
+            # a full disk costs memory: each rank gets the model itself
+            with contextlib.suppress(OSError):
+                self._files[number] = write_mapped(self._read(number), new_partial(self._beside))
+        return self._files[number] if number in self._files else self._read(number)
 
 
 @dataclass(frozen=True)
@@ -112,8 +170,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
             variables, notes = join_scene_variables(study, scenes, [each.variables for each in built])
 
             def read(number: int) -> ReducedModel:
-                one = scenes.studies[number]
-                return read_model(one, harmonics_to_build(one), store)
+                return read_model(scenes.studies[number], store)
 
         else:
             one = scenes.studies[0] if study.mission else study
@@ -130,7 +187,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
     return Scenes(at_ratios(scenes, facts), facts, (*variables, *exact_answers(study)), kept, notes, models)
 
 
-class _Building(Office[SceneTask, SceneBuilt]):
+class _Building(Office):
     """Rank 0 while the scenes are built. found: those that are, by number."""
 
     def __init__(self, scenes: SceneSet, store: Store, say: Callable[[str], None]) -> None:
@@ -141,7 +198,7 @@ class _Building(Office[SceneTask, SceneBuilt]):
 
     def begin(self) -> Iterator[SceneTask]:
         for number, study in enumerate(self._scenes.studies):
-            key = model_key(study, harmonics_to_build(study))
+            key = model_key(study)
             model = self._store.read_computed(key)
             yield SceneTask(number, study, {} if model is None else {key: model})
 
@@ -165,6 +222,6 @@ def build_scene_task(task: SceneTask, _: Callable[[object], None]) -> Iterator[S
     except UserError as error:
         yield SceneBuilt(None, error=error)
         return
-    keep_model(task.study, harmonics_to_build(task.study), model, computed)
+    keep_model(task.study, model, computed)
     new = {key: value for key, value in computed.items() if key not in task.known}
     yield SceneBuilt(describe_scene(model), variables, new)

@@ -258,8 +258,9 @@ def test_one_joint_gives_the_bits_of_a_study(result):
     np.testing.assert_array_equal(history.wear_depth[:, 0], at.wear_depth)
 
 
-def test_results_are_datasets_pictures_and_five_lines():
+def test_results_are_datasets_files_pictures_and_five_lines(tmp_path):
     model = build_scene("sdof_slider")
+    assert len(repr(model).splitlines()) == 3
     missions = integrate_mission([Block(model, 160.0, 10.0, 0.5, cycles=10.0)], 1.1e-11, [0, 10])
     assert missions.to_xarray().sizes == {"mission": 2, "contact": 1, "block": 1, "response": 1, "end": 2, "step": 5}
     curve, mode = frequency_response(model, FREQUENCIES, 10.0, 0.5), backbone(model, 1e-3, 0.5, sweep="down")
@@ -267,7 +268,7 @@ def test_results_are_datasets_pictures_and_five_lines():
     for found, index, value in (
         (march_wear(model, 160.0, 10.0, 0.5, 1.1e-11, 1e4), "cycle", "worn_volume"),
         (missions, "mission", "worn_volume"),
-        (curve, "frequency", "response"),
+        (curve, "frequency", "response_peak"),
         (whole, "point", "frequency"),
         (mode, "modal_amplitude", "damping_ratio"),
     ):
@@ -275,10 +276,16 @@ def test_results_are_datasets_pictures_and_five_lines():
         assert len(lines) == 5
         assert lines[0].startswith(f"{type(found).__name__}: ")
         assert "converged" in lines[0] + lines[1]
-        dataset = found.to_xarray()
-        assert dataset[value].dims[0] == index
-        np.testing.assert_array_equal(dataset[value], getattr(found, value))
-        assert dataset.outcome.values.ravel()[0] == "converged"
+        found.to_xarray().to_netcdf(tmp_path / "found.nc")
+        with xr.open_dataset(tmp_path / "found.nc") as dataset:
+            assert dataset[value].dims[0] == index
+            np.testing.assert_array_equal(dataset[value], getattr(found, value))
+            assert dataset.outcome.values.ravel()[0] == "converged"
+            if found is not missions:
+                rebuilt = dataset.response_amplitude * np.exp(1j * dataset.response_phase)
+                np.testing.assert_allclose(rebuilt, found.response, rtol=1e-14)
+            else:
+                np.testing.assert_array_equal(dataset.response_amplitude_end, np.abs(missions.response_end))
         axes = found.plot()
         assert axes.lines
         pyplot.close(axes.figure)
@@ -299,17 +306,20 @@ def test_a_point_that_fails_is_one_point():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"mass": [[1.0, 0.0]]}, "mass: give shape (2, 2), as the stiffness has, instead of (1, 2)"),
+        ({"mass": [[1.0, 0.0]]}, "mass: give shape (2, 2) instead of (1, 2)"),
+        ({"mass": [[1.0], [0.0, 1.0]]}, "mass: give rows of equal length"),
+        ({"mass": "heavy"}, "mass: give numbers"),
         ({"stiffness": [[2.0, -1.0], [0.0, 2.0]]}, "stiffness: give a symmetric matrix"),
+        ({"stiffness": [[2.0, 1.0j], [-1.0j, 2.0]]}, "stiffness: give real numbers"),
         ({"damping": [[np.nan, 0.0], [0.0, 1.0]]}, "damping: give finite numbers"),
-        ({"contact_dofs": [0, 1, -1]}, "contact_dofs: give a row of 3 indices for each pair"),
-        ({"contact_dofs": [[0, 2, -1]]}, "contact_dofs: give -1 or an index from 0 to 1"),
+        ({"contact_dofs": [0, 1, -1]}, "contact_dofs: give shape (any number, 3) instead of (3,)"),
+        ({"contact_dofs": [[0, 2, -1]]}, "contact_dofs: give whole numbers from -1 to 1"),
         ({"contact_dofs": [[0, 0, -1]]}, "contact_dofs: give each displacement to one pair only"),
         ({"contact_dofs": [[-1, -1, -1]]}, "contact_dofs: give every pair a displacement"),
         ({"contact_dofs": [[-1, 1, -1]]}, "normal_load: give pair 0 more than 0 N"),
         ({"area": 0.0}, "area: give a positive area, m2, to every contact pair"),
         ({"load_harmonic": [1.0]}, "load_harmonic: give shape (2,) instead of (1,)"),
-        ({"response": [2]}, "response: give indices from 0 to 1"),
+        ({"response": [2]}, "response: give whole numbers from 0 to 1"),
         ({"surface": "left"}, "surface: give 1 texts"),
     ],
 )

@@ -9,14 +9,9 @@ import numpy as np
 
 from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.harmonic_levels import n_unknowns
-from solver.accuracy.period_events import half_wave_symmetric, lacks_even
-from solver.continuation.homotopy import add_harmonics, start_with_tail
-from solver.continuation.ratcheting import ratchets, shake_down
-from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.prolongation import transfer
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import State
+from solver.accuracy.harmonic_levels import half_wave_symmetric, lacks_even
+from solver.continuation.natural import ratchets, shake_down
+from solver.harmonic_balance.state import State, largest_responses, transfer
 from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, all_orders
@@ -39,37 +34,11 @@ class ResolvedState:
     joint: Joint
     point: State
 
-    def solve_at(self, resolution: Resolution, run: Run) -> ResolvedState | None:
-        """The state with other harmonics and samples; None where it is not found."""
-        return self._solved(resolution, run, self.case, self.point.evaluation)
-
-    def by_homotopy(self, resolution: Resolution, run: Run) -> ResolvedState | None:
-        """The same state with more harmonics, these raised from nothing; None where the homotopy ends.
-
-        Where the homotopy of all of them at once ends, half of them are raised first.
-        """
-        found = self._in_one_homotopy(resolution, run)
-        middle = (self.case.resolution.highest + resolution.highest) // 2
-        orders = tuple(order for order in resolution.orders if order <= middle)
-        if found is not None or orders in (self.case.resolution.orders, resolution.orders):
-            return found
-        half = self._in_one_homotopy(Resolution(orders, resolution.samples), run)
-        return None if half is None else half.solve_at(resolution, run) or half._in_one_homotopy(resolution, run)
-
-    def _in_one_homotopy(self, resolution: Resolution, run: Run) -> ResolvedState | None:
-        known, found = self.point.evaluation, None
-        if 2 * resolution.highest < self.case.resolution.samples:
-            found = self._solved(resolution, run, self.case, known, with_tail=True)
-        led = None if found is not None else add_harmonics(self.case, self.joint, known, resolution, run)
-        return found if led is None else self._solved(resolution, run, replace(self.case, resolution=resolution), led)
-
-    def _solved(
-        self, resolution: Resolution, run: Run, old: Case, known: Evaluation, *, with_tail: bool = False
-    ) -> ResolvedState | None:
-        """The state solved from a known one of the case `old`; with_tail: as `start_with_tail`."""
+    def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> ResolvedState | None:
+        """The state with other harmonics and samples; None where it is not found. with_tail: as in `transfer`."""
         case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
-        balance, start = (start_with_tail if with_tail else transfer)(old, joint, known)
+        balance, start = transfer(self.case, joint, self.point.evaluation, with_tail=with_tail)
         point = run.fresh().state(balance, start, self.point.parameter)
         # the mean position of a mass depends a little on the harmonics
         return None if point is None else replace(self, case=case, joint=joint, point=point).at_rest(run)
@@ -94,7 +63,11 @@ class ResolvedState:
 
     def unknowns(self, resolution: Resolution) -> int:
         """Number of unknowns of the balance with other harmonics."""
-        return n_unknowns(resolution, self.joint.component_index.size)
+        return self.joint.component_index.size * (2 * len(resolution.orders) + 1)
+
+    def limit(self, unknowns: float) -> float:
+        """A limit of the unknowns with 48 pairs for this joint: of a larger joint it limits the harmonics only."""
+        return unknowns * max(1.0, self.joint.component_index.size / 144)
 
     def holds(self) -> bool:
         """Whether all violations of the certificate are below their limits."""
@@ -113,13 +86,11 @@ class ResolvedState:
     def difference(self, better: ResolvedState) -> Estimate:
         """Relative differences of response and wear rate to a better state."""
         mine, its = self.response(), better.response()
-        least = better._least_response()
+        least, work = better._least_response(), max(self._least_work(), better._least_work())
         first = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), least)
-        mine_peak, its_peak = self.peaks, better.peaks
-        size = np.maximum(its_peak, max(SMALL_PEAK * float(its_peak.max(initial=0.0)), least))
-        response = max(first, float((np.abs(mine_peak - its_peak) / size).max(initial=0.0)))
+        size = np.maximum(better.peaks, max(SMALL_PEAK * float(better.peaks.max(initial=0.0)), least))
+        response = max(first, float((np.abs(self.peaks - better.peaks) / size).max(initial=0.0)))
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
-        work = max(self._least_work(), better._least_work())
         if max(its_slip, mine_slip) <= SMALL_WORK * work:
             return Estimate(response, 0.0)
         # the wear rate cannot be more accurate than the motion that causes it
@@ -127,9 +98,8 @@ class ResolvedState:
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))
 
     def _least_response(self) -> float:
-        """Response, m, below which a relative error has no meaning, as for a mass that friction holds.
-
-        It is a small fraction of the response that the excitation would cause on the stiffness of the joint alone.
+        """Response, m, below which a relative error has no meaning, as for a mass that friction holds: a small fraction
+        of the response that the excitation would cause on the stiffness of the joint alone.
         """
         structure = self.joint.structure
         moved = structure.harmonic_force / self.joint.relative_penalty

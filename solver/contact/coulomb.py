@@ -1,6 +1,4 @@
-"""Coulomb friction with separation at one sample: return map, derivative, and mean normal force around a sample.
-
-Floats and arrays only.
+"""Coulomb friction with separation at one sample: contact force, derivative, mean normal force. Floats and arrays only.
 
 The arguments of the law, Eqs. (11)-(15), are a *predicted* force `p`, the contact force of a pair that does not move,
 and a force-like tangential state `x = eps X_T` (X_T: corrected slip, m). Compression is positive (PHYSICS, section 2:
@@ -34,7 +32,6 @@ SEPARATED = 0
 STICK = 1
 SLIP = 2
 
-
 Force = TypeVar("Force", float, FloatArray)
 
 
@@ -56,22 +53,17 @@ def friction_force(trial_1: float, trial_2: float, limit: float) -> tuple[float,
 
 
 @njit(cache=True)
-def slip_direction(trial_1: float, trial_2: float, limit: float) -> tuple[float, float, float]:
-    """Derivative of `friction_force` of a slipping pair, Eq. (15): direction n (2), limit over |trial|.
+def slip_tangent(trial_1: float, trial_2: float, limit: float) -> tuple[float, float, float, float, float, float]:
+    """Derivative of `friction_force` of a slipping pair, Eq. (15); all zero where the trial force is zero.
 
-    The derivative by the limit is n, by the trial force `limit / |trial| (1 - n n^T)`. All are zero where the trial
-    force is zero.
+    Returns n (2), the derivative by the limit; `ratio` = limit over |trial|; and entries 11, 12, 22 of
+    `ratio (1 - n n^T)`, the derivative by the trial force.
     """
     size = np.sqrt(trial_1 * trial_1 + trial_2 * trial_2)
     if size == 0.0:
-        return 0.0, 0.0, 0.0
-    return trial_1 / size, trial_2 / size, limit / size
-
-
-@njit(cache=True)
-def across_slip(unit_1: float, unit_2: float, ratio: float) -> tuple[float, float, float]:
-    """Entries 11, 12, 22 of the symmetric matrix `ratio (1 - n n^T)`."""
-    return ratio * (1.0 - unit_1 * unit_1), -ratio * unit_1 * unit_2, ratio * (1.0 - unit_2 * unit_2)
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    n_1, n_2, ratio = trial_1 / size, trial_2 / size, limit / size
+    return n_1, n_2, ratio, ratio * (1.0 - n_1 * n_1), -ratio * n_1 * n_2, ratio * (1.0 - n_2 * n_2)
 
 
 @njit(cache=True)
@@ -102,10 +94,9 @@ def contact_tangent(
     limit = friction_limit(friction, normal)
     if status == SEPARATED or limit == 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0
-    unit_1, unit_2, ratio = slip_direction(trial_1, trial_2, limit)
-    across_11, across_12, across_22 = across_slip(unit_1, unit_2, ratio)
+    n_1, n_2, _, across_11, across_12, across_22 = slip_tangent(trial_1, trial_2, limit)
     # the limit grows with the normal force by the friction coefficient
-    return friction * unit_1, friction * unit_2, across_11, across_12, across_22
+    return friction * n_1, friction * n_2, across_11, across_12, across_22
 
 
 @njit(cache=True)
@@ -121,12 +112,12 @@ def advance_monodromy(
     if status == SEPARATED or limit == 0.0:
         monodromy[:, :] = 0.0
         return
-    unit_1, unit_2, ratio = slip_direction(trial_1, trial_2, limit)
+    n_1, n_2, ratio, _, _, _ = slip_tangent(trial_1, trial_2, limit)
     for column in range(2):
         # 1 - n n^T is computed as t t^T with t across n: round-off then leaves nothing along n
-        across = ratio * (unit_1 * monodromy[1, column] - unit_2 * monodromy[0, column])
-        monodromy[0, column] = -unit_2 * across
-        monodromy[1, column] = unit_1 * across
+        across = ratio * (n_1 * monodromy[1, column] - n_2 * monodromy[0, column])
+        monodromy[0, column] = -n_2 * across
+        monodromy[1, column] = n_1 * across
 
 
 @njit(cache=True)

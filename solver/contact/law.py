@@ -3,9 +3,9 @@
 Alternating frequency-time method: predicted force to samples, contact law, contact force back to harmonics. Two kinds
 of pairs stand behind the methods of `ContactLaw`; `solver.structure.penalty` chooses the kind:
 
-- *elastic* pairs, at displacement level: Eqs. (9)-(15), motion `(p - lambda) / eps` (`period_march`);
-- *inertial* pairs, masses that sit directly on rigid ground: motion by Newton's law (`rigid_slider`). Their tangential
-  state is a displacement, m, where that of elastic pairs is a force, N.
+- *elastic* pairs, at displacement level: Eqs. (9)-(15), motion `(p - lambda) / eps` (`elastic_pairs`);
+- *inertial* pairs, masses that sit directly on rigid ground: motion by Newton's law (`sliding_masses`). Their
+  tangential state is a displacement, m, where that of elastic pairs is a force, N.
 """
 
 from __future__ import annotations
@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_limit, mean_normal_force, mean_normal_tangent
-from solver.contact.period_march import MOST_PERIODS, Directions, Period, march_period, new_period
-from solver.contact.rigid_slider import Masses, march_masses
-from solver.contact.tangent import march_tangent, mass_tangent
+from solver.contact.elastic_pairs import MOST_PERIODS, Period, march_period, march_tangent, new_period
+from solver.contact.sliding_masses import Masses, march_masses, mass_tangent
 from solver.model import BoolArray, ComplexArray, ContactInterface, FloatArray, IntArray
 from solver.settings import ROUND_OFF
 
@@ -32,17 +31,16 @@ if TYPE_CHECKING:
 class Marched:
     """Contact forces and states of the pairs under a predicted force, at N samples.
 
-    - predicted_t (n_contact, 3, N): predicted force, N; tangential ones of inertial pairs as means over the steps.
-    - force_t (n_contact, 3, N): contact force, N, compression positive; means for inertial pairs as in predicted_t.
-    - force_h (n_contact, 3, m): its harmonics, N.
-    - state_t (n_contact, 2, N+1): tangential state, N, from the start of the period on; of inertial pairs displacement,
-      m.
-    - start (n_contact, 2): tangential state at the start of the first period, N; for inertial pairs the velocity at the
+    - predicted_t, force_t (n_contact, 3, N): predicted and contact force, N, compression positive; tangential ones of
+      inertial pairs as means over the steps.
+    - force_h (n_contact, 3, m): harmonics of the contact force, N.
+    - state_t (n_contact, 2, N+1): tangential state from the start of the last period on.
+    - start (n_contact, 2): tangential state at the start of the first period, N; of inertial pairs the velocity at the
       start of the last period, m/s.
     - status_t (n_contact, N): SEPARATED, STICK or SLIP.
     - periods (n_contact,): number of periods that were marched.
     - periodicity_error: change of the tangential state over the last period, N.
-    - slip_work (n_contact,): integral of normal force times slip distance over a period, J (`solver.contact.wear_law`).
+    - slip_work (n_contact,): integral of normal force times slip distance over a period, J.
     """
 
     predicted_t: FloatArray
@@ -57,10 +55,8 @@ class Marched:
 
     @property
     def stuck(self) -> BoolArray:
-        """Pairs (n_contact,) that stick during the whole period and so transmit the predicted force.
-
-        The start of a period that was marched more than once may depend on the force.
-        """
+        """Pairs (n_contact,) that stick during the whole period and so transmit the predicted force."""
+        # the start of a period that was marched more than once may depend on the force
         return np.asarray((self.status_t == STICK).all(axis=1) & (self.periods == 1))
 
 
@@ -68,7 +64,8 @@ class Marched:
 class ContactLaw:
     """The law of the pairs of a joint at one frequency omega, rad/s: predicted force to contact force, motion, history.
 
-    friction_coefficient: (n_contact,). Harmonics are on the axis of length m = 2H+1.
+    friction_coefficient: (n_contact,). Harmonics are on the axis of length m = 2H+1. The tangential history of a pair
+    (n_contact, 2), m, is the corrected slip X_T of an elastic pair and the mean position of an inertial one.
     """
 
     penalty: Penalty
@@ -87,6 +84,10 @@ class ContactLaw:
         """Whether the law depends on velocities, and so on the frequency: where masses sit on rigid ground."""
         return bool(self.penalty.inertial.any())
 
+    @property
+    def _masses(self) -> Masses:
+        return Masses(self.penalty.mass, self.penalty.drag, self.contact.line, self.sample_step)
+
     # --- forces ---
 
     def march(self, predicted_h: FloatArray, history: FloatArray) -> Marched:
@@ -94,19 +95,17 @@ class ContactLaw:
 
         predicted_h (n_contact, 3, m): predicted force, N. history (n_contact, 2): tangential history, m.
         """
-        basis, masses, penalty = self.basis, self.penalty.inertial, self.penalty
+        basis, inertial, penalty = self.basis, self.penalty.inertial, self.penalty
         predicted_t = predicted_h @ basis.synthesis
-        if self.rate_dependent:
-            predicted_t[masses, 1:] = (predicted_h[masses, 1:] * basis.step_mean) @ basis.synthesis
+        predicted_t[inertial, 1:] = (predicted_h[inertial, 1:] * basis.step_mean) @ basis.synthesis
         period = new_period(predicted_t, self.friction_coefficient, history * penalty.tangential[:, None])
         limit = friction_limit(self.friction_coefficient, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
         # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
-        march_period(np.flatnonzero(~masses), period, 0.1 * ROUND_OFF * float(limit.max(initial=0.0)), MOST_PERIODS)
+        march_period(np.flatnonzero(~inertial), period, 0.1 * ROUND_OFF * float(limit.max(initial=0.0)), MOST_PERIODS)
         if self.rate_dependent:
-            march_masses(np.flatnonzero(masses), period, self._directions, self._masses)
+            march_masses(np.flatnonzero(inertial), period, self._masses)
         force_h = period.force_t @ basis.analysis
-        if self.rate_dependent:
-            force_h[masses, 1:] /= basis.step_mean
+        force_h[inertial, 1:] /= basis.step_mean
         force_h[:, 0] = mean_normal_force(predicted_t) @ basis.analysis
         return Marched(
             predicted_t=predicted_t,
@@ -117,16 +116,8 @@ class ContactLaw:
             status_t=period.status_t,
             periods=period.periods,
             periodicity_error=float(period.change.max(initial=0.0)),
-            slip_work=np.where(masses, period.slip_work, period.slip_work / penalty.tangential),
+            slip_work=period.slip_work / self.state_stiffness,
         )
-
-    @property
-    def _masses(self) -> Masses:
-        return Masses(self.penalty.mass, self.penalty.drag, self.sample_step)
-
-    @property
-    def _directions(self) -> Directions:
-        return Directions(self.contact.line, self.contact.has_normal)
 
     def friction_work(self, at: Marched) -> FloatArray:
         """Work that friction dissipates in a period (n_contact,), J. Friction is at its limit during slip."""
@@ -138,25 +129,29 @@ class ContactLaw:
         Returns the derivatives of the harmonics of the contact force (n_contact, 3m, 3m), dimensionless, and of the
         slip work (n_contact, 3m), m. Tangential displacements that do not exist count as sticking.
         """
-        contact, basis, masses = self.contact, self.basis, self.penalty.inertial
+        contact, basis, inertial = self.contact, self.basis, self.penalty.inertial
         n_contact, m = contact.n_contact, basis.synthesis.shape[0]
         tangent, work_tangent = np.zeros((n_contact, 3 * m, 3 * m)), np.zeros((n_contact, 3 * m))
+        stuck, absent, none = at.stuck, contact.dofs < 0, np.zeros(n_contact)
         # an open pair transmits nothing
-        stuck = at.stuck
         switching = ~(stuck | (at.status_t == SEPARATED).all(axis=1))
-        slides = switching & (contact.dofs[:, 1:] >= 0).any(axis=1)
-        none = np.zeros(n_contact)
+        slides = switching & ~absent[:, 1:].all(axis=1)
         marched = at.predicted_t, self.friction_coefficient, at.start, at.force_t, at.state_t, at.status_t
         period, out = Period(*marched, at.periods, none, none), (tangent, work_tangent)
-        series = basis.synthesis, basis.synthesis, basis.analysis
-        march_tangent(np.flatnonzero(slides & ~masses), period, self._directions, series, out)
-        work_tangent /= self.penalty.tangential[:, None]
+        march_tangent(np.flatnonzero(slides & ~inertial), period, basis.synthesis, basis.analysis, out)
         if self.rate_dependent:
-            series = basis.synthesis, basis.synthesis * basis.step_mean[:, None], basis.analysis / basis.step_mean
-            mass_tangent(np.flatnonzero(slides & masses), period, self._directions, self._masses, series, out)
+            series = basis.synthesis, basis.step_mean, basis.analysis
+            mass_tangent(np.flatnonzero(slides & inertial), period, self._masses, *series, out)
+        work_tangent /= self.state_stiffness[:, None]
+        # the derivatives of a pair are those of all three directions: nothing acts along those that it does not have
+        pair, component = np.nonzero(absent)
+        by_component = tangent.reshape(n_contact, 3, m, 3, m)
+        by_component[pair, component] = 0.0
+        by_component[pair, :, :, component] = 0.0
+        work_tangent.reshape(n_contact, 3, m)[pair, component] = 0.0
         closing = np.flatnonzero(contact.has_normal & switching)
         mean_normal_tangent(closing, at.predicted_t, basis.synthesis, basis.analysis, tangent)
-        passes = stuck[:, None] | (contact.dofs < 0)
+        passes = stuck[:, None] | absent
         passes[:, 0] = stuck & contact.has_normal
         pair, component = np.nonzero(passes)
         own = m * component[:, None] + np.arange(m)
@@ -166,10 +161,7 @@ class ContactLaw:
     # --- motion ---
 
     def motion(self, correction: FloatArray) -> FloatArray:
-        """Motion (n_contact, 3, m, ...), m, from predicted less contact force, N, of equal shape.
-
-        A linear map: Eq. (12) divided by the penalty; Newton's law for inertial pairs. Means are relative to `origin`.
-        """
+        """Motion (n_contact, 3, m, ...), m, relative to `origin`, from predicted less contact force, N, Eq. (12)."""
         return _scaled(correction, self.compliance)
 
     def force(self, motion: FloatArray) -> FloatArray:
@@ -182,21 +174,21 @@ class ContactLaw:
 
         1 / eps for elastic pairs; for inertial pairs exactly as in the steps of the march.
         """
-        penalty, masses, orders = self.penalty, self.penalty.inertial, np.array(self.basis.orders, np.float64)
+        penalty, inertial, orders = self.penalty, self.penalty.inertial, np.array(self.basis.orders, np.float64)
         found: ComplexArray = np.repeat((1.0 + 0.0j) / penalty.stiffness[:, :, None], orders.size + 1, axis=2)
-        if masses.any() and orders.size:
+        if orders.size:
             angle = np.pi * orders / self.basis.n_samples
-            mass, drag, mean = (part[masses, None] for part in (penalty.mass, penalty.drag, penalty.mean))
+            mass, drag, mean = (part[inertial, None] for part in (penalty.mass, penalty.drag, penalty.mean))
             impedance = 2j * mass * np.sin(angle) / self.sample_step + drag * np.cos(angle)
             moving = np.sin(angle) / angle / (1j * self.omega * orders * impedance)
-            found[masses, 1:] = np.concatenate([1.0 / mean, moving], axis=1)[:, None, :]
+            found[inertial, 1:] = np.concatenate([1.0 / mean, moving], axis=1)[:, None, :]
         return found
 
     def origin(self, history: FloatArray) -> FloatArray:
         """Mean tangential position (n_contact, 2), m, at which no mean force acts: the history of inertial pairs."""
         return np.where(self.penalty.inertial[:, None], history, 0.0)
 
-    # --- tangential history (n_contact, 2), m: corrected slip X_T of elastic pairs, mean position of inertial pairs ---
+    # --- tangential history ---
 
     @property
     def state_stiffness(self) -> FloatArray:
@@ -224,18 +216,14 @@ class ContactLaw:
 
         pairs (n_contact,): pairs that are marched; inertial ones keep their history. first, last (n_contact, 3, N), N.
         """
-        moving, found = pairs & ~self.penalty.inertial, history.copy()
-        if moving.any():
-            first, last = first[moving], last[moving]
-            friction, stiffness = self.friction_coefficient[moving], self.penalty.tangential[moving, None]
-            periodicity = ROUND_OFF * float(friction_limit(friction, last[:, 0].max(axis=1)).max())
-            state = history[moving] * stiffness
-            for part in parts:
-                period = new_period(first + part * (last - first), friction, state)
-                march_period(np.arange(len(state)), period, periodicity, MOST_PERIODS)
-                state = period.state_t[:, :, -1]
-            found[moving] = state / stiffness
-        return found
+        moving, stiffness = pairs & ~self.penalty.inertial, self.state_stiffness[:, None]
+        limit = friction_limit(self.friction_coefficient, last[:, 0].max(axis=1))[moving].max(initial=0.0)
+        state = history * stiffness
+        for part in parts:
+            period = new_period(first + part * (last - first), self.friction_coefficient, state)
+            march_period(np.flatnonzero(moving), period, ROUND_OFF * float(limit), MOST_PERIODS)
+            state[moving] = period.state_t[moving, :, -1]
+        return np.where(moving[:, None], state / stiffness, history)
 
     def history_from(self, other: Penalty, history: FloatArray, mean: FloatArray, last: FloatArray) -> FloatArray:
         """The history of a state with another penalty.
@@ -243,9 +231,9 @@ class ContactLaw:
         A pair that becomes inertial begins at its mean position `mean` (n_contact, 2), m, one that becomes elastic at
         its position `last` at the end of the period, which equals the corrected slip.
         """
-        masses = self.penalty.inertial
-        changed = np.where(masses[:, None], mean, last)
-        return np.where((other.inertial == masses)[:, None], history, changed)
+        inertial = self.penalty.inertial
+        changed = np.where(inertial[:, None], mean, last)
+        return np.where((other.inertial == inertial)[:, None], history, changed)
 
     # --- masses on rigid ground: ratcheting, and harmonics above the highest one ---
 
@@ -264,28 +252,20 @@ class ContactLaw:
         return float(np.abs(at.predicted_t[self.penalty.inertial, 1:]).max(initial=0.0))
 
     def tail(self, at: Marched, basis: FourierBasis) -> FloatArray:
-        """Friction on masses in other harmonics (n_contact, 3, 2k+1), N, from its samples; 0 for elastic pairs.
-
-        The friction force jumps where a mass turns, so that its harmonics fall slowly.
-        """
-        masses = self.penalty.inertial
-        force_h = np.zeros((masses.size, 3, basis.analysis.shape[1]))
-        force_h[masses, 1:] = at.force_t[masses, 1:] @ basis.analysis / basis.step_mean
+        """Friction on masses in other harmonics (n_contact, 3, 2k+1), N, which fall slowly; 0 for elastic pairs."""
+        inertial = self.penalty.inertial
+        force_h = np.zeros((inertial.size, 3, basis.analysis.shape[1]))
+        force_h[inertial, 1:] = at.force_t[inertial, 1:] @ basis.analysis / basis.step_mean
         return force_h
 
-    def beyond_series(self, at: Marched, displacement_h: FloatArray) -> FloatArray:
-        """Tangential motion (n_contact, 2, N), m, that the march adds to the series, half a step before each sample.
+    def beyond_series(self, at: Marched, pairs: list[int], series_t: FloatArray) -> FloatArray:
+        """Tangential motion (n, 2, N), m, that the march adds to the series of some pairs, half a step before samples.
 
-        A mass moves with all harmonics, of which the series `displacement_h` (n_contact, 3, m), m, has the lowest; 0
-        for elastic pairs. The march begins at an arbitrary position, so that the mean comes from the series.
+        A mass moves with all harmonics, of which the series (n, 2, N), m, has the lowest and the mean; 0 for elastic
+        pairs.
         """
-        n_samples, masses = self.basis.n_samples, self.penalty.inertial
-        beyond = np.zeros((masses.size, 2, n_samples))
-        if self.rate_dependent:
-            ends = self.basis.at(2.0 * np.pi * (np.arange(n_samples) - 0.5) / n_samples)
-            beyond[masses] = at.state_t[masses, :, :-1] - displacement_h[masses, 1:] @ ends
-            beyond -= beyond.mean(axis=2, keepdims=True)
-        return beyond
+        added = np.where(self.penalty.inertial[pairs, None, None], at.state_t[pairs, :, :-1] - series_t, 0.0)
+        return np.asarray(added - added.mean(axis=2, keepdims=True))
 
 
 def _scaled(values_h: FloatArray, factor: ComplexArray) -> FloatArray:

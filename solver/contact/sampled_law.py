@@ -5,8 +5,8 @@ B the derivative with respect to x at the sample before (`sample_tangents`). The
 
     (1 - A) eps du - A dlambda = B eps du'.
 
-A mass on a slider has its own steps (`rigid_slider.step_mass`). Their derivatives T include the instants at which the
-mass turns or stops: `dlambda = T_p dp + T_v dv' + T_l mu dlambda_N` with `dp = dlambda + gain dv - loss dv'`.
+A mass on a slider has its own steps (`sliding_masses`). Their derivatives T include the instants at which the mass
+turns or stops: `dlambda = T_p dp + T_v dv' + T_l mu dlambda_N` with `dp = dlambda + gain dv - loss dv'`.
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_limit
 from solver.contact.law import ContactLaw, Marched
-from solver.contact.rigid_slider import step_gains, step_mass
+from solver.contact.sliding_masses import mass_slopes, step_gains
 from solver.model import FloatArray, IntArray
 
 
@@ -86,7 +85,7 @@ def _take_mass_law(found: SampledLaw, place: int, law: ContactLaw, at: Marched, 
     there = np.array([0, 1]) if line < 0 else np.array([line])
     rows, friction = 1 + there, float(law.friction_coefficient[pair])
     limit = friction_limit(friction, np.maximum(at.predicted_t[pair, 0], 0.0))
-    slopes = _mass_slopes(at.predicted_t[pair, 1:], at.start[pair], limit, (gain, loss), line)
+    slopes, _ = mass_slopes(at.predicted_t[pair, 1:], limit, at.start[pair], (gain, loss), line)
     by_predicted, by_before = (slopes[:, there[:, None], first + there] for first in (0, 2))
     block = (slice(None), place, rows[:, None], rows)
     for part in (found.by_force, found.by_motion, found.by_last_motion):
@@ -96,18 +95,3 @@ def _take_mass_law(found: SampledLaw, place: int, law: ContactLaw, at: Marched, 
         found.by_force[:, place, rows, 0] = np.where(limit[:, None] > 0.0, -friction * slopes[:, there, 4], 0.0)
     found.by_speed[block] = -gain / step * by_predicted
     found.by_last_speed[block] = (by_before - loss * by_predicted) / step
-
-
-@njit(cache=True)
-def _mass_slopes(
-    force_t: FloatArray, start: FloatArray, limit_t: FloatArray, gains: tuple[float, float], line: int
-) -> FloatArray:
-    """Derivatives (N, 5, 5) of the steps of a mass through the period, as `rigid_slider.step_mass`.
-
-    force_t (2, N), limit_t (N,): predicted force and friction limit, N. start (2,): velocity, m/s.
-    """
-    slopes, out, velocity = np.empty((limit_t.size, 5, 5)), np.empty(7), start.copy()
-    for n in range(limit_t.size):
-        step_mass(force_t[:, n], velocity, limit_t[n], gains[0], gains[1], line, out, slopes[n])
-        velocity[:] = out[2:4]
-    return slopes

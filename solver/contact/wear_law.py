@@ -4,22 +4,17 @@ The wear depth of a pair grows in a cycle by, Eqs. (7), (21),
 
     g = k_w / alpha * X,      X = c f(p, W) max(S - q alpha, 0)
 
-with the area of the pair alpha, m2, and the *wearing work* X, J: a function of the slip work S, J, the mean pressure
-over the period p, Pa, and the depth W, m:
+with the area of the pair alpha, m2, and the *wearing work* X, J: a function of the slip work S, J, the integral over a
+period of lambda_N |dX_T|, the mean pressure over the period p, Pa, and the depth W, m:
 
 - `archard`: X = S.
 - `energy`: c = mu, so that X = mu S is the energy dissipated by friction. k_w is then the energy wear coefficient,
   volume over dissipated energy (Fouvry, Liskiewicz, Kapsa, Hannel, Sauger, Wear 255 (2003) 287).
-- `threshold`: q, J/m2, is a density of slip work per cycle. Only slip work above this threshold wears.
-- `table`: f is given at pressures and depths, with bilinear interpolation and constant extrapolation. `k_w f` is then
-  a wear coefficient that depends on pressure and depth.
-
-The slip work is the integral over a period of lambda_N |dX_T|, which is no work of a force. The friction force is at
-its limit during slip, so that the energy dissipated by friction is mu S (`law.ContactLaw.friction_work`).
+- `threshold`: only slip work above a density q, J/m2 per cycle, wears.
+- `table`: f is given at pressures and depths, with bilinear interpolation and constant extrapolation.
 
 In each law c may differ between surfaces, and the wear rate is proportional to k_w. An implicit step of h cycles solves
-`W = W_k + gain X(S, p, W)`, Eq. (24), with the gain `h k_w / alpha` (the print of (26b) lacks h), for each pair
-separately and so eliminates W.
+`W = W_k + gain X(S, p, W)`, Eq. (24), with the gain `h k_w / alpha` (the print of (26b) lacks h), pair by pair.
 """
 
 from __future__ import annotations
@@ -51,8 +46,8 @@ class WearLaw:
     - table: of the law "table".
     - surfaces: factor of the wear coefficient for each label of a surface. A pair whose label names both sides, as
       "flat/cylinder", has the sum of both factors. Empty: factor 1 for each pair.
-    - proportional: whether the wear rate is proportional to the wear coefficient, `dW/dt = k_w f(W)`. A history then
-      depends on `k_w` times cycles only, and nothing wears at `k_w` = 0.
+    - proportional: whether the wear rate is proportional to the wear coefficient, as of all laws here: a history then
+      depends on `k_w` times cycles only.
     - worn: depth of each pair at the start of a history, m, from which the depths of the law "table" count; empty: 0.
     """
 
@@ -86,63 +81,83 @@ def surface_factors(labels: tuple[str, ...], surfaces: tuple[tuple[str, float], 
 
 
 @dataclass(frozen=True)
-class WearingWork:
-    """The wearing work of the pairs of one joint. Attributes that a law does not use are None.
+class PairFactors:
+    """The factors f of the law "table" for the pairs of a joint, with bilinear interpolation.
 
-    - factor (n_contact,): c, 1.
-    - least (n_contact,): q alpha, J.
-    - pressure (n_p,), Pa, depth (n_d,), m: arguments of the table.
-    - table (n_p, n_d): f, 1.
-    - area (n_contact,): alpha, m2, for the table alone.
-    - worn (n_contact,): depth at the depth 0 of the history, m, for the table alone; 0 where the table is from 0 on.
+    - pressure (n_p,), Pa, depth (n_d,), m, factor (n_p, n_d): the table.
+    - area (n_contact,): alpha, m2. worn (n_contact,): depth at the depth 0 of the history, m; 0 for an unworn joint.
+    """
+
+    pressure: FloatArray
+    depth: FloatArray
+    factor: FloatArray
+    area: FloatArray
+    worn: FloatArray | float = 0.0
+
+    def at_pressure(self, normal_force: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Rows of the table at the pressures of the pairs (n_contact, n_d), and derivative to the normal force, 1/N."""
+        place, fraction, width = _between(self.pressure, normal_force / self.area)
+        low, high = self.factor[place], self.factor[np.minimum(place + 1, len(self.pressure) - 1)]
+        slope = np.divide(1.0, width * self.area, out=np.zeros_like(width), where=width > 0.0)
+        return low + fraction[:, None] * (high - low), slope[:, None] * (high - low)
+
+    def at_depth(self, by_depth: FloatArray, depth: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values of rows (n_contact, n_d) at the depths of the pairs, m, and their derivatives, 1/m."""
+        place, fraction, width = _between(self.depth, depth + self.worn)
+        pairs = np.arange(depth.size)
+        low, high = by_depth[pairs, place], by_depth[pairs, np.minimum(place + 1, len(self.depth) - 1)]
+        slope = np.divide(high - low, width, out=np.zeros_like(width), where=width > 0.0)
+        return low + fraction * (high - low), slope
+
+
+def _between(knots: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
+    """Index of the knot before each value, fraction of the interval, and its width; both are 0 beyond the ends."""
+    place = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 1)
+    width = np.append(np.diff(knots), 0.0)[place]
+    width = np.where(at < knots[0], 0.0, width)
+    fraction = np.divide(at - knots[place], width, out=np.zeros_like(width), where=width > 0.0)
+    return place, fraction, width
+
+
+@dataclass(frozen=True)
+class WearingWork:
+    """The wearing work of the pairs of one joint.
+
+    - factor (n_contact,): c, 1. least (n_contact,): q alpha, J. table: f; None for 1.
     - depth_held: whether derivatives leave out the dependence on the depth.
     """
 
-    factor: FloatArray | None = None
-    least: FloatArray | None = None
-    pressure: FloatArray | None = None
-    depth: FloatArray | None = None
-    table: FloatArray | None = None
-    area: FloatArray | None = None
-    worn: FloatArray | float = 0.0
+    factor: FloatArray | float = 1.0
+    least: FloatArray | float = 0.0
+    table: PairFactors | None = None
     depth_held: bool = False
 
     @property
     def largest_factor(self) -> float:
         """Largest possible ratio of wearing work to slip work, 1."""
-        largest = 1.0 if self.factor is None else float(self.factor.max(initial=0.0))
-        return largest if self.table is None else largest * float(self.table.max())
+        return float(np.max(self.factor)) * (1.0 if self.table is None else float(self.table.factor.max()))
 
     def work(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> FloatArray:
         """Wearing work X (n_contact,), J, from slip work, J, mean normal force, N, and depth, m, each (n_contact,)."""
         work = self._without_table(slip_work)
-        if self.table is None:
-            return work
-        by_depth, _ = self._at_pressure(normal_force)
-        return work * self._at_depth(by_depth, depth)[0]
+        return work if self.table is None else work * self._table_at(normal_force, depth)[0]
 
     def slopes(
         self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Derivatives (n_contact,) of `work` by slip work, 1, normal force, m, and depth, N."""
-        by_work = np.ones_like(slip_work) if self.factor is None else self.factor
-        if self.least is not None:
-            by_work = np.where(slip_work > self.least, by_work, 0.0)
+        by_work, none = np.where(slip_work >= self.least, self.factor, 0.0), np.zeros_like(slip_work)
         if self.table is None:
-            return by_work, np.zeros_like(slip_work), np.zeros_like(slip_work)
-        work = self._without_table(slip_work)
-        by_depth, by_depth_slope = self._at_pressure(normal_force)
-        value, slope = self._at_depth(by_depth, depth)
-        by_force, _ = self._at_depth(by_depth_slope, depth)
-        return by_work * value, work * by_force, np.zeros_like(work) if self.depth_held else work * slope
+            return by_work, none, none
+        work, (value, by_force, by_depth) = self._without_table(slip_work), self._table_at(normal_force, depth)
+        return by_work * value, work * by_force, none if self.depth_held else work * by_depth
 
     def amplification(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> float:
         """Ratio of the relative errors of total wearing work and slip work, 1; above 1 near a threshold."""
-        if self.least is None:
-            return 1.0
         worn = float(self.work(slip_work, normal_force, depth).sum())
-        by_work, _, _ = self.slopes(slip_work, normal_force, depth)
-        return float(by_work @ slip_work) / worn if worn > 0.0 else 1.0
+        if not np.any(self.least) or worn <= 0.0:
+            return 1.0
+        return float(self.slopes(slip_work, normal_force, depth)[0] @ slip_work) / worn
 
     def growth(
         self, gain: FloatArray | float, slip_work: FloatArray, normal_force: FloatArray, before: FloatArray
@@ -152,25 +167,21 @@ class WearingWork:
         gain (n_contact,): `h k_w / alpha` of the step, m/J. before (n_contact,): depth at the start of the step, m.
         Between two depths of the table both sides are straight lines, so that the root is exact.
         """
-        work = self._without_table(slip_work)
-        if self.table is None or self.depth is None:
-            return gain * work
-        by_depth, _ = self._at_pressure(normal_force)
-        total = before + self.worn
+        steep, table = gain * self._without_table(slip_work), self.table
+        if table is None:
+            return steep
+        by_depth, _ = table.at_pressure(normal_force)
         # y - gain X at the growth y = 0 and at the growths that reach the depths of the table
-        grown = np.maximum(self.depth[None, :] - total[:, None], 0.0)
-        there = np.where(grown > 0.0, by_depth, self._at_depth(by_depth, before)[0][:, None])
-        steep = gain * work
-        grown = np.concatenate([np.zeros((before.size, 1)), grown], axis=1)
-        excess = grown - steep[:, None] * np.concatenate([self._at_depth(by_depth, before)[0][:, None], there], axis=1)
-        passed = excess[:, 1:] >= 0.0
-        pairs = np.arange(before.size)
+        now = table.at_depth(by_depth, before)[0][:, None]
+        grown = np.maximum(table.depth[None, :] - (before + table.worn)[:, None], 0.0)
+        values = np.concatenate([now, np.where(grown > 0.0, by_depth, now)], axis=1)
+        grown = np.concatenate([np.zeros_like(now), grown], axis=1)
+        excess = grown - steep[:, None] * values
+        passed, pairs = excess[:, 1:] >= 0.0, np.arange(before.size)
         place = np.argmax(passed, axis=1)
-        low, high = (excess[pairs, place], grown[pairs, place]), (excess[pairs, place + 1], grown[pairs, place + 1])
-        rise = high[0] - low[0]
-        fraction = np.divide(-low[0], rise, out=np.zeros_like(rise), where=rise > 0.0)
-        inside = low[1] + fraction * (high[1] - low[1])
-        return np.where(passed.any(axis=1), inside, steep * by_depth[:, -1])
+        (low, high), (begin, end) = ((part[pairs, place], part[pairs, place + 1]) for part in (excess, grown))
+        fraction = np.divide(-low, high - low, out=np.zeros_like(low), where=high > low)
+        return np.where(passed.any(axis=1), begin + fraction * (end - begin), steep * by_depth[:, -1])
 
     def growth_tangent(
         self,
@@ -183,48 +194,26 @@ class WearingWork:
 
         at: slip work, J, mean normal force, N, and depth, m, at the end of the step, (n_contact,) each.
         """
-        if self.table is None:
-            return (gain * self.slopes(*at)[0])[:, None] * slip_work_tangent
         by_work, by_force, by_depth = self.slopes(*at)
+        if self.table is None:
+            return (gain * by_work)[:, None] * slip_work_tangent
         follows = gain / (1.0 - gain * by_depth)
         grown: FloatArray = (follows * by_work)[:, None] * slip_work_tangent
         return grown + (follows * by_force)[:, None] * normal_force_tangent
 
     def _without_table(self, slip_work: FloatArray) -> FloatArray:
-        work = slip_work if self.least is None else np.maximum(slip_work - self.least, 0.0)
-        return work if self.factor is None else self.factor * work
+        return self.factor * np.maximum(slip_work - self.least, 0.0)
 
-    def _at_pressure(self, normal_force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Rows of the table at the pressures of the pairs (n_contact, n_d), and derivative to the normal force, 1/N."""
-        assert self.pressure is not None
+    def _table_at(self, normal_force: FloatArray, depth: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Factor of each pair (n_contact,), and its derivatives by normal force, 1/N, and depth, 1/m."""
         assert self.table is not None
-        assert self.area is not None
-        place, fraction, width = _between(self.pressure, normal_force / self.area)
-        low, high = self.table[place], self.table[np.minimum(place + 1, len(self.pressure) - 1)]
-        slope = np.divide(1.0, width * self.area, out=np.zeros_like(width), where=width > 0.0)
-        return low + fraction[:, None] * (high - low), slope[:, None] * (high - low)
-
-    def _at_depth(self, by_depth: FloatArray, depth: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Values of rows (n_contact, n_d) at the depths of the pairs, m, and their derivatives, 1/m."""
-        assert self.depth is not None
-        place, fraction, width = _between(self.depth, depth + self.worn)
-        pairs = np.arange(depth.size)
-        low, high = by_depth[pairs, place], by_depth[pairs, np.minimum(place + 1, len(self.depth) - 1)]
-        slope = np.divide(high - low, width, out=np.zeros_like(width), where=width > 0.0)
-        return low + fraction * (high - low), slope
+        by_depth, by_depth_slope = self.table.at_pressure(normal_force)
+        value, slope = self.table.at_depth(by_depth, depth)
+        return value, self.table.at_depth(by_depth_slope, depth)[0], slope
 
 
 ARCHARDS_WORK = WearingWork()
 """All slip work wears."""
-
-
-def _between(knots: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray, FloatArray]:
-    """Index of the knot before each value, fraction of the interval, and its width; both are 0 beyond the ends."""
-    place = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 1)
-    width = np.append(np.diff(knots), 0.0)[place]
-    width = np.where(at < knots[0], 0.0, width)
-    fraction = np.divide(at - knots[place], width, out=np.zeros_like(width), where=width > 0.0)
-    return place, fraction, width
 
 
 def wearing_work(law: WearLaw, contact: ContactInterface, friction_coefficient: FloatArray) -> WearingWork:
@@ -234,13 +223,11 @@ def wearing_work(law: WearLaw, contact: ContactInterface, friction_coefficient: 
     """
     if law.name not in LAWS:
         raise ValueError(f'wear law "{law.name}": give one of {", ".join(LAWS)}')
-    factor = surface_factors(contact.surface, law.surfaces) if law.surfaces else None
+    factor = surface_factors(contact.surface, law.surfaces) if law.surfaces else 1.0
     if law.name == "energy":
-        factor = friction_coefficient if factor is None else factor * friction_coefficient
-    least = law.threshold * contact.area if law.name == "threshold" else None
-    if law.name != "table" or law.table is None:
-        return WearingWork(factor, least)
-    table, worn = law.table, np.array(law.worn) if law.worn else 0.0
-    return WearingWork(
-        factor, least, np.array(table.pressure), np.array(table.depth), np.array(table.factor), contact.area, worn
-    )
+        factor = factor * friction_coefficient
+    least, table = law.threshold * contact.area if law.name == "threshold" else 0.0, None
+    if law.name == "table" and law.table is not None:
+        pressure, depth, values = (np.array(part) for part in (law.table.pressure, law.table.depth, law.table.factor))
+        table = PairFactors(pressure, depth, values, contact.area, np.array(law.worn) if law.worn else 0.0)
+    return WearingWork(factor, least, table)

@@ -1,6 +1,6 @@
 """Pseudo-arc-length continuation of a branch through its folds.
 
-The parameter is the further unknown of a bordered system (`solver.newton.bordering`), and the further equation says
+The parameter is the further unknown of a bordered system (`solver.newton.run`), and the further equation says
 that the point lies in a plane across the tangent of the branch.
 """
 
@@ -15,32 +15,34 @@ from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Evaluation, Linearisation
 from solver.harmonic_balance.state import BalanceAt, State
 from solver.model import FloatArray
-from solver.newton.bordering import Bordered
-from solver.newton.run import Run
-from solver.settings import DIFFERENCE, NEGLIGIBLE
+from solver.newton.run import Bordered, Run
+from solver.settings import DIFFERENCE
 
 FIRST_ARC = SMOOTH_CHANGE / 10.0
 """Length of the first step, in unknowns divided by the norm of the first predicted force; the longest one is
-`SMOOTH_CHANGE`. With this length seven branches with folds take 1.5 % more iterations."""
+`SMOOTH_CHANGE`."""
 
 CORNER_ARC = 1e-3
-"""Length of the step behind a corner, and least length after a step. Without such a least length the same branches
-take 46 % more iterations."""
+"""Length of the step behind a corner, and least length after a step. Without such a least length seven branches with
+folds take 46 % more iterations."""
 
 SHORTEST_ARC = CORNER_ARC / 10.0
 """Shortest step: where none of this length converges, the branch has a corner."""
 
 ARC_WANDER = 2.0
 """Distance of a corrector from its start over the length of the step, above which the corrector is given up. Without it
-the branch of `tests/solver/test_natural.py` is left for another one."""
+the branch of `tests/solver/test_whole_response.py` is left for another one."""
+
+
+FOLD_HALVINGS = 10
+"""Halvings of a step with a fold; the parameter at the fold is off by the square of the length."""
 
 
 @dataclass
 class Arc:
     """A branch and its arc-length steps in scaled unknowns (p / size, parameter / span), with the history of its start.
 
-    balance_at: balance at a value of the parameter for a tangential history (n_contact, 2), m.
-    start: first state, with its parameter. span: natural length of the parameter. run: tolerance and limits.
+    span: natural length of the parameter.
     """
 
     balance_at: BalanceAt
@@ -53,7 +55,7 @@ class Arc:
         self.size = max(float(np.linalg.norm(self.start.evaluation.predicted_h)), 1e-300)
 
     def steps(self, toward: float) -> Iterator[tuple[State, State, State | None]]:
-        """Steps along the branch: start and end of a step, and the state at the fold between both, None if none.
+        """Start and end of each step along the branch, and the state at the fold between both, None if none.
 
         toward: sign of the first change of the parameter.
         """
@@ -84,10 +86,7 @@ class Arc:
         return np.append(state.evaluation.predicted_h.ravel() / self.size, state.parameter / self.span)
 
     def slope(self, parameter: float, evaluation: Evaluation) -> FloatArray:
-        """Derivative (n_rel, m), N, of the residual with respect to parameter / span.
-
-        A finite difference is enough: the slope only gives directions to the corrector, whose residual is exact.
-        """
+        """Derivative (n_rel, m), N, of the residual by parameter / span, by a difference: enough for a direction."""
         ahead = self.balance_at(parameter + DIFFERENCE * self.span, self.start.history).evaluate(evaluation.predicted_h)
         return (ahead.residual - evaluation.residual) / DIFFERENCE
 
@@ -113,10 +112,10 @@ class Arc:
         return None if found is None else State(found.at, self.start.history, float(found.values[0] * self.span))
 
     def _step_over_corner(self, state: State, tangent: FloatArray) -> State | None:
-        """State behind a corner of the branch; None where no state is found.
+        """State behind a corner of the branch, where a contact sample changes its status; None where none is found.
 
-        At a corner a contact sample changes its status, and the plane across the old tangent may not meet the branch
-        behind. So the tangent is taken a little ahead of the state, and both of its signs are tried.
+        The plane across the old tangent may not meet the branch behind. So the tangent is taken a little ahead of the
+        state, and both of its signs are tried.
         """
         base = self.place(state)
         ahead = base + CORNER_ARC * tangent
@@ -144,38 +143,23 @@ class Arc:
         return State(result.evaluation, self.start.history, target) if result.converged else None
 
     def _fold(self, state: State, tangent: FloatArray, after: State) -> State:
-        """State at the fold between two states, or the one of them that lies nearest to it; tangent: at the first.
-
-        Regula falsi (Illinois) on the part of the tangent along the parameter, which is zero at a fold and jumps at a
-        corner. Of the states on the way, the one with the extreme parameter is the fold.
-        """
-        low, high = 0.0, float(tangent @ (self.place(after) - self.place(state)))
-        at_low, at_high = float(tangent[-1]), -float(tangent[-1])
-        sign = np.sign(tangent[-1])
+        """State with the extreme parameter between two states, by bisection of the length; tangent: at the first."""
+        sign, low, high = np.sign(tangent[-1]), 0.0, float(tangent @ (self.place(after) - self.place(state)))
         best = max(state, after, key=lambda each: sign * each.parameter)
-        for step in range(NEAR_ITERATIONS):
-            # the part behind the fold is known after the first steps: halve until then
-            place = 0.5 * (low + high) if step < 2 else low + (high - low) * at_low / (at_low - at_high)
+        for _ in range(FOLD_HALVINGS):
+            place = 0.5 * (low + high)
             found = self.step(state, tangent, place)
             ahead = None if found is None else self.tangent(found.parameter, found.evaluation, tangent)
             if found is None or ahead is None:
                 break
-            part = float(ahead[-1])
-            if (found.parameter - best.parameter) * sign > 0.0:
-                best = found
-            # the parameter is off by the square of the part
-            if part**2 < NEGLIGIBLE:
-                break
-            if part * at_low > 0.0:
-                low, at_low, at_high = place, part, 0.5 * at_high
-            else:
-                high, at_high, at_low = place, part, 0.5 * at_low
+            best = max(best, found, key=lambda each: sign * each.parameter)
+            low, high = (place, high) if ahead[-1] * sign > 0.0 else (low, place)
         return best
 
 
 @dataclass(frozen=True)
 class _Plane:
-    """The branch of an arc, and the plane across its tangent at a length from a base, both scaled (n + 1,)."""
+    """A branch, and the plane across its tangent at a length from a base, both scaled (n + 1,)."""
 
     arc: Arc
     base: FloatArray

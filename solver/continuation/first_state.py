@@ -1,29 +1,48 @@
-"""The first periodic state of a joint, from its static state."""
+"""The static state of a joint, and its first periodic state from there.
+
+The static state depends on the history of the load. So the load is raised in equal steps, each from the tangential
+state of the step before. Newton's method finds most of them. Where it cycles among sets of pairs that slip and open,
+the step is made in time, as a joint with viscous pairs makes it, by implicit Euler:
+
+    c (u - u_before) + Z_r u + lambda = F_r
+
+A large c, in proportion to the penalty of each pair, binds the pair to its last position, and the state is unique for
+any friction. From step to step c falls, until Newton's method finds the state with c = 0. Also a joint that has to jump
+moves on (a snap under much friction, a body that falls through a gap), and a joint without any static state moves
+without end, in a direction that shows why.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from solver.contact.coulomb import friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, follow_naturally
-from solver.continuation.static_state import predicted_at_rest, solve_static_state
-from solver.continuation.transient import relax_to_periodic
-from solver.harmonic_balance.dlft import Balance
+from solver.continuation.transient import RUNAWAY, relax_to_periodic
+from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State
-from solver.model import ComplexArray, FloatArray
+from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
-from solver.stability.hill import is_stable
-from solver.structure.joint import Case, Joint
+from solver.settings import NEGLIGIBLE
+from solver.stability.floquet import is_stable
+from solver.structure.fourier import change_orders
+from solver.structure.joint import Case, Joint, static_joint, viscous_joint
+
+LOAD_STEPS = 20
+"""Steps of the static load of a joint with gaps, wear or given normal forces, which may change the state."""
+
+VISCOSITY_CUT, VISCOSITY_RISE = 0.2, 10.0
+"""Factors on the viscosity after a step in time, and after a step that was not found. With a cut of 0.05 and 0.1 as
+many random decks (`tests/random_decks.py`) have a static state."""
+
+VISCOUS_STEPS = 300
+"""Most steps in time. Of 300 random decks one needs more than 60."""
 
 RELIEF = (0.1, 0.4)
 """Fractions of the static friction forces that are removed where the excitation cannot be raised with the full forces.
 Other fractions lead to other states that friction allows: 5 % for a mass that ratchets."""
-
-LINEARISATIONS = 20
-"""Iterations of the harmonic linearisation."""
 
 
 def solve_first_state(
@@ -31,91 +50,111 @@ def solve_first_state(
 ) -> State | Outcome:
     """First periodic state. These ways are tried in turn until one leads to a stable state:
 
-    1. Where friction cannot hold any pair against the whole excitation, Newton's method starts from a vibration in
-       which all slide (three to four iterations for the slider, which takes 30 to 90 with the next way).
-    2. The excitation is raised from zero.
-    3. The excitation is raised from a state with smaller static friction forces. Pairs that the static load leaves at
+    1. The excitation is raised from zero.
+    2. The excitation is raised from a state with smaller static friction forces. Pairs that the static load leaves at
        their friction limit slip under the smallest vibration, in states far from the static one, and shake down.
-    4. The vibration builds up in time under the whole excitation (`transient`).
+    3. The vibration builds up in time under the whole excitation (`transient`).
 
-    omega, excitation_amplitude: rad/s, N. wear_depth (n_contact,): m, constant.
-
+    omega, excitation_amplitude: rad/s, N. wear_depth (n_contact,): m.
     Returns the state, or START_FAILED, UNSTABLE, UNSETTLED, ADRIFT or an outcome of `solve_static_state`.
     """
     quiet = case.joint(omega, 0.0)
     static = solve_static_state(quiet, wear_depth, run)
     if isinstance(static, Outcome):
         return static
-    why, unstable = Outcome.START_FAILED, False
-    for found in _ways(case, quiet, static, excitation_amplitude, run):
-        if isinstance(found, Outcome):
-            why = found
-            continue
-        balance = Balance(case.joint(omega, excitation_amplitude), found.evaluation.history, wear_depth)
-        if is_stable(balance, found.evaluation, run):
-            return found
-        unstable = True
-    return Outcome.UNSTABLE if unstable else why
-
-
-def _ways(case: Case, quiet: Joint, static: State, excitation_amplitude: float, run: Run) -> Iterator[State | Outcome]:
-    """States under the whole excitation by the ways of `solve_first_state`, or why the last one ends, on demand."""
-    wear_depth = static.evaluation.wear_depth
 
     def balance_at(load_factor: float, history: FloatArray) -> Balance:
-        return Balance(case.joint(quiet.omega, load_factor * excitation_amplitude), history, wear_depth)
+        return Balance(case.joint(omega, load_factor * excitation_amplitude), history, wear_depth)
 
-    start = predicted_at_rest(case, quiet, static, wear_depth)
+    start, unstable = predicted_at_rest(case, quiet, static, wear_depth), False
     rest = run.state(balance_at(0.0, static.history), start, 0.0)
     if rest is None:
-        yield Outcome.START_FAILED
-        return
-    whole = balance_at(1.0, rest.history)
-    if (sliding := _sliding_start(whole, rest)) is not None:
-        slid = run.state(whole, sliding, 1.0, NEAR_ITERATIONS)
-        if slid is not None:
-            yield slid
+        return Outcome.START_FAILED
     for fraction in (0.0, *RELIEF):
-        begun: State | None = rest
-        if fraction:
-            relieved = Balance(quiet, relieved_history(quiet, static, fraction), wear_depth)
-            begun = run.state(relieved, start, 0.0)
-        if begun is not None:
-            raised, arrived = follow_naturally(balance_at, begun, 1.0, run)
-            if arrived:
-                yield raised
-    yield relax_to_periodic(case, whole.joint, wear_depth, rest.evaluation, quiet, rest.history, run)
-
-
-def _sliding_start(balance: Balance, rest: State) -> FloatArray | None:
-    """Predicted force (n_rel, m), N, of a joint all of whose pairs slide; None where friction may hold one of them.
-
-    Friction acts against the velocity with its first harmonic, 4 / pi times its limit (harmonic linearisation).
-    """
-    joint = balance.joint
-    load, stiffness = joint.structure.harmonic_force, joint.structure.dynamic_stiffness[0]
-    limit = friction_limit(joint.friction_coefficient, rest.evaluation.force_h[:, 0, 0])
-
-    def of_pairs(amplitudes: ComplexArray) -> ComplexArray:
-        spread = np.zeros(3 * limit.size, complex)
-        spread[joint.component_index] = amplitudes
-        return spread.reshape(-1, 3)
-
-    if (np.linalg.norm(of_pairs(load)[:, 1:], axis=1) <= limit).any():
-        return None
-    friction, moved = np.zeros((limit.size, 3), complex), load.astype(np.complex128)
-    for _ in range(LINEARISATIONS):
-        left = load - friction.ravel()[joint.component_index]
-        moved = np.asarray(np.linalg.solve(stiffness, left), dtype=np.complex128)
-        velocity = 1j * of_pairs(moved)[:, 1:]
-        size = np.maximum(np.linalg.norm(velocity, axis=1), 1e-300)
-        friction[:, 1:] = (4.0 / np.pi * limit / size)[:, None] * velocity
-    motion_h, force_h = rest.evaluation.displacement_h.copy(), rest.evaluation.force_h.copy()
-    for values, amplitude in ((motion_h, of_pairs(moved)), (force_h, friction)):
-        values[:, :, 1], values[:, :, 2] = amplitude.real, -amplitude.imag
-    return balance.predict(motion_h, force_h)
+        relieved = Balance(quiet, relieved_history(quiet, static, fraction), wear_depth)
+        begun = run.state(relieved, start, 0.0) if fraction else rest
+        if begun is None:
+            continue
+        raised, arrived = follow_naturally(balance_at, begun, 1.0, run)
+        if arrived and is_stable(balance_at(1.0, raised.evaluation.history), raised.evaluation, run):
+            return raised
+        unstable |= arrived
+    whole = case.joint(omega, excitation_amplitude)
+    settled = relax_to_periodic(case, whole, wear_depth, rest, quiet, run)
+    return Outcome.UNSTABLE if unstable and isinstance(settled, Outcome) else settled
 
 
 def relieved_history(joint: Joint, static: State, fraction: float) -> FloatArray:
     """Tangential history (n_contact, 2), m, that reduces the static friction forces by a fraction."""
     return static.history + fraction * static.evaluation.force_h[:, 1:, 0] / joint.penalty.tangential[:, None]
+
+
+def predicted_at_rest(case: Case, quiet: Joint, static: State, wear_depth: FloatArray) -> FloatArray:
+    """Predicted force (n_rel, 2H+1), N, of the static state with the harmonics of a case, none of which vibrates.
+
+    quiet: the joint without excitation, at the harmonics of the case.
+    """
+    displacement_h, force_h = (
+        change_orders(part, (), case.resolution.orders)
+        for part in (static.evaluation.displacement_h, static.evaluation.force_h)
+    )
+    return Balance(quiet, static.history, wear_depth).predict(displacement_h, force_h)
+
+
+def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State | Outcome:
+    """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
+
+    Without gaps, wear and given normal forces all states of a rising load are proportional, and one step is enough.
+
+    joint: its excitation is left out. wear_depth (n_contact,): m.
+    Returns the state; STATIC_SLIDING or STATIC_OPEN where there is no static state, STATIC_FAILED where none is found.
+    """
+    run, contact = run.fresh(), joint.contact
+    proportional = not contact.gap.any() and not wear_depth.any() and contact.has_normal.all()
+    n_steps = 1 if proportional else LOAD_STEPS
+    unmoved = np.zeros((joint.contact.n_contact, 3, 1))
+    rest = Balance(static_joint(joint, 0.0), unmoved[:, 1:, 0], wear_depth)
+    state = State(rest.evaluate(rest.predict(unmoved, unmoved)), rest.history)
+    for step in range(1, n_steps + 1):
+        balance = Balance(static_joint(joint, step / n_steps), state.history, wear_depth)
+        before = state.evaluation.predicted_h
+        start = balance.joint.structure.force_h() if step == 1 else before * (step / (step - 1.0))
+        found, used = run.state(balance, start), run.budget.iterations
+        if found is None:
+            settled = _settle(balance, state.evaluation, run)
+            if isinstance(settled, Outcome):
+                return settled
+            # every search needs a static state, whose steps have a limit of their own
+            run.budget.limit += run.budget.iterations - used
+            found = settled
+        state = found
+    return state
+
+
+def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Outcome:
+    """Static state to which viscous pairs come from the state `before`, or why there is none."""
+    viscosity, begun = 1.0, before.displacement_h
+    far, moved = float((balance.joint.contact.gap + balance.wear_depth).max()), np.zeros_like(begun)
+    for _ in range(VISCOUS_STEPS):
+        viscous = replace(balance, joint=viscous_joint(balance.joint, viscosity, before.displacement_h))
+        ahead = run.state(viscous, viscous.predict(before.displacement_h, before.force_h), most=NEAR_ITERATIONS)
+        if ahead is None:
+            viscosity *= VISCOSITY_RISE
+            continue
+        before = ahead.evaluation
+        balance = replace(balance, history=ahead.history)
+        end = run.state(balance, balance.predict(before.displacement_h, before.force_h), most=NEAR_ITERATIONS)
+        if end is not None:
+            return end
+        if not moved.any():
+            # the first step is about as long as the load deforms the joint
+            far = max(far, RUNAWAY * float(np.abs(before.displacement_h - begun).max()))
+        moved = before.displacement_h - begun
+        if viscosity < NEGLIGIBLE and np.abs(moved).max() > far:
+            break
+        viscosity *= VISCOSITY_CUT
+    if np.abs(moved).max() <= far:
+        return Outcome.STATIC_FAILED
+    # a motion without end
+    opened, slid = -moved[:, 0].min(initial=0.0), np.linalg.norm(moved[:, 1:], axis=1).max(initial=0.0)
+    return Outcome.STATIC_OPEN if opened > slid else Outcome.STATIC_SLIDING

@@ -1,19 +1,28 @@
-"""Natural continuation of a converged state along one parameter, and constants that all searches share.
+"""Steps along a parameter, natural steps, shakedown of sliding masses by them, and constants that all searches share.
 
-The parameter is the frequency, the excitation amplitude, a homotopy parameter or the fraction of a step on the slow
-time scale. The *change* of the vibration is `vibration_change` of two states, relative to the first one. A state that
-is found is exact to the tolerance for all values of the constants.
+The length of a step follows from the change of the state over the step, or its local error, over the one allowed
+(`take_step`: along frequency, load, amplitude, cycles or missions). Natural steps of Newton's method alone are halved
+where it fails (`follow_naturally`).
+
+The parameter is the frequency, the load, or the fraction of a change of the tangential history or of the wear depth.
+The *change* of the vibration is `vibration_change` of two states, relative to the first one. A state that is found is
+exact to the tolerance for all values of the constants.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
 import numpy as np
 
 from solver.contact.coulomb import STICK
-from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.state import BalanceAt, State, final_history, vibration_change
-from solver.newton.iteration import MOST_ITERATIONS, SHORTEST_STEP
-from solver.newton.run import Run
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.state import BalanceAt, Failure, State, final_history, vibration_change
+from solver.model import FloatArray
+from solver.newton.run import MOST_ITERATIONS, SHORTEST_STEP, Run
+from solver.structure.joint import Joint
 
 ATTEMPTS = 25
 """Most attempts of a search that comes closer with each of them: natural steps that fail, solves for the phase lag of
@@ -33,24 +42,79 @@ LINEAR_CHANGE = 1.0
 resonance is a change of 2."""
 
 
+STEP_SAFETY = 0.85
+"""Length of a step over the length with the allowed error, and the largest factor on a step that was refused."""
+
+LARGEST_STEP_RATIO = 2.0
+"""Largest ratio of two successive steps of a sweep, of an amplitude and on the slow time scale; BDF2 is zero-stable
+below 1 + sqrt(2). With 1.4 the damping of a nonlinear mode of the dovetail changes by 5e-6."""
+
+SMALLEST_STEP_RATIO = 0.25
+"""Factor on a step whose end was not found, and smallest factor on a step that was refused."""
+
+HereT = TypeVar("HereT", contravariant=True)
+EndT = TypeVar("EndT")
+
+
+class Line(Protocol[HereT, EndT]):
+    """What is marched along."""
+
+    def attempt(self, here: HereT, length: float, /) -> EndT | None:
+        """End of a step; None where it is not found."""
+
+    def judge(self, here: HereT, end: EndT, length: float, /) -> float:
+        """Change or error of a step over the allowed one; above 1 the step is refused."""
+
+    def rescue(self, here: HereT, length: float, /) -> EndT | Failure:
+        """End of a step that is not found, or refused, however short; or why the line ends."""
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """The rule for the length of a step.
+
+    order: power of the length with which the judged quantity grows. safety: as `STEP_SAFETY`.
+    shortest: shortest step. rescue: length at and below which a step that is not found is left to the rescue.
+    """
+
+    order: int
+    safety: float = STEP_SAFETY
+    shortest: float = 0.0
+    rescue: float = 0.0
+
+    def factor(self, ratio: float, *, accepted: bool) -> float:
+        """Length of the next step, or of the next attempt of a refused one, over the present length."""
+        wanted = self.safety * max(ratio, 1e-12) ** (-1.0 / self.order)
+        least, most = self.safety, LARGEST_STEP_RATIO
+        return float(np.clip(wanted, *((least, most) if accepted else (SMALLEST_STEP_RATIO, least))))
+
+
+def take_step(line: Line[HereT, EndT], here: HereT, length: float, lengths: Lengths) -> tuple[EndT, float] | Failure:
+    """The end of one step and the length of the next one, or why there is none; length: of the first attempt."""
+    length = max(length, lengths.shortest)
+    while True:
+        end = line.attempt(here, length)
+        ratio = math.inf if end is None else line.judge(here, end, length)
+        if end is not None and ratio <= 1.0:
+            return end, length * lengths.factor(ratio, accepted=True)
+        if length <= (lengths.rescue if end is None else lengths.shortest):
+            rescued = line.rescue(here, length)
+            return rescued if isinstance(rescued, Failure) else (rescued, length)
+        floor = lengths.rescue if end is None else lengths.shortest
+        length = max(lengths.factor(ratio, accepted=False) * length, floor)
+
+
 def follow_naturally(
-    balance_at: BalanceAt,
-    start: State,
-    target: float,
-    run: Run,
-    keep_history: bool = False,
-    fine: float = np.inf,
+    balance_at: BalanceAt, start: State, target: float, run: Run, fine: float = np.inf
 ) -> tuple[State, bool]:
     """Step the parameter to the target; returns the last state, and whether it is at the target.
 
     Steps are halved where Newton's method needs many iterations. The first Newton iteration from the last state is a
     tangent predictor (for wear: Eq. (19)), so that no other predictor is needed.
 
-    balance_at, start, target, run: balance at a value of the parameter; first state, with its parameter; last value of
-    the parameter; limits.
-    keep_history: keeps the tangential history of the start, for intermediate states that are no states of the joint.
-    fine: step length, in the unit of the parameter. A longer step is accepted only if the vibration changes little over
-    the step: where each step leaves a history to the next step, the state at the target depends on the steps.
+    balance_at: balance at a value of the parameter. start: first state, with its parameter.
+    fine: length of the parameter. A longer step is accepted only if the vibration changes little over the step: where
+    each step leaves a history to the next one, the state at the target depends on the steps.
     """
     state, whole, shortest = start, target - start.parameter, SHORTEST_STEP
     if np.isfinite(fine) and whole != 0.0:
@@ -65,8 +129,8 @@ def follow_naturally(
         result = run.solve(balance, state.evaluation.predicted_h, most)
         smooth = abs(reach - state.parameter) <= fine or _is_smooth(state.evaluation, result.evaluation)
         if result.converged and smooth:
-            history = state.history if keep_history else final_history(balance, result.evaluation)
-            state, done, fraction = State(result.evaluation, history, reach), ahead, min(2.0 * fraction, 1.0)
+            state = State(result.evaluation, final_history(balance, result.evaluation), reach)
+            done, fraction = ahead, min(2.0 * fraction, 1.0)
             continue
         fraction = 0.5 * (ahead - done)
         failures += not result.converged
@@ -79,3 +143,38 @@ def _is_smooth(before: Evaluation, after: Evaluation) -> bool:
     """Whether the vibration changes so little between two states that no step between them is needed."""
     linear = bool((before.status_t == STICK).all() and (after.status_t == STICK).all())
     return vibration_change(before, after) <= (LINEAR_CHANGE if linear else SMOOTH_CHANGE)
+
+
+def ratchets(joint: Joint, at: Evaluation, fraction: float) -> bool:
+    """Whether the work of ratcheting in a period exceeds a fraction of the slip work.
+
+    A very small stiffness holds the mean position of a mass on a slider (`penalty.mean`), and drag c its mean velocity.
+    Where the vibration lets the mass slip to a mean position u_0 that differs from that of its history, the law
+    ratchets by 2 pi / omega penalty.mean (u_0 - history) / c in each period, although the Fourier series are periodic.
+    This slip counts as wear, but its work, mean normal force times ratcheting, is not in the balance of energy.
+    """
+    work = float(np.abs(at.force_h[:, 0, 0]) @ np.hypot(*joint.law.drift(at).T))
+    return work > fraction * float(at.slip_work.sum())
+
+
+def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
+    """State after shakedown of the masses, which slip to and fro or stick in the end, at an unchanged wear depth.
+
+    The mean position u_0 becomes the new history, with which only a part of the ratcheting is left, and so on until its
+    work is at most a fraction of the slip work. The last state found where this does not end.
+    """
+    run, worn = run.fresh(), state.evaluation.wear_depth
+    for _ in range(ATTEMPTS):
+        if not ratchets(joint, state.evaluation, fraction):
+            break
+        before = state.evaluation.history
+        shift = joint.law.origin(state.evaluation.displacement_h[:, 1:, 0] - before)
+
+        def balance_at(part: float, _: FloatArray, before: FloatArray = before, shift: FloatArray = shift) -> Balance:
+            return Balance(joint, before + part * shift, worn)
+
+        moved, arrived = follow_naturally(balance_at, State(state.evaluation, before, 0.0), 1.0, run)
+        if not arrived:
+            break
+        state = State(moved.evaluation, moved.history, state.parameter)
+    return state

@@ -1,13 +1,15 @@
-"""A periodic state whose vibration lags behind its excitation by a given phase: the frequency is an unknown.
+"""Periodic states at a given phase lag, or at the largest amplitude: the frequency is an unknown.
 
 With the first harmonics x of all displacements and F of the excitation, `F^H x = |F^H x| exp(-i lag)`. The lag rises
 from 0 below a resonance to pi above; the excitation does most work in phase resonance, at the lag pi/2. The frequency
-is the further unknown of a bordered balance (`solver.newton.bordering`), in an implicit step with the wear depth that
+is the further unknown of a bordered balance (`solver.newton.run`), in an implicit step with the wear depth that
 grows with the motion, and the further equation is
 
     sin(arg(F^H x) + lag) = 0.
 
-The wear depth is eliminated in the Jacobian, so that its change with the frequency is part of the step.
+At the largest amplitude of the first response, in its first harmonic, the rise of the amplitude with the lag is zero; a
+secant finds this lag. For a linear oscillator of one degree of freedom with the damping ratio zeta the frequency is
+then omega_0 sqrt(1 - 2 zeta^2), in phase resonance omega_0.
 """
 
 from __future__ import annotations
@@ -18,23 +20,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.continuation.natural import ATTEMPTS
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.model import ComplexArray, FloatArray
-from solver.newton.bordering import Bordered
-from solver.newton.run import Run
-from solver.settings import DIFFERENCE, ROUND_OFF
+from solver.newton.linear_solver import FORCING
+from solver.newton.run import Bordered, Run
+from solver.settings import DIFFERENCE, NEGLIGIBLE, ROUND_OFF
+from solver.structure.condensation import FrequencySlope, frequency_slope
 from solver.structure.fourier import to_complex
-from solver.structure.frequency_slope import frequency_slope
 from solver.structure.joint import Case, Joint
 
 LARGEST_FREQUENCY_CHANGE = 0.02
 """Largest change of the frequency in an iteration, over the frequency."""
 
+PEAK_RISE = 2.0
+"""Largest rise of the logarithm of the response with the phase lag, 1/rad, over rtol, at which an amplitude counts as
+the largest one: its frequency is then within 2 rtol of half the width of the resonance. The states of single samples
+change with the frequency, so that the rise is rough: by 0.005 for the dovetail with rtol 0.01."""
 
-def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
-    """`F^H x`, N m, of excitation and displacements in the first harmonic, from the motion (n_contact, 3, 2H+1), m."""
-    structure = joint.structure
-    return complex(structure.drive @ _first(joint, displacement_h) + structure.drive_offset)
+LARGEST_LAG_STEP = 0.2
+"""Largest change of the phase lag between two solves, rad."""
 
 
 def phase_lag(joint: Joint, at: Evaluation) -> float:
@@ -46,12 +51,17 @@ def phase_lag(joint: Joint, at: Evaluation) -> float:
     return (-cmath.phase(product) + 0.5 * math.pi) % (2 * math.pi) - 0.5 * math.pi
 
 
+def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
+    """`F^H x`, N m, of excitation and displacements in the first harmonic, from the motion (n_contact, 3, 2H+1), m."""
+    return _product_change(joint, displacement_h) + joint.structure.drive_offset
+
+
 @dataclass(frozen=True)
 class AtLag:
     """The problem: a balance, with fixed or with growing wear depths, whose frequency follows from its lag.
 
-    case: of the joint of the balance. balance: at some frequency. lag: rad, between 0 and pi. `Bordered.reduced` is the
-    change of the lag with the frequency along the states, s/rad.
+    balance: at some frequency. lag: rad, between 0 and pi. `Bordered.reduced`: change of the lag with the frequency
+    along the states, s/rad.
     """
 
     case: Case
@@ -69,11 +79,11 @@ class AtLag:
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
         """As in BorderedProblem."""
         by_frequency = frequency_derivative(here.balance, here.at)
-        return [by_frequency.residual], self._errors(by_frequency.product, here.extra)[:, None]
+        return [by_frequency.force], self._errors(by_frequency.product, here.extra)[:, None]
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         """As in BorderedProblem: of the equation times |F^H x|, whose derivative is linear in the motion."""
-        return self._errors(product_change(here.balance.joint, tangent.transmit(step)[0]), here.extra)
+        return self._errors(_product_change(here.balance.joint, tangent.transmit(step)[0]), here.extra)
 
     def fraction(self, here: Bordered, _: FloatArray, change: FloatArray) -> float:
         """The frequency changes by a small fraction of itself at most."""
@@ -94,43 +104,87 @@ def solve_at_lag(
     return run.solve_bordered(AtLag(case, balance, lag), start, np.array([balance.joint.omega]), most)
 
 
-@dataclass(frozen=True)
-class FrequencyDerivative:
-    """Derivatives with respect to the frequency at a fixed predicted force: of the residual (n_rel, 2H+1), N s/rad, of
-    `F^H x`, N m s/rad, and of the first response in the first harmonic, m s/rad.
+def solve_at_peak(
+    case: Case, balance: Balance, start: FloatArray, lag: float, run: Run, most: int | None = None
+) -> tuple[Bordered, float] | None:
+    """The state of the largest amplitude near a phase lag, rad, and its lag; None where it is not found.
+
+    Arguments as in `solve_at_lag`. Along the frequency the wear depth is constant, also in an implicit step.
     """
+    below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
+    before: tuple[float, float] | None = None
+    for _ in range(ATTEMPTS):
+        found = solve_at_lag(case, balance, start, lag, run, most)
+        if found is None:
+            return None
+        rise, turn = rise_of_response(found, run, accuracy)
+        # where the lag falls with the frequency there is no resonance
+        if not (turn > 0.0 and math.isfinite(rise)):
+            return None
+        rise /= turn
+        below, above = (lag, above) if rise > 0.0 else (below, lag)
+        if abs(rise) <= accuracy or above - below <= accuracy:
+            return replace(found, reduced=np.array([[turn]])), lag
+        # of a linear oscillator with one degree of freedom the rise falls by 1 per rad
+        slope = -1.0 if before is None or before[0] == lag else (rise - before[1]) / (lag - before[0])
+        step = float(np.clip(-rise / min(slope, -NEGLIGIBLE), -LARGEST_LAG_STEP, LARGEST_LAG_STEP))
+        before = lag, rise
+        lag = lag + step if below < lag + step < above else 0.5 * (below + above)
+        balance, start = found.balance, found.at.predicted_h
+    return None
 
-    residual: FloatArray
-    product: complex
-    response: complex
+
+def accepted_rise(rtol: float) -> float:
+    """Rise of the logarithm of an amplitude with the phase lag, 1/rad, at which the amplitude counts as the largest."""
+    return PEAK_RISE * rtol
 
 
-def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencyDerivative:
-    """Derivatives at a state; those of masses on rigid ground by differences."""
+def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float, float]:
+    """Changes along the frequency at fixed wear depth and tangential history, both s/rad: of the logarithm of the
+    amplitude of the first response, in the first harmonic, and of the lag.
+
+    accuracy: first change over the second one that does not count.
+    """
+    joint, at = state.balance.joint, state.at
+    fixed = Balance(joint, at.history, at.wear_depth)
+    by_frequency = frequency_derivative(fixed, at)
+    step = run.step(fixed, at, -by_frequency.force, min(FORCING, 0.1 * accuracy))
+    moved = fixed.linearise(at).transmit(step)[0]
+    response = to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[0, 0]
+    rise = (by_frequency.response[0] + _response_changes(joint, moved)[0]) / response
+    product = by_frequency.product + _product_change(joint, moved)
+    return float(rise.real), -(product / excitation_product(joint, at.displacement_h)).imag
+
+
+def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencySlope:
+    """Derivatives by the frequency at a fixed predicted force: of the residual (n_rel, 2H+1), N s/rad, of `F^H x` and
+    of the responses; those of masses on rigid ground by differences.
+    """
     joint = balance.joint
     amplitude, orders, u = joint.excitation_amplitude, joint.basis.orders, joint.to_relative(at.displacement_h)
     slope = frequency_slope(joint.model, joint.omega, amplitude, orders, u)
-    residual, product, response = slope.force, slope.product, complex(slope.response[0])
-    if joint.law.rate_dependent:
-        # longer than usual: the round-off of the static forces is small against the change of all others
-        length = 10.0 * DIFFERENCE * joint.omega
-        ahead = replace(balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
-        motion = (ahead.displacement_h - at.displacement_h) / length
-        residual = residual + (ahead.residual - at.residual) / length
-        product += product_change(joint, motion)
-        response += first_response(joint, motion)
-    return FrequencyDerivative(residual, product, response)
+    if not joint.law.rate_dependent:
+        return slope
+    # longer than usual: the round-off of the static forces is small against the change of all others
+    length = 10.0 * DIFFERENCE * joint.omega
+    ahead = replace(balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
+    motion = (ahead.displacement_h - at.displacement_h) / length
+    return FrequencySlope(
+        force=slope.force + (ahead.residual - at.residual) / length,
+        product=slope.product + _product_change(joint, motion),
+        response=slope.response + _response_changes(joint, motion),
+    )
 
 
-def first_response(joint: Joint, motion_h: FloatArray) -> complex:
-    """First harmonic of the first response, m, to a motion (n_contact, 3, 2H+1), m, alone, without the excitation."""
-    return complex(joint.structure.dynamic_response[0, 0] @ _first(joint, motion_h))
+def _response_changes(joint: Joint, motion_h: FloatArray) -> ComplexArray:
+    """First harmonic of the responses (n_response,), m, to a motion (n_contact, 3, 2H+1), m, alone."""
+    return np.asarray(joint.structure.dynamic_response[0] @ _first(joint, motion_h))
+
+
+def _product_change(joint: Joint, motion_h: FloatArray) -> complex:
+    """Change of `F^H x`, N m, with a change of the motion (n_contact, 3, 2H+1), m."""
+    return complex(joint.structure.drive @ _first(joint, motion_h))
 
 
 def _first(joint: Joint, motion_h: FloatArray) -> ComplexArray:
     return to_complex(joint.to_relative(motion_h))[:, 0]
-
-
-def product_change(joint: Joint, motion_h: FloatArray) -> complex:
-    """Change of `F^H x`, N m, with a change of the motion (n_contact, 3, 2H+1), m."""
-    return complex(joint.structure.drive @ _first(joint, motion_h))

@@ -1,7 +1,7 @@
 """Relaxation in time to a periodic state: the harmonics of the motion vary slowly until they are constant.
 
-The motion is y(t) = Re sum Y_n(T) exp(i n w t) with slowly varying amplitudes Y_n(T), so that d/dt acts on Y_n as
-i n w + d/dT. With the velocity V = (i n w + d/dT) Y as a second unknown, the equation of motion reads
+The motion is y(t) = Re sum Y_n(T) exp(i n w t), with amplitudes that vary slowly: d/dt acts on Y_n as i n w + d/dT.
+With the velocity V = (i n w + d/dT) Y as a second unknown, the equation of motion reads
 
     M (i n w + d/dT) V + C V + K Y + lambda = F,
 
@@ -9,34 +9,30 @@ and an implicit Euler step of length D in T from (Y_0, V_0), with s = i n w + 1/
 
     (K + s C + s^2 M) Y + lambda = F + M (s Y_0 + V_0) / D + C Y_0 / D.
 
-This is the harmonic balance, Eq. (8), with other matrices and loads. The equation is condensed on the contact pairs and
-solved by Newton's method, as the balance is. A periodic motion (V_0 = i n w Y_0, Y = Y_0) fulfils the equation exactly
-for each D; for D -> infinity the equation is the balance. The friction law is periodic over one period and starts from
-the history of the step before. The static harmonic has s = 1/D.
+This is the harmonic balance, Eq. (8), with other matrices and loads. A periodic motion (V_0 = i n w Y_0, Y = Y_0)
+fulfils the equation exactly for each D; for D -> infinity the equation is the balance. The friction law is periodic
+over one period and starts from the history of the step before. The static harmonic has s = 1/D.
 
-A short step resolves the transient of the structure; a long step damps all decaying motions. Growing motions leave an
-unstable state as long as 1/D exceeds their rate, which the determinant of the step shows (`stability.hill`). So D
-starts at one period, the stability of each periodic state is tested, and D is bounded by this rate once a state was
-unstable.
+A short step resolves the transient, a long step damps all decaying motions. Growing motions leave an unstable state as
+long as 1/D exceeds their rate, which the determinant of the step shows (`stability.hill`). So D starts at one period,
+each periodic state is tested for stability, and D is bounded by this rate once a state was unstable.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any, cast
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
 from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
-from solver.continuation.static_state import RUNAWAY
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, final_history
 from solver.model import ComplexArray, FloatArray, LinearModel, Matrix
-from solver.newton.iteration import SHORTEST_STEP
-from solver.newton.run import Run
+from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.condensation import CondensedStructure, condense, relative_indices, whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -47,12 +43,14 @@ TRANSIENT_CUT = 0.35
 times the iterations of a jump at a fold."""
 
 SEARCH_ITERATIONS = 800
-"""Most Newton iterations of a relaxation with its periodic state. A jump at a fold of vibro-impact takes 400 to 500. A
-motion that does not settle (a blade whose 16 pairs all slip and lift) would take thousands."""
+"""Most Newton iterations of a relaxation with its periodic state. A jump at a fold of vibro-impact takes 400 to 500; a
+motion that does not settle would take thousands."""
+
+RUNAWAY = 1e3
+"""Displacement over the largest one of vibration and start; above it parts run away."""
 
 RELAXED_CHANGE = SMOOTH_CHANGE / 10.0
-"""Change over a step below which a periodic state is sought: norm of the change of the amplitudes over the larger norm
-of two motions."""
+"""Change of the motion over a step below which a periodic state is sought."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,7 @@ class _LoadedStructure(CondensedStructure):
 
 
 class Transient:
-    """Matrices and loads of a case at one frequency and excitation, for steps in time."""
+    """Matrices and loads of a case at the frequency and excitation of a joint, for steps in time."""
 
     def __init__(self, case: Case, joint: Joint) -> None:
         self.joint = joint
@@ -84,20 +82,13 @@ class Transient:
         self.parts: list[tuple[LinearModel, Matrix]] = []
         for order in orders:
             linear = case.model.harmonic_structure(order)
-            load: Matrix = np.zeros(linear.mass.shape[0])
-            if order == 0:
-                load = linear.load_static
-            elif order == 1:
-                load = joint.excitation_amplitude * linear.load_harmonic
-            self.parts.append((linear, load))
+            loads: dict[int, Matrix] = {0: linear.load_static, 1: joint.excitation_amplitude * linear.load_harmonic}
+            self.parts.append((linear, loads.get(order, np.zeros(linear.load_static.size))))
 
     def periodic(self, evaluation: Evaluation) -> Motion:
-        """Motion of the whole structure in a periodic state of this joint."""
-        return self._motion(evaluation, self.rates, [load for _, load in self.parts], None, 0.0)
-
-    def resumed(self, motion: Motion) -> Motion:
-        """Initial motion with the amplitudes of a periodic motion of another joint (another frequency or load)."""
-        return Motion(motion.displacement, self.rates[:, None] * motion.displacement)
+        """Motion of the whole structure in a periodic state of the joint: the end of an infinite step."""
+        zero = np.zeros((len(self.parts), self.parts[0][1].size), complex)
+        return self.after(evaluation, Motion(zero, zero), 0.0)
 
     def step(self, before: Motion, inverse: float) -> Joint:
         """Joint whose balance is an implicit Euler step of length 1/`inverse`, s, from a motion `before`."""
@@ -110,18 +101,23 @@ class Transient:
             full = cast("Matrix", linear.stiffness + rate * linear.damping + rate**2 * linear.mass)
             condensed = condense(full, self.relative, load)
             stiffness[place], force[place] = condensed.stiffness, condensed.force
-        plain = self.joint.structure
-        kept: dict[str, Any] = {field.name: getattr(plain, field.name) for field in fields(plain)}
-        kept["static_stiffness"] = np.real(stiffness[0])
-        kept["moving"] = DenseStiffness(stiffness[1:])
+        plain = {**vars(self.joint.structure), "static_stiffness": np.real(stiffness[0])}
+        plain["moving"] = DenseStiffness(stiffness[1:])
         load_h = from_complex(np.real(force[0]), force[1:].T)
-        return replace(self.joint, structure=_LoadedStructure(**kept, load_h=load_h))
+        return replace(self.joint, structure=_LoadedStructure(**plain, load_h=load_h))
 
     def after(self, evaluation: Evaluation, before: Motion, inverse: float) -> Motion:
         """Motion at the end of a step, from the solution of the balance of the step."""
-        return self._motion(
-            evaluation, np.asarray(self.rates + inverse, np.complex128), self._loads(before, inverse), before, inverse
+        relative_h = self.joint.to_relative(evaluation.displacement_h)
+        amplitudes = np.concatenate([relative_h[:, :1].astype(complex), to_complex(relative_h)], axis=1).T
+        loads, rates = self._loads(before, inverse), np.asarray(self.rates + inverse, np.complex128)
+        displacement = np.array(
+            [
+                whole_motion(linear, rate, self.relative, cast("ComplexArray", load), amplitude)
+                for (linear, _), rate, load, amplitude in zip(self.parts, rates, loads, amplitudes, strict=True)
+            ]
         )
+        return Motion(displacement, rates[:, None] * displacement - inverse * before.displacement)
 
     def _loads(self, before: Motion, inverse: float) -> list[Matrix]:
         loads: list[Matrix] = []
@@ -131,49 +127,28 @@ class Transient:
             loads.append(load + inverse * inertia)
         return loads
 
-    def _motion(
-        self, evaluation: Evaluation, rates: ComplexArray, loads: list[Matrix], before: Motion | None, inverse: float
-    ) -> Motion:
-        relative_h = self.joint.to_relative(evaluation.displacement_h)
-        amplitudes = np.concatenate([relative_h[:, :1].astype(complex), to_complex(relative_h)], axis=1)
-        displacement = np.array(
-            [
-                whole_motion(linear, rate, self.relative, cast("ComplexArray", load), amplitude)
-                for (linear, _), rate, load, amplitude in zip(self.parts, rates, loads, amplitudes.T, strict=True)
-            ]
-        )
-        velocity = rates[:, None] * displacement
-        return Motion(displacement, velocity if before is None else velocity - inverse * before.displacement)
-
 
 def relax_to_periodic(
-    case: Case,
-    joint: Joint,
-    wear_depth: FloatArray,
-    start: Evaluation,
-    start_joint: Joint,
-    history: FloatArray,
-    run: Run,
+    case: Case, joint: Joint, wear_depth: FloatArray, start: State, start_joint: Joint, run: Run
 ) -> State | Outcome:
     """Stable periodic state of `joint` to which the structure relaxes in time from a state of `start_joint`.
 
-    case, joint: model and settings of both joints; the joint whose periodic state is sought.
-    wear_depth (n_contact,): m, constant. history (n_contact, 2): tangential history at the start, m.
-    start, start_joint: first state. Both joints have equal pairs and harmonics; frequency and load may differ. A start
-    without excitation leads to the state that builds up from rest.
-
-    Returns the stable state, or why there is none: ADRIFT where the mean positions run away, as all pairs slip and only
-    friction holds the parts; UNSTABLE where the motion is an unstable periodic state and does not leave this state;
-    UNSETTLED where it does not settle within `SEARCH_ITERATIONS`.
+    case: model and settings of both joints, which have equal pairs and harmonics; frequency and load may differ.
+    wear_depth (n_contact,): m, constant. A start without excitation leads to the state that builds up from rest.
+    Returns the state; ADRIFT where the mean positions run away, as all pairs slip and only friction holds the parts;
+    UNSTABLE where the motion does not leave an unstable periodic state; UNSETTLED where it does not settle within
+    `SEARCH_ITERATIONS`.
     """
     budget = run.budget
     budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
     transient = Transient(case, joint)
-    motion = transient.resumed(Transient(case, start_joint).periodic(start))
-    predicted, period = start.predicted_h, 2.0 * np.pi / joint.omega
+    begun, history = Transient(case, start_joint).periodic(start.evaluation).displacement, start.history
+    # amplitudes of a periodic motion that are constant at the frequency of this joint
+    motion = Motion(begun, transient.rates[:, None] * begun)
+    predicted, period = start.evaluation.predicted_h, 2.0 * np.pi / joint.omega
     # the longest step, in periods, is practically infinite: the step is the harmonic balance itself
     length, longest, tried = 1.0, 1.0 / ROUND_OFF, np.inf
-    size = float(np.abs(start.displacement_h).max())
+    size = float(np.abs(start.evaluation.displacement_h).max())
     left = SEARCH_ITERATIONS
     # whether an unstable state has been found, which the motion leaves
     grows = False
@@ -202,11 +177,11 @@ def relax_to_periodic(
         renewed = change < 0.5 * tried or length >= longest
         if change < RELAXED_CHANGE and renewed:
             tried = change
-            begun = budget.iterations
+            before = budget.iterations
             balance = Balance(joint, history, wear_depth)
             # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
             found = run.state(balance, predicted)
-            left -= budget.iterations - begun
+            left -= budget.iterations - before
             if found is not None and not is_stable(balance, found.evaluation, run):
                 grows = True
             elif found and _change(transient.periodic(found.evaluation), motion) < SMOOTH_CHANGE:

@@ -1,10 +1,17 @@
-"""The sweep along the frequencies of a study: nodes common to many points, and the state at each point."""
+"""The sweep along the frequencies of a study: where it begins, nodes common to many points, the state at each point.
+
+A machine passes other frequencies before the point, and the joint keeps their history. So a sweep begins well away from
+the point: for "up" between 0.49 and 0.7 times its frequency, for "down" between 1.3 and 1.85 times. All points of a
+cell, a quarter octave, have one first frequency: the one at which the vibration loads the stuck joint least, so that no
+sweep begins at a resonance. It depends on the scene and on the cell, not on the other points of a study.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,26 +20,35 @@ from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
 from solver.accuracy.refinement import Refined, refine, state_difference
 from solver.continuation.first_state import solve_first_state
 from solver.harmonic_balance.state import State
-from solver.loading_history.path import FREE_STEP, LoadingPath
-from solver.loading_history.path_of_states import Step
+from solver.loading_history.path import FREE_STEP, LoadingPath, Step
 from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep, SweepState
-from solver.loading_history.sweep_start import Direction, Origin, cell_of, find_origin
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
-from solver.settings import Resolution, SolverSettings, all_orders, allowed
+from solver.settings import Direction, Resolution, SolverSettings, allowed
 from solver.stability.floquet import find_instability
+from solver.structure.condensation import build_structure
 from solver.structure.joint import Case, build_case
 
 FIRST_ITERATIONS = SWEEP_ITERATIONS // 8
-"""Most Newton iterations of all attempts to begin a sweep, or to find a state where the sweep is lost. Tens to hundreds
-suffice where some pairs stick; a joint that slips everywhere takes all of them in vain."""
+"""Most Newton iterations to begin a sweep, or to find a state where the sweep is lost; tens to hundreds suffice where
+some pairs stick."""
 
-OTHER_STARTS = ((1, 64), (3, 256), (15, 256))
-"""Harmonics and samples of further attempts to find a first state."""
+OTHER_START = Resolution((1,), 64)
+"""Harmonics and samples of a further attempt to find a first state: four of 54 random scenes need it."""
+
+BEGIN_AWAY = 0.3
+"""Least distance from the start of a sweep to the point, as a fraction of the frequency of the point. With 0.22 and
+0.38 the dovetail has the same state within 2e-3."""
+
+CELLS_PER_OCTAVE = 4
+"""Cells in an octave. The first frequency of the dovetail is 105 Hz, half the resonance."""
+
+START_CANDIDATES = 8
+"""Candidates for the first frequency of a cell, of which the one with the least load on the stuck joint is chosen."""
 
 _REASONS = (Outcome.UNSTABLE, Outcome.ADRIFT, Outcome.UNSETTLED)
 """Outcomes that give the reason for the end of a sweep, not only its end."""
@@ -41,47 +57,43 @@ _REASONS = (Outcome.UNSTABLE, Outcome.ADRIFT, Outcome.UNSETTLED)
 @packable
 @dataclass(frozen=True)
 class FrequencySweepState:
-    """Saved state of a `FrequencySweep`, with which another one goes on.
+    """Saved state of a `FrequencySweep`: cell, frequency of the penalty, rad/s, that of a ramp or None, and nodes."""
 
-    origin, omega: of the current sweep; omega: frequency of a ramp, rad/s, None for a sweep in frequency.
-    nodes: saved state of the sweep.
-    """
-
-    origin: Origin
+    cell: int
+    penalty_omega: float
     omega: float | None
     nodes: SweepState
 
 
+@dataclass(eq=False)
 class FrequencySweep:
-    """The sweep over frequencies: one `Sweep` for all points with a common origin, or one for each point (ramp).
+    """The sweep over frequencies: one `Sweep` for all points of a cell, or one for each point (ramp).
 
+    nodes, cell: the present sweep, and its cell. save: called where it was saved.
     run: of the state at the current frequency, without the sweep to this frequency.
-    save: called where the sweep was saved.
     every: for which states stability is tested, as in `find_instability`.
-    known: frequencies, Hz, and the resolutions that states need there. Each state then takes that of the nearest one;
-        its error is not estimated, and there is no reference sweep. Empty: errors are estimated.
+    known: frequencies, Hz, and resolutions. Where there are some, each state takes that of the nearest one; its error
+        is not estimated, and there is no reference sweep.
     """
 
-    def __init__(
-        self,
-        model: ReducedModel,
-        friction_coefficient: float | FloatArray | None,
-        excitation_amplitude: float,
-        sweep: Direction,
-        settings: SolverSettings,
-    ) -> None:
-        self.model, self.friction_coefficient = model, friction_coefficient
-        self.excitation_amplitude, self.sweep, self.settings = excitation_amplitude, sweep, settings
-        self.every = True
-        self.known: tuple[tuple[float, Resolution], ...] = ()
-        self.save: Callable[[], None] = lambda: None
-        self.run = Run(settings.tolerance)
-        self.origin: Origin | None = None
-        self.nodes: Sweep[State] | None = None
+    model: ReducedModel
+    friction_coefficient: float | FloatArray | None
+    excitation_amplitude: float
+    sweep: Direction
+    settings: SolverSettings
+    every: bool = True
+    known: tuple[tuple[float, Resolution], ...] = ()
+    save: Callable[[], None] = lambda: None
+    nodes: Sweep[State] | None = None
+    cell: int = 0
+    run: Run = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.run = Run(self.settings.tolerance)
 
     @property
     def n_iterations(self) -> int:
-        """Newton iterations to the current frequency: of the sweep from its origin, and of the state."""
+        """Newton iterations to the current frequency: of the sweep from its start, and of the state."""
         return self.run.budget.iterations + (0 if self.nodes is None else self.nodes.n_iterations)
 
     def set_deadline(self, deadline: float) -> None:
@@ -91,14 +103,15 @@ class FrequencySweep:
             self.nodes.set_deadline(deadline)
 
     def state(self) -> FrequencySweepState | None:
-        """What another sweep needs to go on, to be packed; None where nothing is saved yet."""
-        if self.nodes is None or self.origin is None or self.nodes.saved is None:
+        """What another sweep needs to go on; None where nothing is saved yet."""
+        if self.nodes is None or self.nodes.saved is None:
             return None
-        return FrequencySweepState(self.origin, path_of(self.nodes).omega, self.nodes.saved)
+        path = path_of(self.nodes)
+        return FrequencySweepState(self.cell, path.case.penalty_omega, path.omega, self.nodes.saved)
 
     def load(self, state: FrequencySweepState) -> None:
         """Go on from the saved state of another sweep."""
-        self._new_sweep(state.origin, state.omega).load(state.nodes)
+        self._new_sweep(state.cell, state.penalty_omega, state.omega).load(state.nodes)
 
     def go_on_from(self, case: Case, state: State, frequency: float) -> bool:
         """Begin at a known state; False where the state is rejected.
@@ -107,8 +120,7 @@ class FrequencySweep:
         its amplitude over that of the sweep. frequency: to which the sweep goes, Hz.
         """
         ramp, target = self.sweep == "ramp", 2.0 * np.pi * frequency
-        origin = Origin((), case.penalty_omega / (2.0 * np.pi), cell_of(frequency))
-        nodes = self._new_sweep(origin, target if ramp else None)
+        nodes = self._new_sweep(cell_of(frequency), case.penalty_omega, target if ramp else None)
         nodes.direction = 1.0 if (1.0 if ramp else target) >= state.parameter else -1.0
         return nodes.begin(replace(path_of(nodes), case=case), state)
 
@@ -126,11 +138,11 @@ class FrequencySweep:
                 run.budget.limit = run.budget.iterations + FIRST_ITERATIONS
                 first = self._first(path, target, run)
                 if isinstance(first, Outcome):
-                    return self.without_state(why_lost(nodes, first), _where_lost(nodes))
+                    lost = "" if nodes.last is None else f"stable states end {path.describe(nodes.last)}"
+                    return self.without_state(why_lost(nodes, first), lost)
                 path, reached = first[0], Step(first[1])
-            refined = self._at_known(frequency, path.case, omega, reached.state)
-            if refined is None:
-                refined = refine(path.case, omega, self.excitation_amplitude, reached.state, run)
+            at = path.case, omega, self.excitation_amplitude, reached.state, run
+            refined = self._at_known(*at) or refine(*at)
         except np.linalg.LinAlgError:
             return self.without_state(Outcome.SINGULAR)
         # folds of a ramp are load factors
@@ -146,7 +158,7 @@ class FrequencySweep:
         return StartState(
             outcome=outcome,
             state=None,
-            penalty_omega=float("nan") if self.origin is None else 2.0 * np.pi * self.origin.penalty,
+            penalty_omega=math.nan if self.nodes is None else path_of(self.nodes).case.penalty_omega,
             resolution=resolution or used,
             response_error=estimate.response,
             wear_rate_error=estimate.wear_rate,
@@ -162,47 +174,40 @@ class FrequencySweep:
         """
         omega, cell, nodes = 2.0 * np.pi * frequency, cell_of(frequency), self.nodes
         ramp = omega if self.sweep == "ramp" else None
-        same_cell = self.origin is not None and self.origin.cell == cell
-        there = nodes is not None and same_cell and path_of(nodes).omega == ramp
+        there = nodes is not None and self.cell == cell and path_of(nodes).omega == ramp
         if nodes is not None and there and (ramp or beyond or not nodes.has_passed(omega)):
             return nodes
-        origin = find_origin(self.model, cell, self.sweep)
-        nodes = self._new_sweep(origin, ramp)
+        # the penalty belongs to the upper end of the cell
+        nodes = self._new_sweep(cell, 2.0 * np.pi * edge_of(cell + 1), ramp)
         nodes.run.budget.limit = FIRST_ITERATIONS
-        places = [2.0 * np.pi * start for start in origin.starts] or [FREE_STEP]
-        any(self._begin_at(nodes, place) for place in places)
+        place = 2.0 * np.pi * first_frequency(self.model, cell, self.sweep) if ramp is None else FREE_STEP
+        nodes.run.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
+        with contextlib.suppress(np.linalg.LinAlgError):
+            first = self._first(path_of(nodes), place, nodes.run)
+            if isinstance(first, Outcome):
+                nodes.state = replace(nodes.state, failure=first)
+            else:
+                nodes.begin(*first)
         return nodes
 
-    def _new_sweep(self, origin: Origin, omega: float | None) -> Sweep[State]:
-        """A sweep before its first node. omega: frequency of a ramp, rad/s, else None."""
-        case = build_case(self.model, self.friction_coefficient, 2.0 * np.pi * origin.penalty, self.settings)
+    def _new_sweep(self, cell: int, penalty_omega: float, omega: float | None) -> Sweep[State]:
+        """A sweep before its first node. omega: of a ramp, rad/s, else None."""
+        case = build_case(self.model, self.friction_coefficient, penalty_omega, self.settings)
         path, of = LoadingPath(case, self.excitation_amplitude, omega), self.run.budget
         budget = Budget(deadline=of.deadline, report=of.report)
-        self.origin = origin
+        self.cell = cell
         self.nodes = Sweep(path, -1.0 if self.sweep == "down" else 1.0, budget, with_reference=not self.known)
         self.nodes.save = lambda: self.save()
         return self.nodes
 
-    def _begin_at(self, nodes: Sweep[State], place: float) -> bool:
-        """Begin a sweep at a value of its parameter; False where there is no state."""
-        nodes.run.budget.report(f"first state at {(path_of(nodes).omega or place) / (2.0 * np.pi):.6g} Hz")
-        first: tuple[LoadingPath, State] | Outcome = Outcome.START_FAILED
-        with contextlib.suppress(np.linalg.LinAlgError):
-            first = self._first(path_of(nodes), place, nodes.run)
-            if not isinstance(first, Outcome):
-                return nodes.begin(*first)
-        nodes.state = replace(nodes.state, failure=first if isinstance(first, Outcome) else Outcome.START_FAILED)
-        return False
-
     def _first(self, path: LoadingPath, place: float, run: Run) -> tuple[LoadingPath, State] | Outcome:
-        """A state from the static one at a value of the parameter, with the harmonics of a path, or else with others as
-        far as the settings allow them, and its path; or the reason of the first attempt.
+        """A state from the static one at a value of the parameter, and its path, with the harmonics of a path, or else
+        with one; or the reason of the first attempt.
         """
-        others = [Resolution(all_orders(highest), samples) for highest, samples in OTHER_STARTS]
-        allowed_others = [allowed(other, self.settings) for other in others if self.settings.automatic]
+        others = [allowed(OTHER_START, self.settings)] if self.settings.automatic else []
         omega, load = (place, 1.0) if path.omega is None else (path.omega, place)
         unworn, why = np.zeros(self.model.contact.n_contact), list[Outcome]()
-        for resolution in (path.case.resolution, *allowed_others):
+        for resolution in (path.case.resolution, *others):
             at = path.at(resolution)
             found = solve_first_state(at.case, omega, load * self.excitation_amplitude, unworn, run.fresh())
             if isinstance(found, State):
@@ -212,16 +217,14 @@ class FrequencySweep:
                 break
         return why[-1] if why[-1].static else why[0]
 
-    def _at_known(self, frequency: float, case: Case, omega: float, state: State) -> Refined | None:
+    def _at_known(self, case: Case, omega: float, load: float, state: State, run: Run) -> Refined | None:
         """The state with the known resolution; None where none is known, or where the state is not found with it."""
         if not self.known:
             return None
-        _, resolution = min(self.known, key=lambda each: abs(each[0] - frequency))
+        _, resolution = min(self.known, key=lambda each: abs(2.0 * np.pi * each[0] - omega))
         wanted = case.at(resolution)
-        if resolution != case.resolution:
-            moved = self.run.move(case, wanted.joint(omega, self.excitation_amplitude), state)
-            return None if moved is None else Refined(wanted, moved, NOTHING, accurate=True)
-        return Refined(case, state, NOTHING, accurate=True)
+        moved = state if wanted is case else run.move(case, wanted.joint(omega, load), state)
+        return None if moved is None else Refined(wanted, moved, NOTHING, accurate=True)
 
     def _judged(self, refined: Refined, nodes: Sweep[State]) -> StartState:
         """The outcome of a refined state, with its error and the state of the reference sweep."""
@@ -230,7 +233,7 @@ class FrequencySweep:
         if not certify(joint, point.evaluation).holds(self.settings.tolerance):
             return self.without_state(Outcome.CERTIFICATE_FAILED, "", case.resolution, estimate)
         if unstable := find_instability(case, joint, point.evaluation, self.run, self.every):
-            return self.without_state(unstable.outcome, unstable.sentence, case.resolution, estimate)
+            return self.without_state(unstable.outcome, unstable.message, case.resolution, estimate)
         reference = self._reference(nodes, case, point)
         if reference is not None:
             estimate = estimate + state_difference(case, joint, point, reference)
@@ -262,10 +265,30 @@ def why_lost(nodes: Sweep[State], failure: Outcome) -> Outcome:
     return failure if nodes.last is None or failure in _REASONS else Outcome.BRANCH_LOST
 
 
-def _where_lost(nodes: Sweep[State]) -> str:
-    """Sentence with the last parameter of a lost sweep; empty for a sweep that never began."""
-    if nodes.last is None or not nodes.state.lost:
-        return ""
-    if path_of(nodes).omega is not None:
-        return f"the vibration repeats up to {100.0 * nodes.last.parameter:.3g} % of the excitation"
-    return f"the sweep goes on in stable states as far as {nodes.last.parameter / (2.0 * np.pi):.6g} Hz"
+def cell_of(frequency: float) -> int:
+    """Number of the cell of a frequency, Hz."""
+    return math.floor(CELLS_PER_OCTAVE * math.log2(frequency))
+
+
+def edge_of(cell: int) -> float:
+    """Lower end of a cell, Hz."""
+    return float(2.0 ** (cell / CELLS_PER_OCTAVE))
+
+
+def first_frequency(model: ReducedModel, cell: int, sweep: Direction) -> float:
+    """Frequency, Hz, with which a sweep "up" or "down" to the points of a cell begins."""
+    width = 2.0 ** (1.0 / CELLS_PER_OCTAVE)
+    near, away = (1.0 - BEGIN_AWAY) * edge_of(cell), 1.0 / width
+    if sweep == "down":
+        near, away = (1.0 + BEGIN_AWAY) * edge_of(cell + 1), width
+    frequencies = [float(at) for at in np.geomspace(near * away, near, START_CANDIDATES + 1)]
+    loads = []
+    for frequency in frequencies:
+        try:
+            structure = build_structure(model, 2.0 * np.pi * frequency, 1.0, (1,))
+            loads.append(float(np.linalg.norm(structure.harmonic_force)))
+        except np.linalg.LinAlgError:
+            loads.append(math.inf)
+    # of equally good frequencies the farthest: round-off must not decide
+    least = min(loads) * (1.0 + 1e-6)
+    return next(at for at, load in zip(frequencies, loads, strict=True) if load <= least)

@@ -1,4 +1,4 @@
-"""The unworn joint along its frequency or its excitation: from a stable state to a stable state.
+"""What a sweep goes along, and the unworn joint along its frequency or its excitation.
 
 `LoadingPath.solve` solves one balance, which starts on the parabola through the last three states. Where Newton's
 method fails or the state is unstable, `LoadingPath.rescue` goes on by smaller natural steps to the end of the branch.
@@ -8,32 +8,31 @@ The structure then settles in time a little beyond this end, as in a slow sweep 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.period_events import left_out, nothing_happens
+from solver.accuracy.harmonic_levels import left_out, nothing_happens
 from solver.accuracy.refinement import KEPT_FRACTION, NODE_UNKNOWNS, Refined, refine
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.prolongation import carried_history
-from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
-from solver.loading_history.path_of_states import Step
+from solver.harmonic_balance.state import State, carried_history, history_at_rest, vibration_change, vibration_size
 from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, first_resolution
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3
 """Fraction of the parameter: length of the steps with smaller natural steps, or settling in time, where a branch
-ends. The load factor at which a ramp begins; the amplitude at which a nonlinear mode begins, as vibrating contact
-forces over the friction limits (with ten times the value and with a tenth the nodes lie elsewhere: the damping of the
-dovetail changes by 7e-5 and 1e-3); its smallest growth from node to node."""
+ends. Also the load factor at which a ramp begins, and for a nonlinear mode its first amplitude, as vibrating contact
+forces over the friction limits, and its smallest growth from node to node (with ten times the value and with a tenth
+the damping of the dovetail changes by 7e-5 and 1e-3)."""
 
 LONGEST_STEP = 0.1
 """Longest step, as a fraction of the parameter."""
@@ -43,19 +42,82 @@ SHORTEST_STEP = 2e-5
 resonance in such steps."""
 
 CHANGE_PER_RTOL = 20.0
-"""Largest relative change of the vibration in a step, over rtol. Dovetail of 48 pairs, compared with steps twenty times
-as short, 211 to 212.5 Hz: errors of the motion up to 0.8 % with a largest change of 0.2, up to 0.1 % with 0.05."""
+"""Largest relative change of the vibration in a step, over rtol."""
 
 CHANGE_LIMITS = (0.05, 0.2)
-"""Limits of the largest change, see above. Blade root of the deck `blade_root`, rtol 5e-2: the wear rates with 0.2 and
-0.03 differ by 0.04 %, for 620 and 1680 iterations."""
+"""Limits of this change. Dovetail of 48 pairs, 211 to 212.5 Hz, compared with steps twenty times as short: errors of
+the motion up to 0.8 % with a largest change of 0.2, up to 0.1 % with 0.05. Blade root of the deck `blade_root`: the
+wear rates with 0.2 and 0.03 differ by 0.04 %, for 620 and 1680 iterations."""
 
 SMALL_VIBRATION = 0.3
-"""Fraction of the friction limits: changes of a smaller vibration are relative to this fraction. With 1 the error of
-the motion at 211 Hz is three times as large, with 0 there are a few nodes more."""
+"""Fraction of the friction limits to which changes of a smaller vibration are relative. With 1 the error of the motion
+of the dovetail at 211 Hz is three times as large, with 0 there are a few nodes more."""
 
 LEAST_SLIP = 1e-3
 """Slip of a pair over its motion above which it forgets its history."""
+
+
+S = TypeVar("S", bound=State)
+
+
+@dataclass(frozen=True)
+class Step(Generic[S]):
+    """End of a step: its state, and values of the parameter at the folds that the step has jumped over."""
+
+    state: S
+    folds: tuple[float, ...] = ()
+
+
+class Path(Protocol[S]):
+    """The joint along a parameter, with the harmonics and samples of its case."""
+
+    @property
+    def case(self) -> Case:
+        """Model and settings."""
+
+    @property
+    def steps(self) -> tuple[float, float, float]:
+        """Shortest and longest step, and the one at which a state that is not found is left to `rescue`."""
+
+    @property
+    def node_tolerance(self) -> float:
+        """Tolerance of the scaled residual of a node; results are solved to that of the settings."""
+
+    def ahead(self, parameter: float, length: float) -> float:
+        """The parameter a step farther, or back where the length is below 0."""
+
+    def solve(self, states: tuple[S, ...], target: float, run: Run) -> S | None:
+        """Stable state at a target near the last of some states, which leaves its history to it; None if not found."""
+
+    def rescue(self, start: S, target: float, run: Run) -> Step[S] | Outcome:
+        """State at a target that `solve` does not find, or why there is none."""
+
+    def change(self, before: S, after: S, wider: float) -> float:
+        """Change over a step, over the largest change allowed times `wider`."""
+
+    def rests(self, state: S) -> bool:
+        """Whether no pair slips or opens within the period."""
+
+    def forgets(self, state: S) -> bool:
+        """Whether each pair slips or opens within the period, so that the state follows from its parameter alone."""
+
+    def differs(self, before: S, after: S) -> float:
+        """Relative change of the vibration between two states."""
+
+    def at(self, resolution: Resolution) -> Path[S]:
+        """The path with other harmonics and samples."""
+
+    def move(self, state: S, other: Any, run: Run) -> S | None:
+        """The state with the harmonics and samples of another path; None where not found."""
+
+    def choose(self, state: S, run: Run) -> tuple[Path[S], S, Estimate]:
+        """Path and state with the harmonics that the state needs, or the most allowed, and its estimated error."""
+
+    def suffices(self, checked: S, error: float, state: S) -> bool:
+        """Whether the harmonics chosen for an earlier state, with an estimated error, are about those of a state."""
+
+    def describe(self, state: S) -> str:
+        """Where the path is, in words."""
 
 
 def largest_change(rtol: float, wider: float, *, sticks: bool) -> float:
@@ -68,12 +130,9 @@ def largest_change(rtol: float, wider: float, *, sticks: bool) -> float:
 
 @dataclass(frozen=True)
 class LoadingPath:
-    """The unworn joint along its frequency or its excitation, which is the parameter of the path.
+    """The unworn joint along its frequency, rad/s, or along the load factor on its excitation.
 
-    case: model, friction and settings.
-    excitation_amplitude: N.
-    omega: None where the parameter is the frequency, rad/s; else the fixed frequency, rad/s, and the parameter is the
-        load factor on the amplitude.
+    excitation_amplitude: N. omega: of a path along the load, rad/s; None along the frequency.
     """
 
     case: Case
@@ -90,13 +149,9 @@ class LoadingPath:
         """Unworn balance at a value of the parameter. history (n_contact, 2): m."""
         return Balance(self.joint_at(parameter), history, np.zeros(self.case.model.contact.n_contact))
 
-    def scale(self, parameter: float) -> float:
-        """Reference value for the lengths of steps."""
-        return abs(parameter) if self.omega is None else 1.0
-
     @property
     def steps(self) -> tuple[float, float, float]:
-        """As in Path, over the scale."""
+        """As in Path, over the frequency or the whole load."""
         return SHORTEST_STEP, LONGEST_STEP, FREE_STEP
 
     @property
@@ -106,10 +161,9 @@ class LoadingPath:
 
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path; a ramp ends at its whole load."""
-        target = parameter + length * self.scale(parameter)
         if self.omega is None:
-            return target
-        return min(target, 1.0) if length > 0.0 else max(target, 1.0)
+            return parameter + length * parameter
+        return min(parameter + length, 1.0) if length > 0.0 else max(parameter + length, 1.0)
 
     def solve(self, states: tuple[State, ...], target: float, run: Run) -> State | None:
         """As in Path, by Newton's method alone, from the polynomial through the states."""
@@ -125,18 +179,17 @@ class LoadingPath:
     def rescue(self, start: State, target: float, run: Run) -> Step[State] | Outcome:
         """As in Path: by natural steps and settling in time, in turns until the target."""
         state = replace(start, history=history_at_rest(self.joint_at(start.parameter), start))
-        fine, folds = FREE_STEP * self.scale(target), list[float]()
+        fine, folds = FREE_STEP * (target if self.omega is None else 1.0), list[float]()
         while not run.budget.exhausted:
             end, arrived = follow_naturally(self.balance_at, state, target, run, fine=fine)
             balance = self.balance_at(end.parameter, end.evaluation.history)
             if arrived and is_stable(balance, end.evaluation, run):
                 return Step(end, tuple(folds))
-            # natural steps may have passed the unknown start of an unstable part: then the search begins before them
+            # natural steps may have passed the start of an unstable part: then the search begins before them
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
             joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
-            unworn = np.zeros(self.case.model.contact.n_contact)
-            settled = relax_to_periodic(self.case, joint, unworn, end.evaluation, before, end.history, run)
+            settled = relax_to_periodic(self.case, joint, balance.wear_depth, end, before, run)
             if isinstance(settled, Outcome):
                 return settled
             # a fold with a smaller change is a corner of the branch
@@ -163,7 +216,7 @@ class LoadingPath:
         return nothing_happens(state.evaluation)
 
     def forgets(self, state: State) -> bool:
-        """As in Path; slip over less than a fraction of the motion of its pair does not count."""
+        """As in Path; slip over a small fraction of the motion of its pair does not count."""
         at = state.evaluation
         opens = (at.status_t == SEPARATED).any(axis=1)
         slip = np.ptp(at.state_t, axis=2).max(axis=1) / self.joint_at(state.parameter).law.state_stiffness
@@ -196,10 +249,9 @@ class LoadingPath:
         return replace(self, case=found.case), found.point, found.estimate
 
     def suffices(self, checked: State, error: float, state: State) -> bool:
-        """As in Path.
+        """As in Path: the error grows and falls with the part of the contact force in harmonics that are left out.
 
-        Where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice. Otherwise
-        the error grows and falls with the part of the contact force in harmonics that are left out.
+        Where all pairs slip and none opens, a node only serves to begin the next one: any harmonics suffice.
         """
         settings, resolution = self.case.settings, self.case.resolution
         slides = self.forgets(state) and not (state.evaluation.status_t == SEPARATED).any()

@@ -4,26 +4,36 @@
   bends over, the two directions find different states.
 - "ramp": the excitation is raised slowly at the frequency of the point, as at the onset of flutter or of a flow
   disturbance at constant speed. Every point is independent of all others.
+
+A history with followed frequency begins at the resonance that the sweep "up" or "down" meets first in a range: between
+two nodes, where the phase lag passes pi/2. A resonance that the sweep jumps over, from a fold to a branch beyond, is
+none of its states. The largest amplitude is sought from there, and the sweep then leads to its frequency: along the
+sweep the amplitude has small maxima where pairs begin to slip, far from any resonance.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from solver.clock import computing_time
-from solver.harmonic_balance.state import Failure
-from solver.loading_history.frequency_sweep import FrequencySweep
-from solver.loading_history.resonance_search import find_resonance
-from solver.loading_history.sweep_start import Direction
+from solver.continuation.phase_lag import phase_lag, solve_at_lag, solve_at_peak
+from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import Failure, State, history_at_rest
+from solver.loading_history.frequency_sweep import FrequencySweep, cell_of, edge_of, why_lost
+from solver.loading_history.path import FREE_STEP, Step
+from solver.loading_history.sweep import Sweep
 from solver.model import FloatArray, ReducedModel
-from solver.newton.run import OutOfTimeError
+from solver.newton.run import Budget, OutOfTimeError, Run
 from solver.outcome import Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
-from solver.settings import FollowedFrequency, SolverSettings
+from solver.settings import Direction, FollowedFrequency, SolverSettings
+from solver.stability.floquet import is_stable
 
 
 def follow_branch(
@@ -38,14 +48,11 @@ def follow_branch(
 ) -> Iterator[tuple[int, StartState]]:
     """Unworn periodic states at given frequencies, one by one, in the order of the sweep: index and state.
 
-    A state depends on its own frequency only: the sweep begins at a frequency common to all points of a quarter octave
-    (`sweep_start`) and chooses its own steps (`sweep`). Where the branch ends, the structure settles in time from the
-    last state, as in a slow sweep of the machine. The last attempt starts from the static state.
+    A state depends on its own frequency only. Where the branch ends, the structure settles in time from the last state,
+    as in a slow sweep of the machine. The last attempt starts from the static state.
 
     friction_coefficient: of all pairs or of each pair. excitation_amplitude: N.
     frequencies: Hz, ascending. Or what is sought in a range of frequencies: the first resonance that the sweep meets.
-    sweep: "up" or "down" along the frequency, or "ramp" of the excitation at a given frequency.
-    settings: harmonics, samples, tolerances, limit of time.
     keep: called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
         position and the activity of the sweep, in words.
     resume: progress, as given to `keep`, of a sweep that differs in its frequencies only. The sweep goes on from there
@@ -76,15 +83,12 @@ def follow_line(
     for index in np.arange(n_states)[:: -1 if line.sweep == "down" else 1].tolist():
         line.set_deadline(started + line.settings.time_limit)
         try:
-            wanted: float | Failure
             if isinstance(frequencies, FollowedFrequency):
-                wanted = find_resonance(line, frequencies)
+                found = line.advance(find_resonance(line, frequencies))
             else:
-                wanted = float(frequencies[index])
-            if isinstance(wanted, Failure):
-                found = line.without_state(wanted.outcome, wanted.message)
-            else:
-                found = line.advance(wanted)
+                found = line.advance(float(frequencies[index]))
+        except _NoResonanceError as error:
+            found = line.without_state(error.failure.outcome, error.failure.message)
         except OutOfTimeError:
             found = line.without_state(Outcome.TIME_LIMIT)
         except Exception as error:
@@ -94,3 +98,82 @@ def follow_line(
         yield index, replace(found, newton_iterations=line.n_iterations, run_time=now - started)
         started = now
         save()
+
+
+class _NoResonanceError(Exception):
+    """The sweep meets no resonance."""
+
+    def __init__(self, message: str, outcome: Outcome = Outcome.RESONANCE_LOST) -> None:
+        super().__init__(message)
+        self.failure = Failure(outcome, message)
+
+
+def find_resonance(line: FrequencySweep, follow: FollowedFrequency) -> float:
+    """Frequency of the first resonance that a sweep meets in a range, Hz. Raises _NoResonanceError.
+
+    line: sweep "up" or "down", at its beginning or as saved on its way.
+    """
+    for near, far in _segments(follow, line.sweep == "down"):
+        # the state at a frequency belongs to the sweep of its cell
+        nodes = line.sweep_to(0.5 * (near + far), beyond=True)
+        nodes.advance_to(2.0 * math.pi * near)
+        while (here := nodes.here) is not None and (step := nodes.ahead) is not None:
+            found = _resonance_between(line, nodes, here, step, follow)
+            if found is not None:
+                return found
+            end = step.state.parameter
+            if (2.0 * math.pi * far - end) * nodes.direction <= 0.0:
+                break
+            nodes.advance_to(float(np.nextafter(end, nodes.direction * math.inf)))
+        else:
+            at = near if nodes.last is None else nodes.last.parameter / (2.0 * math.pi)
+            said = f"the sweep {line.sweep} ends at {at:.6g} Hz and has met no resonance until there"
+            raise _NoResonanceError(said, why_lost(nodes, nodes.state.failure or Outcome.BRANCH_LOST))
+    raise _NoResonanceError(
+        f"the sweep {line.sweep} meets no {follow.of} between {follow.low:g} and {follow.high:g} Hz: give another range"
+    )
+
+
+def _segments(follow: FollowedFrequency, down: bool) -> Iterator[tuple[float, float]]:
+    """Parts of a range, Hz, in each of which one sweep passes all frequencies, in the order of the sweep."""
+    edges = [edge_of(cell) for cell in range(cell_of(follow.low) + 1, cell_of(follow.high) + 1)]
+    parts = pairwise([follow.low, *(edge for edge in edges if follow.low < edge < follow.high), follow.high])
+    return ((high, low) for low, high in reversed(list(parts))) if down else parts
+
+
+def _resonance_between(
+    line: FrequencySweep, nodes: Sweep[State], here: State, step: Step[State], follow: FollowedFrequency
+) -> float | None:
+    """Frequency, Hz, of a resonance between two nodes, with the history of the first one; None where there is none."""
+    case, load, ahead = nodes.path.case, line.excitation_amplitude, step.state
+    # positive before a resonance on the way of the sweep, negative behind
+    one, other = (
+        nodes.direction * math.cos(phase_lag(case.joint(at.parameter, load), at.evaluation)) for at in (here, ahead)
+    )
+    if not one > 0.0 >= other:
+        return None
+    part = 0.0 if step.folds else one / (one - other)
+    joint = case.joint(here.parameter + part * (ahead.parameter - here.parameter), load)
+    balance = Balance(joint, history_at_rest(joint, here), here.evaluation.wear_depth)
+    before = here.evaluation.predicted_h
+    run = Run(line.settings.tolerance, Budget(deadline=line.run.budget.deadline))
+    start = before + part * (ahead.evaluation.predicted_h - before)
+    found = solve_at_lag(case, balance, start, 0.5 * math.pi, run)
+    omega = math.nan if found is None else float(found.values[0])
+    if not abs(omega - joint.omega) <= 2.0 * abs(ahead.parameter - here.parameter):
+        # none, or another resonance
+        found = None
+    for fold in step.folds:
+        before_fold = (fold - omega) * nodes.direction > FREE_STEP * fold
+        if found is None or not before_fold or not is_stable(found.balance, found.at, run):
+            back = "down" if line.sweep == "up" else "up"
+            over = f"resonance at {fold / (2.0 * math.pi):.6g} Hz"
+            raise _NoResonanceError(f'the sweep {line.sweep} jumps over the {over}: give sweep = "{back}"')
+    if found is not None and not follow.low <= omega / (2.0 * math.pi) <= follow.high:
+        return None
+    if found is not None and follow.of == "peak":
+        peak = solve_at_peak(case, found.balance, found.at.predicted_h, 0.5 * math.pi, run)
+        found = None if peak is None else peak[0]
+    if found is None:
+        raise _NoResonanceError(f"no {follow.of} is found near {joint.omega / (2.0 * math.pi):.6g} Hz")
+    return float(found.values[0]) / (2.0 * math.pi)

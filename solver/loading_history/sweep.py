@@ -1,17 +1,15 @@
 """A slow sweep along a path: states with steps of their own, which leave the joint as the machine would.
 
-Friction gives a joint a family of periodic states. The tangential displacements at which the pairs stick select one of
-them, and these displacements depend on all vibration before. So a sweep has nodes of its own, whose distance depends
-only on the change of the vibration from node to node. A state between two nodes is solved from the node before and
-leaves the sweep unchanged. So the state of a point does not depend on the other points of the study.
+Friction gives a joint a family of periodic states. The tangential displacements at which the pairs stick select one,
+and these depend on all vibration before. So a sweep has nodes of its own, whose distance depends only on the change of
+the vibration. A state between two nodes is solved from the node before and leaves the sweep unchanged.
 
 The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
 slip, up to one step too early. A reference sweep has a node in the middle of every third step, and harmonics one level
-lower where these are automatic. The difference of both sweeps is at least half the error of the finer one, and as a
-rule the error of the coarser one; with common nodes both might keep the same history too early. There is no reference
-as long as nothing slips or opens, and where each pair slips or opens within the period: such a state follows from its
-parameter alone. Where the sweep jumps over a fold, its reference begins anew behind the jump: the place of a jump is no
-measure of the error by steps.
+lower where these are automatic. The difference of both sweeps is at least half the error of the finer one; with common
+nodes both might keep the same history too early. There is no reference as long as nothing slips or opens, and where
+each pair slips or opens within the period: such a state follows from its parameter alone. Behind a fold the reference
+begins anew: the place of a jump is no measure of the error by steps.
 """
 
 from __future__ import annotations
@@ -26,18 +24,23 @@ import numpy as np
 from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.harmonic_levels import fewer
 from solver.accuracy.refinement import VIBRATION_RECHECK
+from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.path_of_states import Nodes, Path, S, Step
-from solver.march.steps import LARGEST_STEP_RATIO, Lengths, take_step
+from solver.loading_history.path import Path, S, Step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
+from solver.settings import Resolution
+
+KEPT_NODES = 3
+"""Last nodes that a sweep keeps: the next one is predicted on the parabola through them. With two, and a straight line,
+the nodes of the slider take 7 % more iterations."""
 
 AIMED_CHANGE = 0.75
 """Expected change of the vibration in the next step over the largest change. Few steps are refused."""
 
 SWEEP_ITERATIONS = 8000
-"""Most Newton iterations of a sweep: more in jumps and searches are in vain (the dovetail takes 300)."""
+"""Most Newton iterations of a sweep (the dovetail takes 300)."""
 
 NODE_ITERATIONS = 5 * SWEEP_ITERATIONS // 16
 """Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""
@@ -53,27 +56,37 @@ STEPS_OF_REFERENCE = 3
 
 @packable
 @dataclass(frozen=True)
+class Nodes:
+    """The last nodes of a sweep, with equal harmonics; the current one is the last."""
+
+    resolution: Resolution
+    states: tuple[Any, ...] = ()
+
+    def then(self, state: Any) -> Nodes:
+        """With one node more."""
+        return replace(self, states=(*self.states, state)[-KEPT_NODES:])
+
+
+@packable
+@dataclass(frozen=True)
 class SweepState:
     """State of a sweep at a node, with which the sweep goes on.
 
-    nodes: the last nodes; those before its end where the sweep is lost.
+    failure: why there is no state, at the start or behind the last node; None where there is one.
     length: of the next step. rate: change in the last one, over the largest change allowed, per length.
     checked, error: the node at which the harmonics were chosen, and its largest estimated error.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
-    lost, failure: whether the sweep has ended, and the reason why there is no state.
-    iterations: Newton iterations so far.
     reference: last nodes of the reference sweep, None for none; skipped: parameters of the nodes since then.
     """
 
     nodes: Nodes
+    failure: Outcome | None = Outcome.START_FAILED
     length: float = 0.0
     rate: float = 0.0
     checked: Any = None
     error: float = 0.0
     branch: int = 0
     fold: float = math.nan
-    lost: bool = False
-    failure: Outcome = Outcome.START_FAILED
     iterations: int = 0
     reference: Nodes | None = None
     skipped: tuple[float, ...] = ()
@@ -82,11 +95,8 @@ class SweepState:
 class Sweep(Generic[S]):
     """A sweep, node by node, up (direction 1) or down (-1) along the parameter of its path.
 
-    state: at the current node. saved: at the last saved node; a sweep resumed from there is equal to the last bit.
-    ahead: the next node, where it is known.
-    passed: parameters of the nodes so far.
-    save: called where the sweep was saved.
-    with_reference: whether a reference sweep follows.
+    state, saved: at the current node, and at the last saved one. ahead: the next node, where it is known.
+    passed: parameters of the nodes so far. save: called where the sweep was saved.
     """
 
     def __init__(self, path: Path[S], direction: float, budget: Budget, *, with_reference: bool = False) -> None:
@@ -123,7 +133,7 @@ class Sweep(Generic[S]):
     @property
     def here(self) -> S | None:
         """The current node, None where there is no state."""
-        return None if self.state.lost else self.last
+        return self.last if self.state.failure is None else None
 
     @property
     def reference(self) -> tuple[Path[S], tuple[S, ...]] | None:
@@ -132,15 +142,15 @@ class Sweep(Generic[S]):
         return None if found is None else (self.path.at(found.resolution), found.states)
 
     def begin(self, path: Path[S], state: S) -> bool:
-        """Take the first state, which has the harmonics and samples of a path; False where the state is rejected.
+        """Take the first state, which has the harmonics and samples of a path; False where it is rejected.
 
-        A state that more harmonics change by more than half is rejected: one harmonic can give a joint that slips and
-        opens everywhere a state that does not exist.
+        One harmonic can give a joint that slips and opens everywhere a state that does not exist: more harmonics change
+        it by more than half.
         """
         self._forget()
         self.path, self.passed = path, [state.parameter]
         nodes = Nodes(path.case.resolution, (state,))
-        self.state = replace(self.state, nodes=nodes, length=path.steps[1], lost=False)
+        self.state = replace(self.state, nodes=nodes, length=path.steps[1], failure=None)
         if self._choose_resolution() > SENSITIVE_ERROR:
             self.state = replace(self.state, nodes=replace(nodes, states=()), failure=Outcome.UNSETTLED)
             return False
@@ -148,30 +158,29 @@ class Sweep(Generic[S]):
         return True
 
     def has_passed(self, parameter: float) -> bool:
-        """Whether a value of the parameter lies before the current node, or before the end of a lost sweep."""
+        """Whether a value of the parameter lies before the last node."""
         return self.last is not None and (parameter - self.last.parameter) * self.direction < 0.0
 
     def advance_to(self, parameter: float) -> None:
-        """Go on until the next node lies at or beyond a value of the parameter, or until the branch is lost."""
+        """Go on until the next node lies at or beyond a value of the parameter, or the sweep is lost."""
         try:
-            while self.here is not None:
+            while (here := self.here) is not None:
                 if self.ahead is None:
-                    self._look_ahead(self.here)
+                    self._look_ahead(here)
                 elif (self.ahead.state.parameter - parameter) * self.direction >= 0.0:
                     return
                 else:
-                    self._advance(self.here, self.ahead)
+                    self._advance(here, self.ahead)
         except np.linalg.LinAlgError:
-            self.state, self.ahead = replace(self.state, lost=True), None
+            self._lose(Outcome.START_FAILED)
 
     def state_at(self, parameter: float, run: Run) -> Step[S] | Outcome:
         """State at a parameter between the current and the next node, or why there is none.
 
-        A state beyond a fold is solved backwards from the next node, to which the sweep has jumped.
-        run: of its own; the sweep must not depend on this state.
+        Beyond a fold it is solved backwards from the next node. run: of its own; the sweep must not depend on it.
         """
         if self.here is None or self.ahead is None:
-            return self.state.failure
+            return self.state.failure or Outcome.BRANCH_LOST
         ahead, before = self.ahead, self.state.nodes.states[:-1]
         beyond = tuple(at for at in ahead.folds if (parameter - at) * self.direction > 0.0)
         if beyond and parameter != ahead.state.parameter:
@@ -208,18 +217,22 @@ class Sweep(Generic[S]):
         budget, (shortest, longest, rescue) = self.run.budget, self.path.steps
         budget.report(self.path.describe(here))
         budget.limit = budget.iterations + NODE_ITERATIONS
-        taken: tuple[Step[S], float] | Failure = Failure(Outcome.BRANCH_LOST)
-        if budget.iterations <= SWEEP_ITERATIONS:
-            self._rate = 0.0
-            taken = take_step(self, here, self.state.length, Lengths(1, AIMED_CHANGE, shortest, rescue))
+        if budget.iterations > SWEEP_ITERATIONS:
+            self._lose(Outcome.BRANCH_LOST)
+            return
+        self._rate = 0.0
+        taken = take_step(self, here, self.state.length, Lengths(1, AIMED_CHANGE, shortest, rescue))
         if isinstance(taken, Failure):
-            self.state = replace(self.state, failure=taken.outcome, lost=True)
-        else:
-            self.ahead, length = taken
-            # the change will grow as in the last step: towards a resonance every third step would be refused
-            growth = self._rate / self.state.rate if self.state.rate > 0.0 else 1.0
-            length = min(length / min(max(growth, 1.0), LARGEST_STEP_RATIO), longest)
-            self.state = replace(self.state, length=length, rate=self._rate)
+            self._lose(taken.outcome)
+            return
+        self.ahead, length = taken
+        # the change will grow as in the last step: towards a resonance every third step would be refused
+        growth = self._rate / self.state.rate if self.state.rate > 0.0 else 1.0
+        length = min(length / min(max(growth, 1.0), LARGEST_STEP_RATIO), longest)
+        self.state = replace(self.state, length=length, rate=self._rate)
+
+    def _lose(self, failure: Outcome) -> None:
+        self.state, self.ahead = replace(self.state, failure=failure), None
 
     def _advance(self, before: S, step: Step[S]) -> None:
         """Make the next node the current one."""
@@ -249,7 +262,8 @@ class Sweep(Generic[S]):
         if self.state.reference is None:
             if self.path.rests(step.state):
                 return
-            self._begin_reference(self.path, before)
+            begun = self._reference_at(self.path, before) or Nodes(self.path.case.resolution, (before,))
+            self.state = replace(self.state, reference=begun)
         skipped = self.state.skipped
         if len(skipped) < STEPS_OF_REFERENCE - 1:
             self.state = replace(self.state, skipped=(*skipped, step.state.parameter))
@@ -268,25 +282,16 @@ class Sweep(Generic[S]):
                 nodes = None if found is None else nodes.then(found)
         return nodes
 
-    def _begin_reference(self, path: Path[S], node: S) -> bool:
-        """Begin the reference sweep at a state of a path, with harmonics one level lower than those of the sweep.
-
-        False where the state is not found with these harmonics, and the state itself is taken.
-        """
-        wanted = self.path.at(fewer(self.state.nodes.resolution, self.path.case.settings))
-        moved: S | None = node
-        if wanted.case.resolution != path.case.resolution:
-            moved = path.move(node, wanted, self.run)
-        resolution = (path if moved is None else wanted).case.resolution
-        reference = Nodes(resolution, (node if moved is None else moved,))
-        self.state, self._reference_run = replace(self.state, reference=reference), self.run.fresh()
-        return moved is not None
+    def _reference_at(self, path: Path[S], node: S) -> Nodes | None:
+        """The reference sweep at a state of a path, with one level of harmonics fewer; None where it is not found."""
+        wanted = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
+        same = wanted.case.resolution == path.case.resolution
+        moved = node if same else path.move(node, wanted, self.run)
+        self._reference_run = self.run.fresh()
+        return None if moved is None else Nodes(wanted.case.resolution, (moved,))
 
     def _choose_resolution(self) -> float:
-        """Choose the harmonics and samples of the nodes for the current state, as far as they are automatic.
-
-        Returns the estimated relative error of the response, 0 for fixed settings.
-        """
+        """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
         nodes, error = self.state.nodes, NOTHING
         here = nodes.states[-1]
         if self.path.case.settings.automatic:
@@ -302,9 +307,13 @@ class Sweep(Generic[S]):
         """Take the current node with other harmonics and samples; those of the reference sweep follow."""
         before, self.path, self.run = self.reference, path, self.run.fresh()
         self.state = replace(self.state, nodes=Nodes(path.case.resolution, (state,)))
-        if before is not None and not self._begin_reference(before[0], before[1][-1]):
-            self._begin_reference(path, state)
+        if before is None:
+            return
+        reference = self._reference_at(before[0], before[1][-1])
+        if reference is None:
+            reference = self._reference_at(path, state) or self.state.nodes
             self.state = replace(self.state, skipped=())
+        self.state = replace(self.state, reference=reference)
 
     def _save(self) -> None:
         """Save the current node, and drop all that a resumed sweep would not have."""

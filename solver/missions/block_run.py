@@ -16,10 +16,9 @@ from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.loading_history.frequency_sweep import FrequencySweep
 from solver.loading_history.path import LoadingPath
-from solver.loading_history.path_of_states import KEPT_NODES
 from solver.loading_history.start_states import follow_line
-from solver.loading_history.sweep_start import Direction
-from solver.missions.blocks import Block, Mission
+from solver.loading_history.sweep import KEPT_NODES
+from solver.missions.mission import Block, Mission
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
@@ -27,15 +26,13 @@ from solver.packing import in_rows, packable
 from solver.results.history import StartState
 from solver.results.state_report import periodic_state
 from solver.results.verdict import first_cut_off
-from solver.settings import Resolution, SolverSettings
+from solver.settings import Direction, Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
-from solver.wear.control import Adaptive
-from solver.wear.integrate import Ended
+from solver.wear.integrate import Integrations, Like, SlowTime
 from solver.wear.rate_slope import rate_slope
-from solver.wear.solutions import Like, SlowTime, Solutions
-from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.step import Adaptive
+from solver.wear.wearing_joint import WearingJoint, WearState
 
 NODES_OF_A_REFERENCE_STEP = 3
 """Nodes of the sweep of a block in one step of its reference solution: the difference of both is twice the error by the
@@ -46,7 +43,7 @@ LARGEST_CHANGE = 2.0
 
 CHANGE_OF_A_WAY = 0.5
 """Change of the vibration behind such a sweep, after which the sweep chooses its nodes anew and its error is estimated
-again. A state without its way is left after `smooth_change`, as only the way tells on which branch it lies."""
+again. A state without its way is left after `SMOOTH_CHANGE`, as only the way tells on which branch it lies."""
 
 MOST_HALVINGS = 12
 """Most halvings of the distance of two such nodes in one sweep, to come past a corner at the resonance."""
@@ -104,8 +101,7 @@ class BlockRun:
 class BlockCase:
     """What a block is computed with.
 
-    mission, place: the mission, and the place of the block in it.
-    depth (n_contact,): m, worn before the block.
+    mission, place: the mission, and the place of the block in it. depth (n_contact,): m, worn before the block.
     deadline: CPU time of the thread, s, at which the time of the history is over.
     carried: state that the block continues; None for a block that begins anew.
     begun, like: of this block in an earlier mission, and in the history for its reference solution; else None.
@@ -152,24 +148,17 @@ class BlockCase:
 
     def line(self, sweep: Direction, amplitude: float | None = None) -> FrequencySweep:
         """A sweep at the depth before the block. amplitude: N; that of the block if not given."""
-        block, model = self.block, self.model
-        load = block.excitation_amplitude if amplitude is None else amplitude
-        line = FrequencySweep(model, block.friction_coefficient, load, sweep, self.settings)
+        load = self.block.excitation_amplitude if amplitude is None else amplitude
+        line = FrequencySweep(self.model, self.block.friction_coefficient, load, sweep, self.settings)
         line.every = self.every
         line.set_deadline(self.deadline)
         return line
 
-    def work(self, start: StartState) -> WearingJoint:
-        """The joint at the depth before the block, with harmonics, samples and penalty of a state."""
-        friction, mission = self.block.friction_coefficient, self.mission
-        assert start.state is not None
-        case = build_case(self.model, friction, start.penalty_omega, self.settings, start.resolution)
-        return WearingJoint(case, start, mission.wear_coefficient, mission.law.begun_at(self.depth))
-
     def begin(self, start: StartState) -> tuple[WearingJoint, WearState]:
-        """The joint at the depth before the block, and a state as its first one."""
-        work = self.work(start)
-        assert start.state is not None
+        """The joint at the depth before the block, with harmonics, samples and penalty of a state, and this state."""
+        friction, mission = self.block.friction_coefficient, self.mission
+        case = build_case(self.model, friction, start.penalty_omega, self.settings, start.resolution)
+        work = WearingJoint(case, start, mission.wear_coefficient, mission.law.begun_at(self.depth))
         # the limit of the explicit step is not asked for
         return work, work.begin(np.inf)
 
@@ -179,11 +168,12 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     start, begun = find_start(case)
     if start.state is None:
         return Failure(start.outcome, start.message)
-    law, (_, cycles) = case.mission.law.begun_at(case.depth), case.block.steady
-    work, counts = case.work(start), np.array([0.0, cycles])
-    asked = SlowTime(work.wear_coefficient, Adaptive(work.case.settings.rtol), counts, law=law, ends_at_last=True)
-    solutions = Solutions(work.case, start, asked)
-    ended = solutions.history(stable_end=case.every) if case.like is None else solutions.follow(case.like, counts)
+    (work, _), cycles = case.begin(start), case.block.steady[1]
+    counts = np.array([0.0, cycles])
+    asked = SlowTime(work.wear_coefficient, Adaptive(work.case.settings.rtol), counts, law=work.law, ends_at_last=True)
+    solve = Integrations(work.case, start)
+    like, every = case.like, case.every
+    ended = solve.history(asked, stable_end=every) if like is None else solve.reference(asked, like, counts)
     state = ended.state
     if state is None or ended.failure.outcome is not Outcome.CONVERGED:
         return ended.failure
@@ -207,8 +197,8 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         inaccurate=state.worst.largest if state.inaccurate_from <= cycles else 0.0,
         held=state.held_from <= cycles,
         cut_off=not math.isnan(first_cut_off(case.model.contact, counts, values["mean_pressure"], depth)),
-        like=Like(ended.course.resolutions, state.step_limit, ended.iterations),
-        last=_last(ended, start) if case.is_continued else None,
+        like=Like(ended.course.resolutions, state.step_limit),
+        last=_last(state, start) if case.is_continued else None,
         begun=begun,
         iterations=start.newton_iterations + ended.iterations,
     )
@@ -216,22 +206,16 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     return in_rows(found)
 
 
-def _last(ended: Ended, start: StartState) -> StartState:
+def _last(state: WearState, start: StartState) -> StartState:
     """The last state of a block, with the tangential history for the next one."""
-    assert ended.state is not None
+    at, choice = state.point.evaluation, state.choice
     assert start.state is not None
-    point, choice = ended.state.point, ended.state.choice
-    state = replace(
-        start.state,
-        displacement_h=point.evaluation.displacement_h,
-        contact_force_h=point.evaluation.force_h,
-        start_history=point.history,
-    )
+    here = replace(start.state, displacement_h=at.displacement_h, contact_force_h=at.force_h)
     return replace(
         start,
         outcome=Outcome.CONVERGED if choice.accurate else Outcome.INACCURATE,
-        state=state,
-        resolution=ended.state.resolution,
+        state=replace(here, start_history=state.point.history),
+        resolution=state.resolution,
         response_error=choice.estimate.response,
         wear_rate_error=choice.estimate.wear_rate,
         message="",
@@ -256,12 +240,11 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
 
 
 def _again(case: BlockCase, begun: Begun) -> StartState | None:
-    """The state at other depths than `begun`, with its errors, through the nodes of its sweep.
+    """The state at other depths than `begun`, with its errors, through the nodes of its sweep; else None.
 
-    With nodes of its own, the sweep of each mission would leave other static friction forces: the wear of a mission
-    would jump from depth to depth by the error of the sweep. Where each pair slips or opens within the period, the
-    state keeps nothing of its way, and follows from the depths alone. None where the way has jumped over a fold, where
-    there is no stable state, or where the vibration has changed so much that the way may lead to another branch.
+    With other nodes in each mission, the wear of a mission would jump from depth to depth by the error of the sweep.
+    Where each pair slips or opens within the period, the state follows from the depths alone. None where the way has
+    jumped over a fold, where there is no stable state, or where the way may lead to another branch.
     """
     start, run = begun.start, case.run
     if start is None or start.state is None or start.branch > 0:
@@ -313,11 +296,10 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, every_node: i
 def _continued(case: BlockCase, carried: StartState) -> StartState:
     """The state of a block that keeps the tangential history of the block before, or why there is none.
 
-    carried: state at the end of the block before. It is solved first at the depth before the block, which a longer or
-    an extrapolated step may have changed. Then amplitude and frequency change, one after the other, the frequency at
-    the smaller of both amplitudes. Raises OutOfTimeError, LinAlgError.
+    carried: state at the end of the block before, solved first at the depth before the block. Then amplitude and
+    frequency change, one after the other, the frequency at the smaller amplitude. Raises OutOfTimeError, LinAlgError.
     """
-    before, run, (frequency, _) = carried.state, case.run, case.block.steady
+    before, run, frequency = carried.state, case.run, case.block.steady[0]
     assert before is not None
     work, begins = case.begin(carried)
     at = begins.point.evaluation

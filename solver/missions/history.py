@@ -9,21 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from solver.accuracy.history_error import Both, HistoryError, history_error
-from solver.accuracy.target_error import error_of_wear, target_error
+from solver.accuracy.history_error import Both, HistoryError, error_of_target, history_error
 from solver.harmonic_balance.state import Failure
-from solver.missions.blocks import Mission
-from solver.missions.course import MissionCourse, worn_by
-from solver.missions.integrate import Missions
+from solver.missions.integrate import MissionCourse, Missions, worn_by
+from solver.missions.mission import Mission, MissionHistory
 from solver.missions.passage import LARGEST_SWEEP_RATE
-from solver.missions.result import MissionHistory
 from solver.model import FloatArray
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, unpack
 from solver.results.verdict import describe_cut_off, describe_uncertain
-
-ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
-"""Outcomes of a reference solution that are those of the history."""
+from solver.wear.integrate import ENDS_ALL
 
 
 def integrate_missions(
@@ -135,11 +130,10 @@ def _target_error(mission: Mission, at: float, fine: MissionCourse, reference: M
         return math.nan
     whole, *_ = _errors(mission, np.array([0.0, at]), fine, reference)
     depth = fine.growth_at(np.array([at])).sum(axis=1)[0]
-    volume_error = float(whole.worn_volume[1] * (depth @ mission.area))
-    known = error_of_wear(mission.until.quantity, depth, whole.wear_depth[1], volume_error)
     before, end = fine.nodes[-2:]
     per_mission = (worn_by(mission, end.growth) - worn_by(mission, before.growth)) / (end.mission - before.mission)
-    return target_error(at, reference.missions_to_target(mission), known, per_mission)
+    other = reference.missions_to_target(mission)
+    return error_of_target(mission.until, at, other, depth, whole, per_mission, mission.area)
 
 
 def _judged(mission: Mission, fine: MissionCourse, history: MissionHistory) -> Failure:

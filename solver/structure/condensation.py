@@ -1,23 +1,52 @@
-"""The linear structure at one frequency, condensed on the relative displacements of the contact pairs."""
+"""The linear structure at one frequency, condensed on the relative displacements of the contact pairs.
+
+With the dynamic stiffness A = K + i n w C - (n w)^2 M of harmonic n, Eq. (1), and the displacements split into those of
+the pairs (r) and all others (i),
+
+    Z_r = A_rr - A_ri A_ii^-1 A_ir,      F_r = F_r - A_ri A_ii^-1 F_i.                                         (8)
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.structure.fourier import from_complex, to_complex
-from solver.structure.harmonic_stiffness import DenseStiffness, HarmonicStiffness, SharedStiffness
+from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 
 DENSE_BYTES = 2e6
 """Bytes of the matrices of all harmonics up to which a product with each matrix is fastest (cache of the processor)."""
 
 KEPT_STRUCTURES = 8
 """Condensed structures of a case in its cache. A wear history with its errors uses six."""
+
+
+def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
+    """Indices (n_rel,) of the relative displacements in the linear model and component indices `3 pair + component`."""
+    components = np.flatnonzero(contact.dofs.ravel() >= 0)
+    return contact.dofs.ravel()[components], components
+
+
+def _relative_first(n: int, relative: IntArray) -> IntArray:
+    """Indices (n,) of all displacements, the relative ones first, then the others, ascending."""
+    others = np.ones(n, bool)
+    others[relative] = False
+    return np.concatenate([relative, np.flatnonzero(others)])
+
+
+def _block(linear: LinearModel, rates: FloatArray, rows: IntArray, columns: IntArray) -> ComplexArray:
+    """Rows and columns of `K + i r C - r^2 M`, (H, n_rows, n_columns), N/m, at the rates r (H,), rad/s."""
+    at, rate = np.ix_(rows, columns), rates[:, None, None]
+    mass, damping, stiffness = linear.mass[at], linear.damping[at], linear.stiffness[at]
+    if any(np.iscomplexobj(part) for part in (stiffness, damping, mass)):
+        return cast("ComplexArray", stiffness + 1j * rate * damping - rate**2 * mass)
+    full = np.empty((rates.size, rows.size, columns.size), complex)
+    full.real, full.imag = stiffness - rate**2 * mass, rate * damping
+    return full
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +66,7 @@ class CondensedStructure:
     """
 
     static_stiffness: FloatArray
-    moving: HarmonicStiffness
+    moving: DenseStiffness | SharedStiffness
     static_force: FloatArray
     harmonic_force: ComplexArray
     static_response: FloatArray
@@ -64,10 +93,7 @@ class CondensedStructure:
         return from_complex(self.static_stiffness @ displacement_h[:, 0], self.moving.apply(displacement_h))
 
     def apply_roughly(self, displacement_h: FloatArray) -> FloatArray:
-        """`Z_r u` to at least three digits in less time, for directions of Newton's method.
-
-        A product takes 0.088 ms (48 pairs, 9 harmonics) and 3.9 ms (336 pairs, 13 harmonics), `apply` 0.133 and 7.8.
-        """
+        """`Z_r u` to at least three digits, for directions of Newton's method; 0.5 to 0.7 of the time of `apply`."""
         # a joint that slides as a whole moves far: the static part in double precision
         return from_complex(self.static_stiffness @ displacement_h[:, 0], self.moving.single.apply(displacement_h))
 
@@ -86,16 +112,10 @@ class CondensedStructure:
         return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
 
 
-def relative_indices(contact: ContactInterface) -> tuple[IntArray, IntArray]:
-    """Indices (n_rel,) of the relative displacements in the linear model and component indices `3 pair + component`."""
-    components = np.flatnonzero(contact.dofs.ravel() >= 0)
-    return contact.dofs.ravel()[components], components
-
-
 def build_structure(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> CondensedStructure:
-    """Condense the dynamic stiffness `K + i n w C - (n w)^2 M`, Eq. (1), at the harmonics n to Z_r of Eq. (8).
+    """Condense the structure at the harmonics n of the frequency w.
 
     omega: w, rad/s. excitation_amplitude: N, in harmonic 1. orders: harmonics above the static one, ascending.
     Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
@@ -107,89 +127,97 @@ def build_structure(
     # not where much lies behind the joint: a `SharedStiffness` has to read that, too
     shares = 16 * len(orders) * n_rel**2 > DENSE_BYTES and n <= 2 * n_rel
     real = not any(np.iscomplexobj(part) for part in (still.mass, still.damping, still.stiffness, still.response))
+    rates, load = omega * np.array(orders, np.float64), excitation_amplitude * first.load_harmonic
     if shares and first is still and real and not model.nodal_diameter:
-        moving = _condense_shared(still, relative, omega * np.array(orders, np.float64), excitation_amplitude)
+        moving, force, rows, offset = _condense_shared(still, relative, rates, load)
     else:
-        moving = _condense_each(model, relative, omega, excitation_amplitude, orders)
-    return CondensedStructure(**_static(still, tuple(relative.tolist())), **moving)
+        moving, force, rows, offset = _condense_each(model, relative, rates, orders, load)
+    static_stiffness, static_force, static_response, static_offset = _static(still, tuple(relative.tolist()))
+    return CondensedStructure(
+        static_stiffness=static_stiffness,
+        moving=moving,
+        static_force=static_force,
+        harmonic_force=force,
+        static_response=static_response,
+        dynamic_response=rows[:, :-1],
+        static_offset=static_offset,
+        harmonic_offset=offset[:-1],
+        drive=rows[0, -1] if orders else np.zeros(n_rel, complex),
+        drive_offset=complex(offset[-1]),
+    )
 
 
 @lru_cache(maxsize=2)
-def _static(linear: LinearModel, relative: tuple[int, ...]) -> dict[str, Any]:
-    """The static attributes of a `CondensedStructure`, which are the same at all frequencies."""
-    chosen = np.array(relative, np.intp)
-    found = condense(np.real(linear.stiffness), chosen, linear.load_static)
-    rows = np.real(linear.response)[:, relative_first(len(linear.mass), chosen)]
-    of_pairs, of_others = np.split(rows, [chosen.size], axis=1)
-    return {
-        "static_stiffness": np.asarray(np.real(found.stiffness)),
-        "static_force": np.asarray(np.real(found.force)),
-        "static_response": np.asarray(np.real(of_pairs - of_others @ found.behind)),
-        "static_offset": np.asarray(np.real(of_others @ found.held)),
-    }
+def _static(linear: LinearModel, relative: tuple[int, ...]) -> tuple[FloatArray, ...]:
+    """As `Condensed`, of the static structure, which is the same at all frequencies."""
+    found = condense(
+        np.real(linear.stiffness), np.array(relative, np.intp), linear.load_static, np.real(linear.response)
+    )
+    return tuple(np.asarray(np.real(part), np.float64) for part in found)
+
+
+Moving = tuple[DenseStiffness | SharedStiffness, ComplexArray, ComplexArray, ComplexArray]
+"""Z_r; F_r (n_rel,) of harmonic 1; responses and then the work `conj(F) . x` per u, (H, n_response + 1, n_rel), and
+with u = 0 in harmonic 1, (n_response + 1,)."""
 
 
 def _condense_each(
-    model: ReducedModel, relative: IntArray, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
-) -> dict[str, Any]:
-    """The other attributes, with a matrix for each harmonic; arguments as in `build_structure`."""
-    n_rel, n_response = relative.size, model.linear[0].response.shape[0]
-    every = relative_first(len(model.linear[0].mass), relative)
-    stiffness = np.empty((len(orders), n_rel, n_rel), complex)
-    response = np.empty((len(orders), n_response, n_rel), complex)
-    (force, drive), offset, drive_offset = np.zeros((2, n_rel), complex), np.zeros(n_response, complex), 0.0 + 0.0j
-    for linear, places in by_structure(model, orders):
-        harmonics = np.array(orders)[places]
-        load = np.where(harmonics[:, None] == 1, excitation_amplitude, 0.0) * linear.load_harmonic[every]
-        found = _condense_ordered(dynamic_stiffness(linear, omega * harmonics, every, every), n_rel, load)
-        stiffness[places] = found.stiffness
-        of_pairs, of_others = linear.response[:, every[:n_rel]], linear.response[:, every[n_rel:]]
-        response[places] = of_pairs - of_others @ found.behind
-        if harmonics[0] == 1:
-            force, offset = found.force[0], of_others @ found.held[0]
-            drive = load[0, :n_rel].conj() - load[0, n_rel:].conj() @ found.behind[0]
-            drive_offset = complex(load[0, n_rel:].conj() @ found.held[0])
-    return {
-        "moving": DenseStiffness(stiffness),
-        "harmonic_force": force,
-        "dynamic_response": response,
-        "harmonic_offset": offset,
-        "drive": drive,
-        "drive_offset": drive_offset,
-    }
+    model: ReducedModel, relative: IntArray, rates: FloatArray, orders: tuple[int, ...], load: ComplexArray
+) -> Moving:
+    """The harmonics with a matrix for each, at the rates n w (H,), rad/s. load (n,): of harmonic 1, N."""
+    n_rel, n_rows, every = relative.size, len(model.linear[0].response) + 1, np.arange(load.size)
+    stiffness, rows = (np.empty((len(orders), n, n_rel), complex) for n in (n_rel, n_rows))
+    force, offset = np.zeros(n_rel, complex), np.zeros(n_rows, complex)
+    for place, (harmonic, rate) in enumerate(zip(orders, rates, strict=True)):
+        linear, own = model.harmonic_structure(harmonic), load if harmonic == 1 else np.zeros_like(load)
+        full = _block(linear, np.array([rate]), every, every)[0]
+        found = condense(full, relative, own, cast("Matrix", np.vstack([linear.response, own.conj()])))
+        stiffness[place], rows[place] = found.stiffness, found.rows
+        if harmonic == 1:
+            force, offset = found.force, found.offset
+    return DenseStiffness(stiffness), force, rows, offset
 
 
-def _condense_shared(
-    linear: LinearModel, relative: IntArray, rates: FloatArray, excitation_amplitude: float
-) -> dict[str, Any]:
-    """As `_condense_each`, of a real structure, with matrices shared by all harmonics, at the rates n w (H,), rad/s."""
-    others = relative_first(len(linear.mass), relative)[relative.size :]
-    compliance = cast("ComplexArray", np.linalg.inv(dynamic_stiffness(linear, rates, others, others)))
-    coupling = dynamic_stiffness(linear, rates, others, relative)
-    load, rows = excitation_amplitude * linear.load_harmonic, linear.response
-    # effect of a unit load on the displacements behind the joint, on the responses and on the work of the excitation
-    seen = rows[:, others] @ compliance
-    by_load = load[others].conj() @ compliance[0]
+def _condense_shared(linear: LinearModel, relative: IntArray, rates: FloatArray, load: ComplexArray) -> Moving:
+    """As `_condense_each`, of a real structure, with matrices shared by all harmonics."""
+    others = _relative_first(load.size, relative)[relative.size :]
+    compliance = cast("ComplexArray", np.linalg.inv(_block(linear, rates, others, others)))
+    rows = np.vstack([linear.response, load.conj()])
+    by_pairs = rows[:, relative] - rows[:, others] @ compliance @ _block(linear, rates, others, relative)
     held = compliance[0] @ load[others]
-    return {
-        "moving": SharedStiffness(linear, relative, others, rates, compliance),
-        "harmonic_force": load[relative] - dynamic_stiffness(linear, rates[:1], relative, others)[0] @ held,
-        "dynamic_response": rows[:, relative] - seen @ coupling,
-        "harmonic_offset": rows[:, others] @ held,
-        "drive": load[relative].conj() - by_load @ coupling[0],
-        "drive_offset": complex(load[others].conj() @ held),
-    }
+    force = load[relative] - _block(linear, rates[:1], relative, others)[0] @ held
+    return SharedStiffness(linear, relative, others, rates, compliance), force, by_pairs, rows[:, others] @ held
 
 
-def dynamic_stiffness(linear: LinearModel, rates: FloatArray, rows: IntArray, columns: IntArray) -> ComplexArray:
-    """Rows and columns of `K + i r C - r^2 M`, (H, n_rows, n_columns), N/m, at the rates r (H,), rad/s."""
-    at, rate = np.ix_(rows, columns), rates[:, None, None]
-    mass, damping, stiffness = linear.mass[at], linear.damping[at], linear.stiffness[at]
-    if any(np.iscomplexobj(part) for part in (stiffness, damping, mass)):
-        return cast("ComplexArray", stiffness + 1j * rate * damping - rate**2 * mass)
-    full = np.empty((rates.size, rows.size, columns.size), complex)
-    full.real, full.imag = stiffness - rate**2 * mass, rate * damping
-    return full
+class Condensed(NamedTuple):
+    """A structure reduced to the relative displacements u (n_rel,).
+
+    - stiffness (n_rel, n_rel): Schur complement, N/m. force (n_rel,): reduced load, N.
+    - rows (k, n_rel), offset (k,): rows of all displacements as `rows u + offset`.
+    """
+
+    stiffness: Matrix
+    force: Matrix
+    rows: Matrix
+    offset: Matrix
+
+
+def condense(full: Matrix, relative: IntArray, load: Matrix, rows: Matrix | None = None) -> Condensed:
+    """Condensation of a stiffness `full` (n, n), N/m, a load (n,), N, and rows (k, n) on displacements (n_rel,).
+
+    Raises numpy.linalg.LinAlgError where the block of the other displacements is singular.
+    """
+    n_rel, every = relative.size, _relative_first(len(full), relative)
+    ordered = np.column_stack([full, load])[every][:, np.append(every, -1)]
+    seen = np.zeros((0, len(full))) if rows is None else rows[:, every]
+    from_u = np.vstack([ordered[:n_rel], np.column_stack([seen, np.zeros(len(seen))])])
+    # the other displacements per u, with the sign reversed, and under the load with u = 0
+    behind = np.linalg.solve(ordered[n_rel:, n_rel:-1], np.delete(ordered[n_rel:], np.s_[n_rel:-1], axis=1))
+    reduced = cast("Matrix", np.delete(from_u, np.s_[n_rel:-1], axis=1) - from_u[:, n_rel:-1] @ behind)
+    return Condensed(reduced[:n_rel, :-1], reduced[:n_rel, -1], reduced[n_rel:, :-1], -reduced[n_rel:, -1])
+
+
+# --- all displacements, and their change with the frequency ---
 
 
 def whole_motion(
@@ -200,7 +228,7 @@ def whole_motion(
     For motions and loads with exp(s t), s the `exponent`, 1/s: `i n w` in harmonic n of a periodic motion.
     Raises numpy.linalg.LinAlgError where the structure with its joint held is singular.
     """
-    every, n_rel = relative_first(len(linear.mass), relative), relative.size
+    every, n_rel = _relative_first(len(linear.mass), relative), relative.size
     others, whole = every[n_rel:], np.zeros(load.shape, complex)
     whole[relative] = moved
     if others.size:
@@ -210,54 +238,44 @@ def whole_motion(
     return whole
 
 
-def by_structure(model: ReducedModel, orders: tuple[int, ...]) -> Iterator[tuple[LinearModel, IntArray]]:
-    """Each linear model with the indices of its harmonics in `orders`."""
-    seen = [model.harmonic_structure(harmonic) for harmonic in orders]
-    for number, linear in enumerate(seen):
-        same = [other is linear for other in seen]
-        if same.index(True) == number:
-            yield linear, np.flatnonzero(same)
+@dataclass(frozen=True)
+class FrequencySlope:
+    """Derivatives with respect to the frequency at given relative displacements u and contact forces.
 
-
-class Condensed(NamedTuple):
-    """Matrices (..., n, n) and loads (..., n) reduced to the relative displacements u (n_rel,).
-
-    - stiffness (..., n_rel, n_rel): Schur complement, N/m.
-    - force (..., n_rel): reduced load, N.
-    - behind (..., n_i, n_rel): the other displacements, ascending, for a unit u, with the sign reversed.
-    - held (..., n_i): the other displacements under the load with u = 0, m.
+    - force (n_rel, 2H+1): of `Z_r u - F_r`, N s/rad.
+    - product: of `F^H x` in harmonic 1, N m s/rad.
+    - response (n_response,): complex, of the responses in harmonic 1, m s/rad.
     """
 
-    stiffness: Matrix
-    force: Matrix
-    behind: Matrix
-    held: Matrix
+    force: FloatArray
+    product: complex
+    response: ComplexArray
 
 
-def condense(full: Matrix, relative: IntArray, load: Matrix) -> Condensed:
-    """Condensation of stiffnesses `full` (..., n, n), N/m, and loads (..., n), N, on some displacements (n_rel,).
+def frequency_slope(
+    model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...], displacement_h: FloatArray
+) -> FrequencySlope:
+    """Change of a structure with the frequency; arguments as in `build_structure`, and u (n_rel, 2H+1), m.
 
-    Raises numpy.linalg.LinAlgError where the block of the other displacements is singular.
+    With the change `A' = i n C - 2 n^2 w M` of the dynamic stiffness and all displacements x under given u,
+
+        x_i' = -A_ii^-1 (A' x)_i,      (Z_r u - F_r)' = (A' x)_r + A_ri x_i'.
+
+    A difference of two condensations is not accurate: behind a joint that sticks A_ii is nearly singular close to the
+    resonance that is followed.
     """
-    every = relative_first(full.shape[-1], relative)
-    return _condense_ordered(full[..., every[:, None], every], relative.size, load[..., every])
-
-
-def relative_first(n: int, relative: IntArray) -> IntArray:
-    """Indices (n,) of all displacements, the relative ones first, then the others, ascending."""
-    others = np.ones(n, bool)
-    others[relative] = False
-    return np.concatenate([relative, np.flatnonzero(others)])
-
-
-def _condense_ordered(full: Matrix, n_rel: int, load: Matrix) -> Condensed:
-    """As `condense`, of matrices whose first n_rel displacements are the relative ones."""
-    right = np.concatenate([full[..., n_rel:, :n_rel], load[..., n_rel:, None]], axis=-1)
-    solved = cast("Matrix", np.linalg.solve(full[..., n_rel:, n_rel:], right))
-    back = full[..., :n_rel, n_rel:] @ solved
-    return Condensed(
-        full[..., :n_rel, :n_rel] - back[..., :-1],
-        load[..., :n_rel] - back[..., -1],
-        solved[..., :-1],
-        solved[..., -1],
-    )
+    relative, _ = relative_indices(model.contact)
+    moving, still = to_complex(displacement_h), np.zeros(relative.size, complex)
+    force, product = np.zeros((relative.size, len(orders)), complex), 0.0 + 0.0j
+    response = np.zeros(model.linear[0].response.shape[0], complex)
+    for place, n in enumerate(orders):
+        linear, rate = model.harmonic_structure(n), 1j * n * omega
+        load = (excitation_amplitude if n == 1 else 0.0) * linear.load_harmonic
+        x = whole_motion(linear, rate, relative, load, moving[:, place])
+        slope = 1j * n * (linear.damping @ x) - 2.0 * n**2 * omega * (linear.mass @ x)
+        turned = whole_motion(linear, rate, relative, -slope, still)
+        rows = linear.stiffness[relative] + rate * linear.damping[relative] + rate**2 * linear.mass[relative]
+        force[:, place] = slope[relative] + rows @ turned
+        if n == 1:
+            product, response = complex(load.conj() @ turned), linear.response @ turned
+    return FrequencySlope(from_complex(np.zeros(relative.size), force), product, response)

@@ -29,10 +29,7 @@ class DenseStiffness:
 
     @cached_property
     def single(self) -> DenseStiffness:
-        """Z_r in single precision, for directions of Newton's method, not for the residual.
-
-        A product takes the time of reading the matrices from memory.
-        """
+        """Z_r in single precision, for directions of Newton's method: a product takes the time of reading it."""
         return DenseStiffness(self.dense.astype(np.complex64))
 
 
@@ -40,13 +37,10 @@ class DenseStiffness:
 class SharedStiffness:
     """Real matrices K, M, C, shared by all harmonics, and the compliance behind the joint at each harmonic.
 
-    With A = K - (n w)^2 M + i n w C and the displacements split into those of the pairs (r) and all others (i),
-
-        Z_r = A_rr - A_ri A_ii^-1 A_ir                                                                         (8)
-
-    A product for all harmonics is one real product of [K M C] with the motions times 1, -(n w)^2 and i n w, real and
-    imaginary parts side by side. Its time is the time of reading 3 n_rel^2 numbers from memory, for any H. With 336
-    pairs and 13 harmonics the matrices of all harmonics take 211 MB, these take 24 MB.
+    With A = K - (n w)^2 M + i n w C, `Z_r = A_rr - A_ri A_ii^-1 A_ir` (`condensation`). A product for all harmonics is
+    one real product of [K M C] with the motions times 1, -(n w)^2 and i n w, real and imaginary parts side by side. Its
+    time is the time of reading 3 n_rel^2 numbers from memory, for any H. With 336 pairs and 13 harmonics the matrices
+    of all harmonics take 211 MB, these take 24 MB. Methods as in `DenseStiffness`.
 
     - linear, relative (n_rel,), others (n_i,): the structure, and its displacements of the pairs and all others.
     - rates (H,): n w, rad/s.
@@ -61,7 +55,6 @@ class SharedStiffness:
 
     @cached_property
     def _parts(self) -> tuple[FloatArray, FloatArray]:
-        """Columns r (n, 3 n_rel) of K, M, C, with rows r before rows i; and their blocks ri (n_rel, 3 n_i)."""
         kind = self.held_compliance.real.dtype.name
         return _real_parts(self.linear, tuple(self.relative.tolist()), tuple(self.others.tolist()), kind)
 
@@ -73,12 +66,12 @@ class SharedStiffness:
 
     @property
     def dense(self) -> ComplexArray:
-        """As in DenseStiffness; computed at each call: the matrices may need as much memory as all other data."""
+        """Computed at each call: the matrices may need as much memory as all other data."""
         n_rel = self.relative.size
         return np.array([self.matrix(place) for place in range(self.rates.size)]).reshape(-1, n_rel, n_rel)
 
     def matrix(self, place: int) -> ComplexArray:
-        """As in DenseStiffness."""
+        """Matrix (n_rel, n_rel), N/m, of the harmonic at index `place`."""
         n_rel, factors = self.relative.size, self._factors[:, 0, place]
         columns, back = (
             sum(factor * part for factor, part in zip(factors, np.split(parts, 3, axis=1), strict=True))
@@ -87,7 +80,7 @@ class SharedStiffness:
         return cast("ComplexArray", columns[:n_rel] - back @ (self.held_compliance[place] @ columns[n_rel:]))
 
     def apply(self, displacement_h: FloatArray) -> ComplexArray:
-        """As in DenseStiffness."""
+        """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
         n_rel, (columns, back) = self.relative.size, self._parts
         forces = self._product(columns, to_complex(displacement_h))
         behind = np.matmul(self.held_compliance, forces[n_rel:].T[:, :, None])[:, :, 0].T
@@ -95,7 +88,7 @@ class SharedStiffness:
 
     @cached_property
     def single(self) -> SharedStiffness:
-        """As in DenseStiffness."""
+        """As in `DenseStiffness`."""
         return replace(self, held_compliance=self.held_compliance.astype(np.complex64))
 
     def _product(self, parts: FloatArray, amplitudes: ComplexArray) -> ComplexArray:
@@ -105,14 +98,14 @@ class SharedStiffness:
         return np.asarray((parts @ motions.view(parts.dtype)).view(kind))
 
 
-HarmonicStiffness = DenseStiffness | SharedStiffness
-
-
 @lru_cache(maxsize=4)
 def _real_parts(
     linear: LinearModel, relative: tuple[int, ...], others: tuple[int, ...], kind: str
 ) -> tuple[FloatArray, FloatArray]:
-    """As `SharedStiffness._parts`, the same at all frequencies; kind: of the numbers, "float64" or "float32"."""
+    """Columns r (n, 3 n_rel) of K, M, C, with rows r before rows i; and their blocks ri (n_rel, 3 n_i).
+
+    They are the same at all frequencies. kind: of the numbers, "float64" or "float32".
+    """
     three = [np.real(part) for part in (linear.stiffness, linear.mass, linear.damping)]
     columns, back = (
         np.hstack([np.asarray(part[np.ix_(rows, places)], kind) for part in three])

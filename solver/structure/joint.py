@@ -24,7 +24,6 @@ class Joint:
     - model: before condensation. structure: the condensed one.
     - omega, excitation_amplitude: rad/s, N.
     - friction_coefficient (n_contact,): for each pair.
-    - component_index (n_rel,): `3 pair + component` of each relative displacement.
     """
 
     model: ReducedModel
@@ -32,10 +31,18 @@ class Joint:
     excitation_amplitude: float
     friction_coefficient: FloatArray
     structure: CondensedStructure
-    contact: ContactInterface
     basis: FourierBasis
-    component_index: IntArray
     penalty: Penalty
+
+    @property
+    def contact(self) -> ContactInterface:
+        """The contact pairs."""
+        return self.model.contact
+
+    @cached_property
+    def component_index(self) -> IntArray:
+        """`3 pair + component` (n_rel,) of each relative displacement."""
+        return relative_indices(self.contact)[1]
 
     @cached_property
     def law(self) -> ContactLaw:
@@ -56,9 +63,7 @@ class Joint:
 
     def rows_of(self, pairs: IntArray | int) -> IntArray:
         """Indices of the relative displacements of one or more pairs, ascending."""
-        chosen = np.zeros(self.contact.n_contact, bool)
-        chosen[pairs] = True
-        return np.flatnonzero(chosen[self.component_index // 3])
+        return np.flatnonzero(np.isin(self.component_index // 3, pairs))
 
     def to_pairs(self, values: FloatArray) -> FloatArray:
         """Values (n_contact, 3, m) of the pairs from (n_rel, m); zero where a pair has no such displacement."""
@@ -89,14 +94,6 @@ class Hold:
         """Force of the spring, N, at mean relative displacements (n_rel,), m."""
         return self.stiffness * (float(self.direction @ motion) - self.position)
 
-    def on(self, structure: CondensedStructure) -> CondensedStructure:
-        """The structure with the spring."""
-        return replace(
-            structure,
-            static_stiffness=structure.static_stiffness + self.stiffness * np.outer(self.direction, self.direction),
-            static_force=structure.static_force + self.stiffness * self.position * self.direction,
-        )
-
 
 @dataclass(frozen=True)
 class Case:
@@ -114,6 +111,7 @@ class Case:
     settings: SolverSettings
     resolution: Resolution
     hold: Hold | None = None
+    # a small cache: a wear history uses two structures at one frequency in turns
     _structures: dict[tuple[float, float, tuple[int, ...]], CondensedStructure] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -123,30 +121,23 @@ class Case:
 
         Raises numpy.linalg.LinAlgError where the structure with its joint held is singular at a harmonic.
         """
-        _, component_index = relative_indices(self.model.contact)
-        return Joint(
-            model=self.model,
-            omega=omega,
-            excitation_amplitude=excitation_amplitude,
-            friction_coefficient=self.friction_coefficient,
-            structure=self._structure(omega, excitation_amplitude),
-            contact=self.model.contact,
-            basis=build_basis(self.resolution.orders, self.resolution.samples),
-            component_index=component_index,
-            penalty=self.penalty,
-        )
+        structure = self._structure(omega, excitation_amplitude)
+        basis = build_basis(self.resolution.orders, self.resolution.samples)
+        friction, penalty = self.friction_coefficient, self.penalty
+        return Joint(self.model, omega, excitation_amplitude, friction, structure, basis, penalty)
 
     def _structure(self, omega: float, excitation_amplitude: float) -> CondensedStructure:
-        """Condensed structure, from a small cache: a wear history uses two at one frequency in turns."""
-        key = omega, excitation_amplitude, self.resolution.orders
-        found = self._structures.get(key)
-        if found is None:
+        key, cache, hold = (omega, excitation_amplitude, self.resolution.orders), self._structures, self.hold
+        if key not in cache:
             found = build_structure(self.model, *key)
-            found = found if self.hold is None else self.hold.on(found)
-            while len(self._structures) >= KEPT_STRUCTURES:
-                del self._structures[next(iter(self._structures))]
-            self._structures[key] = found
-        return found
+            if hold is not None:
+                spring = hold.stiffness * np.outer(hold.direction, hold.direction)
+                force = found.static_force + hold.stiffness * hold.position * hold.direction
+                found = replace(found, static_stiffness=found.static_stiffness + spring, static_force=force)
+            while len(cache) >= KEPT_STRUCTURES:
+                del cache[next(iter(cache))]
+            cache[key] = found
+        return cache[key]
 
     def held(self, hold: Hold | None) -> Case:
         """The case with another hold."""
@@ -196,7 +187,7 @@ def friction_of_pairs(model: ReducedModel, friction_coefficient: float | FloatAr
 def static_joint(joint: Joint, load_factor: float) -> Joint:
     """The joint under a fraction of its static load, without excitation: no harmonics, one sample."""
     structure = joint.structure
-    held = replace(
+    still = replace(
         structure,
         moving=DenseStiffness(np.empty((0, *structure.static_stiffness.shape), complex)),
         dynamic_response=structure.dynamic_response[:0],
@@ -204,7 +195,7 @@ def static_joint(joint: Joint, load_factor: float) -> Joint:
         static_offset=load_factor * structure.static_offset,
     )
     basis, penalty = build_basis((), 1), joint.penalty.static()
-    return replace(joint, excitation_amplitude=0.0, structure=held, basis=basis, penalty=penalty)
+    return replace(joint, excitation_amplitude=0.0, structure=still, basis=basis, penalty=penalty)
 
 
 def viscous_joint(joint: Joint, viscosity: float, before: FloatArray) -> Joint:

@@ -7,7 +7,7 @@ E_n has to be near Z_n above the highest harmonic:
 - A pair on an elastic joint, whose stiffness no longer changes with frequency, is taken at displacement level, with
   E_n = eps near this stiffness, Eq. (10).
 - A mass that sits directly on a slider (`Z_n` near `-(n w)^2 m`) is inertial: the pair is marched with its mass
-  (`solver.contact.rigid_slider`), with `E_n = -(n w)^2 m + i n w c`.
+  (`solver.contact.sliding_masses`), with `E_n = -(n w)^2 m + i n w c`.
 - A mass on a stiff spring at its slider is inertial where the mass dominates in the harmonics that are left out. Where
   the spring dominates, the pair is taken at displacement level.
 """
@@ -43,12 +43,10 @@ class Penalty:
     """Penalties of the pairs, Eq. (9), and masses of the inertial pairs.
 
     - normal, tangential (n_contact,): eps, N/m; `tangential` for elastic pairs only.
-    - inertial (n_contact,): whether the pair is marched with its mass.
-    - mass (n_contact,): kg, for inertial pairs only.
-    - drag (n_contact,): N s/m, for inertial pairs only.
-    - mean (n_contact,): stiffness on the mean tangential position, N/m, for inertial pairs only. While such a pair
-      sticks, the friction force alone does not determine the mean position. The stiffness is too small to hold a pair
-      that slips.
+    - inertial (n_contact,): whether the pair is marched with its mass. The others are for inertial pairs only:
+    - mass, drag (n_contact,): kg, N s/m.
+    - mean (n_contact,): stiffness on the mean tangential position, N/m, which friction alone does not determine while
+      such a pair sticks. It is too small to hold a pair that slips.
     """
 
     normal: FloatArray
@@ -78,17 +76,21 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     At a real rate the structure has no resonances: an elastic joint acts as a stiffness, a slider as a mass.
     omega: rad/s. highest: highest harmonic of the balance.
     """
-    rate = (highest + 1) * omega
+    rate, contact = (highest + 1) * omega, model.contact
     size = _stiffness_at(model, rate)
     low, high = (_stiffness_at(model, times * INERTIAL_RATE * omega)[:, 1] for times in (1.0, 2.0))
-    has_tangent = (model.contact.dofs[:, 1:] >= 0).any(axis=1)
-    inertial = has_tangent & (high > INERTIAL_RATIO * low)
+    inertial = (contact.dofs[:, 1:] >= 0).any(axis=1) & (high > INERTIAL_RATIO * low)
     if inertial.any() and highest + 1 > INERTIAL_RATE:
         # a mass behind a spring: where the spring dominates in the harmonics left out, the pair is elastic
         inertial &= _stiffness_at(model, 2.0 * rate)[:, 1] > INERTIAL_RATIO * size[:, 1]
-    mass = np.ones(size.shape[0])
+    mass = np.ones(contact.n_contact)
     if inertial.any():
-        mass[inertial] = _mass_at(model, rate)[inertial]
+        # the mass that a tangential force accelerates, with all other pairs free: 1 / G = k + m s^2, compliance G
+        low, high = (1.0 / compliance_at(model, s) for s in (rate, 2.0 * rate))
+        pair, component = np.divmod(relative_indices(contact)[1], 3)
+        least, tangent = np.full(contact.n_contact, np.inf), component > 0
+        np.minimum.at(least, pair[tangent], ((high - low) / (3.0 * rate**2))[tangent])
+        mass[inertial] = least[inertial]
     return Penalty(
         normal=size[:, 0],
         tangential=size[:, 1],
@@ -111,17 +113,6 @@ def _stiffness_at(model: ReducedModel, rate: float) -> FloatArray:
     np.maximum.at(size, (components // 3, np.minimum(components % 3, 1)), diagonal)
     # a pair without such a displacement or without stiffness still needs a divisor
     return np.where(size > 0.0, size, 1.0)
-
-
-def _mass_at(model: ReducedModel, rate: float) -> FloatArray:
-    """Mass (n_contact,), kg, that a tangential force on a pair accelerates, with all other pairs free."""
-    _, components = relative_indices(model.contact)
-    # for an inertial pair 1 / G = k + m s^2, with the compliance G
-    low, high = (1.0 / compliance_at(model, s) for s in (rate, 2.0 * rate))
-    mass = np.full(model.contact.n_contact, np.inf)
-    tangent = components % 3 > 0
-    np.minimum.at(mass, components[tangent] // 3, ((high - low) / (3.0 * rate**2))[tangent])
-    return mass
 
 
 def compliance_at(model: ReducedModel, rate: float) -> FloatArray:

@@ -1,67 +1,62 @@
-"""Check of a state of a wearing joint before it is reported: certificate, harmonics and samples, stability."""
+"""Check of a state of a wearing joint: whether it is a result, and whether it is the last one.
+
+In a steady state every pair that slips carries no force, and the slowest pair determines how fast a history approaches
+this state. So a history to the end of wear ends where the wear rate of every pair is below a fraction of its largest
+one. A joint that slips everywhere under a load that nothing else carries has no steady state: its rate is constant.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import replace
 
 import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, certify
 from solver.accuracy.error_estimate import UNKNOWN
-from solver.accuracy.period_events import lacks_even, left_out
+from solver.accuracy.harmonic_levels import lacks_even, left_out
 from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
-from solver.outcome import Outcome
+from solver.outcome import Outcome, in_digits
 from solver.results.state_report import StateReport, report_state
-from solver.settings import NEGLIGIBLE, Resolution
+from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution
 from solver.stability.floquet import find_instability
+from solver.wear.course import Course
 from solver.wear.jump import creeps, free_slide
-from solver.wear.state import Choice, WearState
-from solver.wear.wearing_joint import Following, WearingJoint
+from solver.wear.wearing_joint import Choice, WearingJoint, WearState
 
 LEFT_OUT_GROWN = 1.5
 """Growth of the part of the contact force in harmonics that are left out, since the last choice of harmonics, above
 which a new choice is possible. Dovetail, 211.5, 211.75, 212.5 Hz: 0.8 to 1.4 over 1e5 cycles."""
 
+STEPS_TO_THE_END, LONGEST_HISTORY = 20_000, 1e25
+"""Most steps and most cycles of a history without a steady state; a joint takes 2 to 10 steps a pair."""
+
+ACTED_BACK = 100.0
+"""Change of the normal force by the depth of one pair alone, all other pairs held, over the normal force of this pair.
+A wear rate counts as steady above only: less wear may not have acted back on the joint yet. Long waves of n pairs are
+about n times as soft."""
+
+AS_ASKED = Failure(Outcome.CONVERGED)
+"""The regular end of a history."""
+
+
 Checked = tuple[WearState, StateReport]
 """A state that passed the check, possibly with other harmonics than before, and its report."""
 
 
-@dataclass(frozen=True)
-class FullCheck:
-    """The check of a reported history.
+def full_check(
+    work: WearingJoint, state: WearState, loops: tuple[int, ...] = (), *, with_resonance: bool = False
+) -> Checked | Failure:
+    """A state of a reported history with its report, or the reason of its rejection.
 
-    loops: pairs with reported fretting loops.
-    with_resonance: whether the resonance of the vibration is reported.
+    loops: pairs with reported fretting loops. with_resonance: whether the resonance of the vibration is reported.
+    Raises OutOfTimeError, LinAlgError.
     """
 
-    loops: tuple[int, ...] = ()
-    with_resonance: bool = False
-
-    def __call__(self, work: WearingJoint, state: WearState) -> Checked | Failure:
-        """The state with its report, or the reason of a rejection. Raises OutOfTimeError, LinAlgError."""
-        choose = chosen_for_another(work, state)
-        checked = self._report(work, state, choose=choose)
-        if isinstance(checked, Failure) and not choose and state.choice.accurate and work.case.settings.automatic:
-            # more harmonics or samples may suffice
-            checked = self._report(work, state, choose=True)
-        if isinstance(checked, Failure):
-            return checked
-        state, report = checked
-        state = _note_accuracy(state)
-        at = state.point.evaluation
-        if state.hold is not None and creeps(work.at(state), state.hold, at):
-            return Failure(Outcome.ADRIFT)
-        if _vibrates_otherwise(state):
-            if (unstable := _multipliers(work, state, every=False)) is not None:
-                return unstable
-            state = replace(state, judged_h=at.predicted_h)
-        return state, report
-
-    def _report(self, work: WearingJoint, state: WearState, *, choose: bool) -> Checked | Failure:
+    def report(chosen: WearState | Failure) -> Checked | Failure:
         """Report with certificate; its estimated errors come from the last choice of the harmonics."""
-        chosen = choose_anew(work, state) if choose else state
         if isinstance(chosen, Failure):
             return chosen
         joint, at, estimate = work.at(chosen), chosen.point.evaluation, chosen.choice.estimate
@@ -72,43 +67,48 @@ class FullCheck:
         )
         if not certificate.holds(work.case.settings.tolerance):
             return Failure(Outcome.CERTIFICATE_FAILED)
-        report = report_state(joint, at, certificate, self.loops, with_resonance=self.with_resonance)
-        if isinstance(work.where, Following):
-            error = work.where.error(chosen, estimate.response, work.case.settings.rtol)
-            report = replace(report, excitation_frequency_error=error)
-        return chosen, report
+        found = report_state(joint, at, certificate, loops, with_resonance=with_resonance)
+        return chosen, replace(found, excitation_frequency_error=work.frequency_error(chosen))
+
+    anew = chosen_for_another(work, state)
+    checked = report(choose_anew(work, state) if anew else state)
+    if isinstance(checked, Failure) and not anew and state.choice.accurate and work.case.settings.automatic:
+        # more harmonics or samples may suffice
+        checked = report(choose_anew(work, state))
+    if isinstance(checked, Failure):
+        return checked
+    (state, reported), at = checked, checked[0].point.evaluation
+    estimate, worst = state.choice.estimate, state.worst
+    # NaN for given harmonics and samples, where no state with others was found for a comparison
+    unknown = np.isnan(estimate.largest)
+    if unknown or not state.choice.accurate:
+        if not estimate.largest < worst.largest:
+            worst = UNKNOWN if unknown else estimate
+        state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
+    if state.hold is not None and creeps(work.at(state), state.hold, at):
+        return Failure(Outcome.ADRIFT)
+    if _vibrates_otherwise(state):
+        if (unstable := find_instability(work.case, work.at(state), at, work.run, False)) is not None:
+            return unstable
+        state = replace(state, judged_h=at.predicted_h)
+    return state, reported
 
 
-@dataclass(frozen=True)
-class PlainCheck:
-    """No check, for a reference solution: its harmonics only follow a given schedule.
+def report_only(
+    work: WearingJoint, state: WearState, resolutions: tuple[tuple[float, Resolution], ...], *, with_resonance: bool
+) -> Checked:
+    """A state of a reference solution with its report, with the harmonics wanted at its count where it is found there.
 
     resolutions: cycle count from which on a resolution holds, and this resolution; ascending counts, the first 0.
-    with_resonance: whether the resonance of the vibration is reported.
     """
-
-    resolutions: tuple[tuple[float, Resolution], ...]
-    with_resonance: bool = False
-
-    def __call__(self, work: WearingJoint, state: WearState) -> Checked | Failure:
-        """The state with the harmonics wanted at its count, or unchanged where no such state is found."""
-        wanted = [resolution for count, resolution in self.resolutions if count <= state.cycle][-1]
-        state = _with_harmonics(work, state, wanted)
-        joint, at = work.at(state), state.point.evaluation
-        return state, report_state(joint, at, NOT_CERTIFIED, with_resonance=self.with_resonance)
-
-
-def _with_harmonics(work: WearingJoint, state: WearState, wanted: Resolution) -> WearState:
-    """The state solved with other harmonics and samples, at the frequency that is then followed; else as it is."""
-    if wanted == state.resolution:
-        return state
-    work.at(state)
-    joint = work.case.at(wanted).joint(state.omega, work.excitation_amplitude)
-    point = work.run.move(work.case, joint, state.point)
-    if point is None:
-        return state
-    found = work.at_followed(replace(state, point=point, resolution=wanted))
-    return state if isinstance(found, Failure) else found
+    wanted = [resolution for count, resolution in resolutions if count <= state.cycle][-1]
+    if wanted != state.resolution:
+        work.at(state)
+        joint = work.case.at(wanted).joint(state.omega, work.excitation_amplitude)
+        point = work.run.move(work.case, joint, state.point)
+        moved = point and work.at_followed(replace(state, point=point, resolution=wanted))
+        state = moved if isinstance(moved, WearState) else state
+    return state, report_state(work.at(state), state.point.evaluation, NOT_CERTIFIED, with_resonance=with_resonance)
 
 
 def chosen_for_another(work: WearingJoint, state: WearState) -> bool:
@@ -142,18 +142,6 @@ def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
     return work.at_followed(replace(state, point=refined.point, resolution=resolution, choice=choice))
 
 
-def _note_accuracy(state: WearState) -> WearState:
-    """The state with the count from which on its harmonics do not suffice, and with the largest error since."""
-    estimate, worst = state.choice.estimate, state.worst
-    # NaN for given harmonics and samples, where no state with others was found for a comparison
-    known = not np.isnan(estimate.largest)
-    if state.choice.accurate and known:
-        return state
-    if not estimate.largest < worst.largest:
-        worst = estimate if known else UNKNOWN
-    return replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
-
-
 def _vibrates_otherwise(state: WearState) -> bool:
     """Whether the vibration differs from the vibration of the last stability check."""
     if state.judged_h is None or state.judged_h.shape != state.point.evaluation.predicted_h.shape:
@@ -162,19 +150,56 @@ def _vibrates_otherwise(state: WearState) -> bool:
     return float(np.linalg.norm(now - before)) > VIBRATION_RECHECK * float(np.linalg.norm(before))
 
 
-def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failure | None:
-    """Instability of a state by its Floquet multipliers, None if stable; every: as in `find_instability`."""
-    joint = work.at(state)
-    unstable = find_instability(work.case, joint, state.point.evaluation, work.run, every)
-    return None if unstable is None else Failure(unstable.outcome, unstable.sentence)
-
-
 def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
     """Instability of the last state of a history, None if stable. The sweep has judged the start state already."""
-    if state.cycle == 0.0 and not work.where.follows and not _vibrates_otherwise(state):
+    if state.cycle == 0.0 and work.follow is None and not _vibrates_otherwise(state):
         return None
     joint, at = work.at(state), state.point.evaluation
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
     if free_slide(joint, at) is None and not work.is_stable(joint, at):
         return Failure(Outcome.UNSTABLE)
-    return _multipliers(work, state, every=True)
+    return find_instability(work.case, joint, at, work.run, True)
+
+
+def why_ended(work: WearingJoint, state: WearState, course: Course) -> Failure | None:
+    """Why a history ends at a state: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on."""
+    reached = not math.isnan(course.reached)
+    if reached or not state.wears or state.cycle >= course.end * (1.0 - 1e-12):
+        return AS_ASKED
+    if course.end < math.inf:
+        return None
+    # over where the rate of every pair is below a share of its largest one
+    share, largest = course.final_share, state.largest_rates[:-1]
+    if (state.rates[:-1] <= share * np.maximum(largest, share * float(largest.max(initial=0.0)))).all():
+        return AS_ASKED
+    rate, n_steps = float(state.rates[-1]), len(course.ends) - 1
+    if is_steady(work, state, course):
+        steady = f"from cycle {in_digits(state.cycle, 4)} on they wear at a steady rate of {rate:.6g} m3 a cycle"
+        return Failure(Outcome.NO_FINAL_STATE, f"all pairs slip, and {steady}")
+    if n_steps >= STEPS_TO_THE_END or state.cycle > LONGEST_HISTORY:
+        still = f"the joint still wears at {rate:.6g} m3 a cycle"
+        return Failure(Outcome.NO_FINAL_STATE, f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}, {still}")
+    return None
+
+
+def is_steady(work: WearingJoint, state: WearState, course: Course) -> bool:
+    """Whether wear goes on without end.
+
+    Every pair that carries load slips, and the wear rate is constant although the wear is deep enough to act back.
+    """
+    joint, at = work.at(state), state.point.evaluation
+    normal = at.force_h[:, 0, 0]
+    pressed = normal > ROUND_OFF * float(normal.max(initial=0.0))
+    if not pressed.any() or not (at.slip_work[pressed] > 0.0).all():
+        return False
+    volumes, rates = course.volumes, course.dense.rate @ work.area
+    # over the last nine tenths of the worn volume, to the accuracy of a rate
+    first = max(int(np.searchsorted(volumes, 0.1 * volumes[-1], "right")) - 1, 0)
+    varies = np.abs(rates[first:] - rates[-1]) > work.case.settings.rtol * rates[-1]
+    if volumes[first] > 0.1 * volumes[-1] or varies.any():
+        return False
+    rows = np.flatnonzero(joint.component_index % 3 == 0)
+    rows = rows[pressed[joint.component_index[rows] // 3]]
+    pair = joint.component_index[rows] // 3
+    moved = joint.structure.static_stiffness[rows, rows] * at.wear_depth[pair]
+    return bool((moved >= ACTED_BACK * normal[pair]).all())

@@ -6,8 +6,8 @@ its mean position gets a soft hold in the direction without stiffness:
 Only friction holds a root along a prismatic slot. Where every pair slips at some time of the period, nothing determines
 the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean force g along the
 slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Strictly, the root creeps by about g / F of its slip
-path in a period, here 1e-12 m, and motion and wear change by g / F at most. So a soft spring holds the mean position
-from there on. Where g / F is no longer negligible there is no periodic state, and the outcome is ADRIFT.
+path in a period, and motion and wear change by g / F at most. So a soft spring holds the mean position from there on.
+Where g / F is no longer negligible there is no periodic state, and the outcome is ADRIFT.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from solver.contact.coulomb import STICK
 from solver.continuation.natural import follow_naturally
 from solver.continuation.transient import SEARCH_ITERATIONS, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.state import Failure, State, final_history, vibration_change
+from solver.harmonic_balance.state import Failure, State, vibration_change
 from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.results.verdict import HELD_FORCE
@@ -28,8 +28,7 @@ from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
 from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
-from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.wearing_joint import WearingJoint, WearState
 
 
 def jump(work: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
@@ -51,24 +50,22 @@ def _held(work: WearingJoint, state: WearState, worn: FloatArray, *, drifts: boo
 
     drifts: whether the joint is known to slide as a whole, although some pairs still stick.
     """
-    at = state.point.evaluation
+    at, before = state.point.evaluation, state.depth
     hold = None if state.hold is not None else free_slide(work.at(state), at, drifts=drifts)
     if hold is None:
         return None
-    joint, before = work.case.held(hold).joint(state.omega, work.excitation_amplitude), state.depth
+    joint = work.case.held(hold).joint(state.omega, work.excitation_amplitude)
 
-    def balance_at(fraction: float, history: FloatArray) -> Balance:
-        return Balance(joint, history, before + fraction * (worn - before))
+    def balance_at(fraction: float, _: FloatArray) -> Balance:
+        return Balance(joint, state.point.history, before + fraction * (worn - before))
 
-    start = replace(state.point, parameter=0.0)
-    found, arrived = follow_naturally(balance_at, start, 1.0, work.run, keep_history=True)
+    found, arrived = follow_naturally(balance_at, replace(state.point, parameter=0.0), 1.0, work.run)
     there = found.evaluation
     if not arrived or not work.is_stable(joint, there) or creeps(joint, hold, there):
         return None
     if vibration_change(at, there) > OTHER_BRANCH:
         return None
-    point = State(there, final_history(balance_at(1.0, start.history), there))
-    return replace(state, point=point, hold=hold, held_from=state.cycle)
+    return replace(state, point=State(there, found.history), hold=hold, held_from=state.cycle)
 
 
 def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
@@ -78,7 +75,7 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
     joint, last = work.at(state), state.point
-    found = relax_to_periodic(work.case, joint, worn, last.evaluation, joint, last.history, work.run)
+    found = relax_to_periodic(work.case, joint, worn, last, joint, work.run)
     if isinstance(found, Outcome):
         return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners

@@ -1,7 +1,7 @@
-"""A joint that wears: where it is excited, the data common to all states of a history, a kept factorisation.
+"""A joint that wears: its state, from which a history goes on, and what all states of a history have in common.
 
-A followed frequency is an unknown with one more equation: a given phase lag of the vibration
-(`solver.continuation.phase_lag`), or that of the largest amplitude (`solver.continuation.largest_response`).
+A followed frequency is an unknown with one more equation: a given phase lag of the vibration, or that of the largest
+amplitude (`solver.continuation.phase_lag`).
 """
 
 from __future__ import annotations
@@ -11,101 +11,109 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.period_events import left_out
+from solver.accuracy.error_estimate import NOTHING, Estimate
+from solver.accuracy.harmonic_levels import left_out
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
-from solver.continuation.largest_response import accepted_rise, rise_of_response, solve_at_peak
 from solver.continuation.natural import NEAR_ITERATIONS
-from solver.continuation.phase_lag import solve_at_lag
+from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import FloatArray
-from solver.newton.iteration import MOST_ITERATIONS
-from solver.newton.run import Run
+from solver.newton.run import MOST_ITERATIONS, Run
 from solver.outcome import Outcome, in_digits
+from solver.packing import packable
 from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.rate_slope import explicit_step_limit
-from solver.wear.state import Choice, LastStep, WearState
+
+NO_WEAR = 1e-12
+"""Fraction of `WearState.most_rate`: a joint that wears less sticks, and its rate is round-off."""
 
 
+@packable
 @dataclass(frozen=True)
-class Fixed:
-    """The frequency of the unworn state."""
+class Choice:
+    """The last choice of harmonics and samples.
 
-    follows = False
+    left_out: fraction of the contact force in harmonics that are left out, of the state for which they were chosen.
+    estimate: errors of response and wear rate. accurate: whether they are below rtol; True for given harmonics.
+    """
 
-    def solve(
-        self, _: Case, balance: Balance, start: FloatArray, state: WearState, run: Run, most: int | None = None
-    ) -> WearState | None:
-        """The state with the solution of a balance; None where it is not found.
-
-        start (n_rel, 2H+1): first predicted force, N. state: the state before. run, most: as in `Run.solve`.
-        """
-        point = run.state(balance, start, most=most or NEAR_ITERATIONS)
-        return None if point is None else replace(state, point=point)
-
-    def lost(self, _: WearState, failure: Failure, /) -> Failure:
-        """The end of a history where a search behind its last state has failed."""
-        return failure
+    left_out: float
+    estimate: Estimate
+    accurate: bool
 
 
-FIXED = Fixed()
-
-
+@packable
 @dataclass(frozen=True)
-class Following(Fixed):
-    """Phase resonance or the largest amplitude in a range. A state may be unstable at fixed frequency."""
+class LastStep:
+    """The last step, for BDF2 and for the extrapolation to the next state.
 
-    wanted: FollowedFrequency
+    length: cycles. At its start: depth (n_contact,), m, predicted_h (n_rel, 2H+1), N, omega, rad/s, resolution.
+    """
 
-    follows = True
+    length: float
+    depth: FloatArray
+    predicted_h: FloatArray
+    omega: float
+    resolution: Resolution
 
-    def solve(
-        self, case: Case, balance: Balance, start: FloatArray, state: WearState, run: Run, most: int | None = None
-    ) -> WearState | None:
-        """As in `Fixed`; the frequency of the balance is the first one."""
-        lag, most = state.lag, most or NEAR_ITERATIONS
-        if self.wanted.of == "peak":
-            peak = solve_at_peak(case, balance, start, lag, run, most)
-            found, lag = (None, lag) if peak is None else peak
-        else:
-            found = solve_at_lag(case, balance, start, lag, run, most)
-        if found is None:
-            return None
-        turn = math.nan if found.reduced is None else abs(float(found.reduced[0, 0]))
-        if math.isnan(turn) and state.half_width == 0.0:
-            turn = abs(rise_of_response(found, run, accepted_rise(case.settings.rtol))[1])
-        half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
-        point = State(found.at, final_history(found.balance, found.at))
-        return replace(state, point=point, omega=float(found.values[0]), lag=lag, half_width=half_width)
 
-    def error(self, state: WearState, response_error: float, rtol: float) -> float:
-        """Error of the frequency of a state, Hz, by the relative error of its response and rtol.
+@packable
+@dataclass(frozen=True)
+class WearState:
+    """A wearing joint at one cycle count; the next step depends on this state only.
 
-        The phase of the vibration, and so the phase lag, is wrong by as much as the amplitude. The amplitude is flat at
-        its maximum: every amplitude that is less than the largest one by its error may be the largest one.
-        """
-        lag = response_error
-        if self.wanted.of == "peak":
-            lag = math.sqrt(2.0 * response_error) + accepted_rise(rtol)
-        return state.half_width * lag / (2.0 * math.pi)
+    cycle: count. omega: of the excitation, rad/s. point: periodic state with its depth and tangential history.
+    resolution, choice: harmonics and samples of the state, and their last choice.
+    rates, largest_rates (n_contact + 1,): wear rates of the pairs and, last, of all together, and their largest values
+        so far, m3 per cycle; NaN and zero before the first state.
+    most_rate: wear rate if every pair slipped as far as it moves, m3 per cycle.
+    step_limit: largest stable explicit step at the first state that wears, cycles; NaN as long as nothing wears.
+    previous: the last step; None at the first state and after a jump.
+    length, first_length: largest length of the next step, and length of the first adaptive step, cycles.
+    judged_h (n_rel, 2H+1): predicted force at the last stability check, N; None before.
+    lag, half_width: of a followed frequency: phase lag of the vibration, rad, and change of the frequency over that of
+        the lag, rad/s; 0 for a given frequency.
+    hold, held_from: soft hold of the mean position of a joint that slides as a whole, and the count from which on it is
+        held; None and NaN for none.
+    jump_cycle: count of the first jump to another branch, NaN if none.
+    inaccurate_from, worst: count from which on harmonics and samples no longer bring the errors below rtol, inf if
+        never, and the largest errors from there on.
+    """
 
-    def out_of_range(self, state: WearState) -> Failure | None:
-        """The end of a history whose frequency leaves its range; None within."""
-        frequency, wanted = state.omega / (2.0 * math.pi), self.wanted
-        if wanted.low <= frequency <= wanted.high:
-            return None
-        said = f"at cycle {in_digits(state.cycle)} the {wanted.of} is at {frequency:.6g} Hz"
-        return Failure(Outcome.RESONANCE_LOST, f"{said}, out of the range from {wanted.low:g} to {wanted.high:g} Hz")
+    cycle: float
+    omega: float
+    point: State
+    resolution: Resolution
+    choice: Choice
+    rates: FloatArray
+    largest_rates: FloatArray
+    most_rate: float = 0.0
+    step_limit: float = math.nan
+    previous: LastStep | None = None
+    length: float = 0.0
+    first_length: float = 0.0
+    judged_h: FloatArray | None = None
+    lag: float = 0.5 * math.pi
+    half_width: float = 0.0
+    hold: Hold | None = None
+    held_from: float = math.nan
+    jump_cycle: float = math.nan
+    inaccurate_from: float = math.inf
+    worst: Estimate = NOTHING
 
-    def lost(self, state: WearState, _: Failure, /) -> Failure:
-        """As in `Fixed`."""
-        at = f"at cycle {in_digits(state.cycle)} and {state.omega / (2.0 * math.pi):.6g} Hz"
-        said = f"the {self.wanted.of} ends {at}: no state beyond is found to go on with"
-        return Failure(Outcome.RESONANCE_LOST, said)
+    @property
+    def depth(self) -> FloatArray:
+        """Worn depth (n_contact,), m."""
+        return self.point.evaluation.wear_depth
+
+    @property
+    def wears(self) -> bool:
+        """Whether the wear rate is above the round-off of the slip by the static load."""
+        return bool(self.rates[-1] > NO_WEAR * self.most_rate)
 
 
 @dataclass
@@ -115,7 +123,7 @@ class WearingJoint:
     case: model, friction and settings, with the resolution and the hold of the last state that was used.
     start: unworn state, which exists; its load is that of the history.
     wear_coefficient: 1/Pa. law: part of the slip work that wears.
-    where: at which frequency.
+    follow: what the frequency of the excitation follows, None for the frequency of the unworn state.
     run: counts the iterations, limits the time, and keeps a factorisation from one solve to the next.
     """
 
@@ -123,7 +131,7 @@ class WearingJoint:
     start: StartState
     wear_coefficient: float
     law: WearLaw = ARCHARD
-    where: Fixed = FIXED
+    follow: FollowedFrequency | None = None
     excitation_amplitude: float = field(init=False)
     wearing: WearingWork = field(init=False)
     run: Run = field(init=False)
@@ -172,10 +180,7 @@ class WearingJoint:
         return cycles * self.wear_coefficient / self.area
 
     def begin(self, step_limit: float = math.nan, *, of_reference: bool = False) -> WearState:
-        """The unworn state, or that of the reference sweep where there is one. It is evaluated, not solved again.
-
-        step_limit: largest stable explicit step, cycles; NaN if unknown.
-        """
+        """The unworn state, or that of the reference sweep where there is one, evaluated and not solved again."""
         start = self.start
         state = start.reference if of_reference and start.reference is not None else start.state
         assert state is not None
@@ -197,11 +202,6 @@ class WearingJoint:
         )
         return self.noted(begun)
 
-    def accepted(self, state: WearState, end: WearState, length: float) -> WearState:
-        """The end of a step of `length` cycles from a state; end: that state with the solution of the step."""
-        last = LastStep(length, state.depth, state.point.evaluation.predicted_h, state.omega, state.resolution)
-        return self.noted(replace(end, cycle=state.cycle + length, previous=last))
-
     def noted(self, state: WearState) -> WearState:
         """The state with its wear rates, and with the limit of the explicit step from the first state that wears on."""
         at = state.point.evaluation
@@ -218,11 +218,65 @@ class WearingJoint:
             state = replace(state, step_limit=limit)
         return state
 
+    def solve(
+        self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS
+    ) -> WearState | None:
+        """The state before with the solution of a balance, whose frequency is the first one that follows; or None.
+
+        start (n_rel, 2H+1): first predicted force, N. most: Newton iterations.
+        """
+        if self.follow is None:
+            point = self.run.state(balance, start, most=most)
+            return None if point is None else replace(state, point=point)
+        lag = state.lag
+        if self.follow.of == "peak":
+            peak = solve_at_peak(self.case, balance, start, lag, self.run, most)
+            found, lag = (None, lag) if peak is None else peak
+        else:
+            found = solve_at_lag(self.case, balance, start, lag, self.run, most)
+        if found is None:
+            return None
+        turn = math.nan if found.reduced is None else abs(float(found.reduced[0, 0]))
+        if math.isnan(turn) and state.half_width == 0.0:
+            turn = abs(rise_of_response(found, self.run, accepted_rise(self.case.settings.rtol))[1])
+        half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
+        point = State(found.at, final_history(found.balance, found.at))
+        return replace(state, point=point, omega=float(found.values[0]), lag=lag, half_width=half_width)
+
     def at_followed(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depths and its tangential history."""
-        if not self.where.follows:
+        if self.follow is None:
             return state
         at = state.point.evaluation
         balance = Balance(self.at(state), at.history, at.wear_depth)
-        found = self.where.solve(self.case, balance, at.predicted_h, state, self.run, MOST_ITERATIONS)
-        return found or self.where.lost(state, Failure(Outcome.RESONANCE_LOST))
+        found = self.solve(balance, at.predicted_h, state, MOST_ITERATIONS)
+        return found or self.lost(state, Failure(Outcome.RESONANCE_LOST))
+
+    def lost(self, state: WearState, failure: Failure) -> Failure:
+        """The end of a history where a search behind its last state has failed."""
+        if self.follow is None:
+            return failure
+        at = f"at cycle {in_digits(state.cycle)} and {state.omega / (2.0 * math.pi):.6g} Hz"
+        said = f"the {self.follow.of} ends {at}: no state beyond is found to go on with"
+        return Failure(Outcome.RESONANCE_LOST, said)
+
+    def out_of_range(self, state: WearState) -> Failure | None:
+        """The end of a history whose frequency leaves its range; None within."""
+        frequency, wanted = state.omega / (2.0 * math.pi), self.follow
+        if wanted is None or wanted.low <= frequency <= wanted.high:
+            return None
+        said = f"at cycle {in_digits(state.cycle)} the {wanted.of} is at {frequency:.6g} Hz"
+        return Failure(Outcome.RESONANCE_LOST, f"{said}, out of the range from {wanted.low:g} to {wanted.high:g} Hz")
+
+    def frequency_error(self, state: WearState) -> float:
+        """Error of a followed frequency, Hz, by the relative error of the response; 0 for a given one.
+
+        The phase lag is wrong by as much as the amplitude. Every amplitude that is less than the largest one by its
+        error may be the largest one.
+        """
+        if self.follow is None:
+            return 0.0
+        lag = state.choice.estimate.response
+        if self.follow.of == "peak":
+            lag = math.sqrt(2.0 * lag) + accepted_rise(self.case.settings.rtol)
+        return state.half_width * lag / (2.0 * math.pi)

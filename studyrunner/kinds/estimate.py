@@ -1,7 +1,7 @@
 """Estimated work of a task, for the order of the tasks, the time left and `--plan`.
 
 The estimates fit the bundled studies on one core within a factor of two. A joint that jumps takes longer. A joint in
-which nothing slips takes no step.
+which nothing slips takes no step. Numbers of Newton iterations have in brackets what was measured.
 """
 
 from __future__ import annotations
@@ -10,72 +10,39 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-ITERATIONS_AT_FIRST = 560
-"""Newton iterations to the first state of a sweep, so many that with the planned harmonics they take the time: between
-the dovetail (32 samples at its resonance: 270) and the root of the deck `blade_root` (1180, with up to 13 harmonics).
-The time of both studies is then estimated within 1.6."""
+_AT_FIRST = 560  # to the first state of a sweep (dovetail 270, deck `blade_root` with up to 13 harmonics 1180)
+_OF_RAMP = 180  # to the only state of a ramp (1 and 48 pairs: 221 and 146)
+_A_STATE = 50  # each further frequency of a sweep (slider 70, dovetail 65, 130 to 260 at a wall, 3 where nothing slips)
+_OF_MODE = 900  # to the first point of a mode; with two more unknowns it takes five times as long as forced vibration
+_A_MODE_POINT = 300  # each further amplitude, with errors (study `modes`: 3300 for 9; 30 where nothing slips)
+_A_STEP = 3  # in slow time, explicit or implicit (2 to 4 where the joint slips)
+_AN_ADAPTIVE_STEP = 7  # with refused steps and the reference solution (36 and 48 pairs near the resonance: 4 to 13)
+_OF_BLOCK = 20  # of a mission behind its start state (slider: 10 to 35)
+_OF_PASSAGE = 900  # (dovetail with 16 pairs, rtol 0.1: 970, 2500 with 40 frequencies, 330 where nothing slips)
+_AN_OCTAVE = 350  # of a wide passage (slider from 1 to 10 000 Hz: 5600, and 2700 of its reference solution)
 
-ITERATIONS_OF_RAMP = 180
-"""Newton iterations to the only state of a ramp (1 and 48 pairs: 221 and 146)."""
+_ADAPTIVE_STEPS = 40
+_STEPS_TO_THE_END = 100
+"""Of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)."""
 
-ITERATIONS_A_STATE = 50
-"""Newton iterations for each further frequency of a sweep (5 points of a slider 70, 18 around the resonance of the
-dovetail 65, 11 of a mass that hits a wall 130 to 260; 3 where nothing slips)."""
-
-ITERATIONS_OF_MODE = 900
-"""Newton iterations to the first point of a nonlinear mode, so many that they take the time: one with frequency and
-damping among the unknowns takes about five times as long as one of forced vibration."""
-
-ITERATIONS_A_MODE_POINT = 300
-"""The same for each further amplitude, with errors (study `modes`: 3300 for 9 amplitudes; 30 where nothing slips)."""
-
-ITERATIONS_A_STEP = 3
-"""Newton iterations of one step in slow time, explicit or implicit (measured: 2 to 4 where the joint slips)."""
-
-ADAPTIVE_STEPS = 40
-"""Steps of a history with the adaptive scheme."""
-
-STEPS_TO_THE_END = 100
-"""Steps of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)."""
-
-ITERATIONS_AN_ADAPTIVE_STEP = 7
-"""Newton iterations of one adaptive step near the resonance (36 and 48 pairs: 4 to 13), with refused steps and the
-reference solution."""
-
-MISSIONS_A_DOUBLING = 2.0
+_MISSIONS_A_DOUBLING = 2.0
 """Missions that are computed for each doubling of their number, by the history and again by its reference solution: 6
 of 20 on a slider, 18 to 26 of thousands on a dovetail, 42 of a million on a slider."""
 
-WAYS_OF_ONE_PAIR = 0.25
-"""Ramps and sweeps of a joint of one pair, which slips: 2 of 14 missions with 20 missions, 12 of 84 with a million
-(`solver.missions.block_run`)."""
-
-WAYS = 0.5
-"""Newton iterations of the way to a block in a later mission, over those of the first one (dovetail with 16 pairs: 150
-to 190 of 320 to 380)."""
-
-ITERATIONS_OF_BLOCK = 20
-"""Newton iterations of a block behind its start state (slider: 10 to 35, those of a way that is not gone included)."""
-
-ITERATIONS_OF_PASSAGE = 900
-"""Newton iterations of a passage (dovetail with 16 pairs, rtol 0.1, 17 to 25 frequencies: 970 where most of its time
-goes, 330 where nothing slips; 2500 with about 40 frequencies)."""
-
-ITERATIONS_AN_OCTAVE = 350
-"""Those of a wide passage for each octave (slider from 1 to 10 000 Hz: 5600, and 2700 of its reference solution)."""
+_WAYS, _WAYS_OF_ONE_PAIR = 0.5, 0.25
+"""Iterations of the way to a block in a later mission, over those of the first one (dovetail with 16 pairs: 150 to 190
+of 320 to 380; of one pair that slips 2 of 14 missions with 20 missions, 12 of 84 with a million)."""
 
 AUTOMATIC_HARMONICS = 5
 """Harmonics of a state on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
 
+_AUTOMATIC_HARMONICS_AT_MOST = 9  # for which the memory is estimated
+
 COMPILE_SECONDS = 9
 """Time for compiling the functions of the solver, s, once on a machine."""
 
-AUTOMATIC_HARMONICS_AT_MOST = 9
-"""Largest automatic number of harmonics for which the memory is estimated."""
-
 _BASE_MEMORY = 250e6
 _NOTICED_MEMORY = 1e8  # what building a small scene takes is in the libraries' and differs from run to run
-_MATRICES_A_RANK = 1
 
 
 def seconds_an_iteration(n_unknowns: int) -> float:
@@ -89,13 +56,12 @@ def seconds_an_iteration(n_unknowns: int) -> float:
 
 def iterations_of_sweep(sweep: str, n_frequencies: int) -> int:
     """Newton iterations of a sweep through so many frequencies, or of a ramp."""
-    first = ITERATIONS_OF_RAMP if sweep == "ramp" else ITERATIONS_AT_FIRST
-    return first + ITERATIONS_A_STATE * (n_frequencies - 1)
+    return (_OF_RAMP if sweep == "ramp" else _AT_FIRST) + _A_STATE * (n_frequencies - 1)
 
 
 def iterations_of_mode(n_amplitudes: int) -> int:
     """Newton iterations of a nonlinear mode at so many amplitudes."""
-    return ITERATIONS_OF_MODE + ITERATIONS_A_MODE_POINT * (n_amplitudes - 1)
+    return _OF_MODE + _A_MODE_POINT * (n_amplitudes - 1)
 
 
 def iterations_of_histories(steps: Sequence[tuple[str, float]], cycles: float) -> int:
@@ -104,16 +70,16 @@ def iterations_of_histories(steps: Sequence[tuple[str, float]], cycles: float) -
     steps: scheme and step of each. Those with given steps are compared with the adaptive history.
     """
     if cycles == 0.0:
-        return ITERATIONS_A_STEP
+        return _A_STEP
     given = [step for scheme, step in steps if scheme not in ("adaptive", "final")]
-    n_steps = sum(max(1, math.ceil(cycles / step)) if cycles < math.inf else STEPS_TO_THE_END for step in given)
-    adaptive = ADAPTIVE_STEPS if cycles < math.inf else STEPS_TO_THE_END
-    return ITERATIONS_AN_ADAPTIVE_STEP * adaptive + ITERATIONS_A_STEP * n_steps
+    n_steps = sum(max(1, math.ceil(cycles / step)) if cycles < math.inf else _STEPS_TO_THE_END for step in given)
+    adaptive = _ADAPTIVE_STEPS if cycles < math.inf else _STEPS_TO_THE_END
+    return _AN_ADAPTIVE_STEP * adaptive + _A_STEP * n_steps
 
 
 def missions_computed(missions: float) -> int:
     """Missions that are computed for a number of missions, by the history or by its reference solution."""
-    return math.ceil(min(missions, 2.0 + MISSIONS_A_DOUBLING * math.log2(max(missions, 1.0))))
+    return math.ceil(min(missions, 2.0 + _MISSIONS_A_DOUBLING * math.log2(max(missions, 1.0))))
 
 
 def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float, *, one_pair: bool) -> float:
@@ -125,16 +91,16 @@ def iterations_of_missions(blocks: Sequence[tuple[str, float]], missions: float,
     each = 0.0
     for begin, octaves in blocks:
         if octaves > 0.0:
-            each += ITERATIONS_OF_PASSAGE + ITERATIONS_AN_OCTAVE * octaves
+            each += _OF_PASSAGE + _AN_OCTAVE * octaves
         elif begin == "continue":
-            each += 2 * ITERATIONS_OF_BLOCK
+            each += 2 * _OF_BLOCK
         else:
-            each += ITERATIONS_OF_BLOCK + iterations_of_sweep(begin, 1) * (WAYS_OF_ONE_PAIR if one_pair else WAYS)
+            each += _OF_BLOCK + iterations_of_sweep(begin, 1) * (_WAYS_OF_ONE_PAIR if one_pair else _WAYS)
     return 2 * missions_computed(missions) * each
 
 
 def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float) -> float:
-    """Memory of one rank, bytes: the libraries, the dense matrices, and the arrays of the result.
+    """Memory of one rank, bytes: the libraries, the dense matrix, and the arrays of the result.
 
     Measured 0.37, 1.10 and 2.72 GB at 48, 160 and 336 pairs with automatic harmonics: within a factor of 1.2.
 
@@ -142,10 +108,10 @@ def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_wi
     largest state has `AUTOMATIC_HARMONICS`. built_with: memory that building the scene takes beside the libraries,
     bytes.
     """
-    grown = (2.0 * AUTOMATIC_HARMONICS_AT_MOST + 1.0) / (2.0 * AUTOMATIC_HARMONICS + 1.0) if automatic else 1.0
-    solved = _BASE_MEMORY + _MATRICES_A_RANK * 8.0 * (grown * n_unknowns) ** 2
-    built = _BASE_MEMORY + _NOTICED_MEMORY * math.floor(built_with / _NOTICED_MEMORY)
-    return max(solved, built) + 8.0 * result_values
+    grown = (2.0 * _AUTOMATIC_HARMONICS_AT_MOST + 1.0) / (2.0 * AUTOMATIC_HARMONICS + 1.0) if automatic else 1.0
+    solved = 8.0 * (grown * n_unknowns) ** 2
+    built = _NOTICED_MEMORY * math.floor(built_with / _NOTICED_MEMORY)
+    return _BASE_MEMORY + max(solved, built) + 8.0 * result_values
 
 
 def largest_memory() -> float:

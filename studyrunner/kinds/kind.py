@@ -1,4 +1,4 @@
-"""Study -> its kind: the only place of the runner that asks which one it is."""
+"""Study -> its kind and its tasks: the only place of the runner that asks which kind it is."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from studyrunner.kinds import missions, modes, wear_plan
-from studyrunner.kinds.task import Task
-from studyrunner.kinds.task_plan import TaskPlan
+from studyrunner.kinds.task import Task, TaskPlan
 from studyrunner.scene.scene_set import SceneSet, find_scenes
-from studyrunner.study.kinds import MISSIONS, MODES
-from studyrunner.study.study import Study
+from studyrunner.study.study import MISSIONS, MODES, Study
 
 
 class Kind(Protocol):
@@ -45,11 +43,10 @@ def build_tasks(
     """Tasks of a study. Their order and numbers depend on the study alone.
 
     n_displacements: number of relative displacements of each scene of the study (`find_scenes`), or of all scenes.
-    contacts: what is drawn for the pairs of each part of the study, as `contact_changes` gives it; None for nothing.
-    scenes: of the study, where they are known already.
+    contacts: what is drawn for the pairs of each part (`contact_changes`); None for nothing. scenes: of the study,
+    where they are known already.
     """
     scenes = find_scenes(study) if scenes is None else scenes
     drawn: Sequence[Any] = (((),) * len(study.mission),) * len(scenes.parts) if contacts is None else contacts
-    n_scenes = len(scenes.studies)
-    sizes = (n_displacements,) * n_scenes if isinstance(n_displacements, int) else tuple(n_displacements)
+    sizes = [n_displacements] * len(scenes.studies) if isinstance(n_displacements, int) else n_displacements
     return kind_of(study).build_tasks(study, sizes, drawn, scenes)

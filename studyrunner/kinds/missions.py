@@ -1,4 +1,4 @@
-"""Mission histories: tasks and their computation."""
+"""Mission histories: tasks, their computation, and what a result file holds of them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, replace
 from typing import TYPE_CHECKING, Literal, cast
+
+import numpy as np
 
 from solver.contact.wear_law import WearLaw
 from solver.packing import Packed
@@ -20,16 +22,18 @@ from studyrunner.kinds.task import (
     PointResult,
     Reached,
     Task,
+    TaskPlan,
     described,
     digest,
     joint_of,
     n_unknowns_of,
+    number_points,
     raise_fault,
     settings_at,
 )
-from studyrunner.kinds.task_plan import TaskPlan, number_points
 from studyrunner.mpi.cost_model import CostKeys
-from studyrunner.scene.drawn_contacts import ContactChange
+from studyrunner.percent import show_count
+from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.mission import MissionBlock
 from studyrunner.study.realisation import Realisation
@@ -38,7 +42,10 @@ from studyrunner.study.study import Study
 from studyrunner.system.progress import count
 
 if TYPE_CHECKING:
-    from solver.model import ReducedModel
+    from solver.missions.mission import MissionHistory
+    from solver.model import FloatArray, ReducedModel
+
+TIME = "to a factor of three, if every block wears"
 
 _OF_ONE_PAIR = 3
 """Relative displacements of one contact pair, at most."""
@@ -107,17 +114,16 @@ class Mission(Task):
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """The history."""
-        from solver.missions import blocks as solver_blocks
+        from solver.missions import mission as of_solver
         from solver.missions.history import integrate_missions
-        from studyrunner.kinds.mission_result import build_mission_result, missions_read
 
         of_joints = {block.joint: block.joint.model(models) for block in self.blocks}
         blocks = tuple(
-            solver_blocks.Block(
+            of_solver.Block(
                 model=of_joints[block.joint],
                 frequency=block.frequency
                 if block.passage is None
-                else solver_blocks.Passage(block.frequency, *block.passage),
+                else of_solver.Passage(block.frequency, *block.passage),
                 excitation_amplitude=block.excitation_amplitude,
                 friction_coefficient=block.joint.friction_coefficient,
                 cycles=block.cycles if block.passage is None else None,
@@ -134,18 +140,14 @@ class Mission(Task):
             reached(progress)
             keep(min(next(n_computed) / n_planned, _MOST))
 
-        mission = solver_blocks.Mission(
-            blocks,
-            self.wear_coefficient,
-            missions_read(self.missions),
-            self.settings,
-            self.law,
-            self.until,
-            cast("Literal['up', 'down', 'ramp']", self.begin),
-        )
+        kept = {int(number) for number in self.missions}
+        # with those before, for the wear of one
+        read = tuple(sorted({0, 1} | kept | {max(number - 1, 0) for number in kept}))
+        begin = cast("Literal['up', 'down', 'ramp']", self.begin)
+        mission = of_solver.Mission(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, begin)
         history = integrate_missions(mission, note, self.resume)
         raise_fault(history.outcome, history.message)
-        yield replace(build_mission_result(self, history), progress=reached.after(history.outcome))
+        yield PointResult(self.points(0), _values(self, history), progress=reached.after(history.outcome))
 
     def describe(self, place: int) -> str:  # noqa: ARG002
         """Its number."""
@@ -154,7 +156,7 @@ class Mission(Task):
 
 def variables(study: Study) -> tuple[str, ...]:
     """Variables of a mission history: those asked for and those that the last lines of a run are made of."""
-    return tuple(name for name in study.variables if name in study.outputs.variables or name in _FOR_THE_TABLE)
+    return tuple(name for name in study.kind.asked if name in (*study.outputs.variables, *_FOR_THE_TABLE))
 
 
 def build_tasks(
@@ -165,15 +167,14 @@ def build_tasks(
     contacts: what is drawn for the pairs of each part, by block.
     """
     points: dict[Mission, list[Index]] = {}
-    for number, part in enumerate(scenes.parts):
+    for part, numbers, of_blocks in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
         sizes = {name: len(getattr(part.study.axes, name)) for name in _POINT}
         sizes |= {name: len(getattr(study, name)) for name in SOLVER_AXES}
         for places in itertools.product(*map(range, sizes.values())):
             at = dict(zip(sizes, places, strict=True))
-            blocks = tuple(_blocks(part, at, scenes.of_blocks[number], contacts[number]))
-            task = _task(study, part, at, blocks, n_displacements)
+            task = _task(study, part, at, tuple(_blocks(part, at, numbers, of_blocks)), n_displacements)
             points.setdefault(task, []).append((*(at[name] for name in study.own_axes), *part.place))
-    return number_points({task: [tuple(indices)] for task, indices in points.items()}, study, len(scenes.studies))
+    return number_points({task: [tuple(indices)] for task, indices in points.items()}, study)
 
 
 def _blocks(
@@ -181,9 +182,8 @@ def _blocks(
 ) -> Iterator[PlannedBlock]:
     """The blocks of a point. at: indices of the point along the axes."""
     sweep = part.study.axes.sweep[at["sweep"]]
-    for given, study, scene, contact in zip(
-        part.study.mission, part.study.block_studies, scenes, contacts, strict=True
-    ):
+    of_blocks = zip(part.study.mission, part.study.block_studies, scenes, contacts, strict=True)
+    for given, study, scene, contact in of_blocks:
         amplitude, frequency = (
             getattr(study.axes, name)[0 if given.gives(name) else at[name]]
             for name in ("excitation_amplitude", "frequency")
@@ -194,7 +194,7 @@ def _blocks(
             passage, begin = (stop, given.frequency["rate"]), "up" if stop > frequency else "down"
         elif begin == "sweep":
             begin = sweep
-        joint = joint_of(Realisation(study, part.place), scene, contact)
+        joint = joint_of(study, scene, contact)
         yield PlannedBlock(given.name, joint, frequency, passage, amplitude, given.cycles_at(frequency), begin)
 
 
@@ -229,9 +229,6 @@ def _task(
     )
 
 
-TIME = "to a factor of three, if every block wears"
-
-
 def describe_tasks(tasks: Sequence[Task]) -> str:
     """Tasks in words."""
     return f"{count(len(tasks), 'mission history', 'mission histories')}, each computed by one rank"
@@ -239,7 +236,7 @@ def describe_tasks(tasks: Sequence[Task]) -> str:
 
 def slow_time(study: Study) -> list[tuple[str, str]]:
     """Number of missions, and the blocks."""
-    kept = count(len(study.missions_kept), "number is", "numbers are")
+    kept = count(len(study.cycles_kept), "number is", "numbers are")
     blocks = zip(study.mission, study.block_studies, strict=True)
     return [
         ("missions", f"{study.slow_time.missions}, of which {kept} kept"),
@@ -255,3 +252,70 @@ def _describe(block: MissionBlock, frequency: float) -> str:
         passed = "{start:g} to {stop:g} Hz at {rate:g} Hz/s".format(**block.frequency)
         return f"passage from {passed}, {cycles}"
     return f"{frequency:g} Hz, {cycles}, {how[block.begin]}"
+
+
+def _values(task: Mission, history: MissionHistory) -> dict[str, object]:
+    """Variables of the result, at the numbers of missions that the task asks for."""
+    counts = np.array(task.missions)
+    rows, ends = (np.searchsorted(history.missions, each) for each in (counts, np.clip(counts, 1.0, None)))
+    in_mission = history.block_volume[ends] - history.block_volume[ends - 1]
+    rate, worn = in_mission.sum(axis=1), history.worn_volume[rows]
+    share = np.divide(in_mission, rate[:, None], out=np.full_like(in_mission, np.nan), where=rate[:, None] > 0.0)
+    depth, depth_error = history.wear_depth[rows], history.wear_depth_error[rows]
+    deepest = np.nan_to_num(depth).argmax(axis=1)[:, None]
+    reached = np.flatnonzero(np.isfinite(worn))
+    last = history.wear_depth[rows[reached[-1]] if reached.size else 0]
+    of_task: Mapping[str, object] = {
+        "worn_volume": worn,
+        "wear_rate": np.where(np.isfinite(worn), rate, np.nan),
+        "wear_depth": depth,
+        "wear_depth_max": depth.max(axis=1, initial=0.0),
+        "wear_depth_max_error": np.take_along_axis(depth_error, deepest, axis=1)[:, 0],
+        "wear_depth_last": last,
+        "block_worn_volume": history.block_volume[rows],
+        "block_worn_volume_error": history.block_volume_error[rows],
+        "block_share": share,
+        "response_amplitude": np.abs(history.response_end[rows]),
+        "response_phase": np.angle(history.response_end[rows]),
+        "response_amplitude_begin": np.abs(history.response_begin[rows]),
+        "response_peak": history.response_peak_end[rows],
+        "response_peak_begin": history.response_peak_begin[rows],
+        "response_error": history.response_error[rows],
+        "excitation_frequency": history.excitation_frequency[:, 1],
+        "excitation_frequency_begin": history.excitation_frequency[:, 0],
+        "block_cycles": np.array([block.cycles for block in task.blocks]),
+        "sweep_rate": history.sweep_rate,
+        "worn_volume_error": history.worn_volume_error[rows],
+        "wear_depth_error": depth_error,
+    }
+    return {
+        **{name: of_task[name] for name in task.variables},
+        "outcome": int(history.outcome),
+        "missions_to_target": history.missions_to_target,
+        "missions_to_target_error": history.missions_to_target_error,
+        "newton_iterations": history.newton_iterations,
+        "run_time": history.run_time,
+        # a mission is computed for the vibration at 0
+        "error_estimate": history.error_estimate if counts[-1] > 0.0 else 0.0,
+        "last_mission": _last(history, counts),
+        "largest_wear_depth": float(last.max(initial=0.0)) if reached.size else math.nan,
+        "message": "; ".join(filter(None, (history.message, _of_target(task, history)))),
+    }
+
+
+def _last(history: MissionHistory, counts: FloatArray) -> float:
+    """Number of missions up to which the point was computed; NaN where there is no state at all."""
+    if not np.isfinite(history.worn_volume).any() or not np.isfinite(history.response_begin).any():
+        return math.nan
+    return min(history.last_mission, float(counts[-1]))
+
+
+def _of_target(task: Mission, history: MissionHistory) -> str:
+    """What there is to say of the target."""
+    if task.until is None or not history.outcome.complete:
+        return ""
+    if math.isnan(history.missions_to_target):
+        return f"{task.until.quantity} stays below {task.until.value:g}"
+    if history.last_mission < task.missions[-1]:
+        return f"at its target at mission {show_count(round(history.missions_to_target))}: later ones are not computed"
+    return ""

@@ -9,23 +9,25 @@ from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 
-from studyrunner.kinds.estimate import ITERATIONS_A_MODE_POINT, iterations_of_mode, seconds_an_iteration
+from studyrunner.kinds.estimate import iterations_of_mode, seconds_an_iteration
 from studyrunner.kinds.task import (
     Identity,
     JointTask,
     Keep,
     PointResult,
     Task,
+    TaskPlan,
     described,
     digest,
     joint_of,
     n_unknowns_of,
+    number_points,
     raise_fault,
     settings_at,
+    up_or_down,
 )
-from studyrunner.kinds.task_plan import TaskPlan, number_points
 from studyrunner.mpi.cost_model import CostKeys
-from studyrunner.scene.drawn_contacts import ContactChange
+from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
@@ -33,6 +35,8 @@ from studyrunner.system.progress import count
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
+
+TIME = "to a factor of three; a mode that is lost at a large amplitude takes longer"
 
 _FOR_THE_TABLE = ("natural_frequency", "damping_ratio")
 
@@ -51,8 +55,7 @@ class Mode(JointTask):
     @property
     def order(self) -> tuple[int, ...]:
         """Indices of the amplitudes in the order in which they are computed."""
-        places = range(len(self.amplitudes))
-        return tuple(reversed(places) if self.direction == "down" else places)
+        return up_or_down(len(self.amplitudes), self.direction)
 
     @property
     def cost_keys(self) -> CostKeys:
@@ -60,9 +63,9 @@ class Mode(JointTask):
         return (("mode", ("mode", self.number)),)
 
     def cost_of(self, *, first: bool) -> float:
-        """Estimated time, s, of the first point with the way to it, or of one of the others."""
-        share = iterations_of_mode(1) if first else ITERATIONS_A_MODE_POINT
-        return self.cost * share / iterations_of_mode(self.n_results)
+        """The first point with the way to it, or one of the others."""
+        one, two = iterations_of_mode(1), iterations_of_mode(2)
+        return self.cost * (one if first else two - one) / iterations_of_mode(self.n_results)
 
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the points. None depends on the other amplitudes."""
@@ -108,20 +111,23 @@ class Mode(JointTask):
 
 def variables(study: Study) -> tuple[str, ...]:
     """Variables of a point of a mode: those asked for and those that the last lines of a run are made of."""
-    return tuple(name for name in study.variables if name in study.outputs.variables or name in _FOR_THE_TABLE)
+    return tuple(name for name in study.kind.asked if name in (*study.outputs.variables, *_FOR_THE_TABLE))
 
 
 def build_tasks(
     study: Study, n_displacements: Sequence[int], contacts: Sequence[ContactChange], scenes: SceneSet
 ) -> TaskPlan:
     """Tasks of a study of nonlinear modes: one along the amplitude for each joint, mode, direction and setting."""
-    amplitudes, names = study.axes.modal_amplitude or (), tuple(study.dimensions)
+    amplitudes, asked = study.axes.modal_amplitude or (), variables(study)
     ascending = sorted(range(len(amplitudes)), key=lambda place: amplitudes[place])
-    asked = variables(study)
+    sizes = {"mode": len(study.axes.mode), "sweep": len(study.axes.sweep)}
+    sizes |= {name: len(getattr(study, name)) for name in SOLVER_AXES}
     modes: dict[Mode, list[dict[str, int]]] = {}
     for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
-        joint, of_part = joint_of(part, scene, contact), dict(zip(study.axes_of_parts, part.place, strict=True))
-        for at in _lines(study):
+        joint = joint_of(part.study, scene, contact)
+        of_part = dict(zip(study.axes_of_parts, part.place, strict=True))
+        for places in itertools.product(*map(range, sizes.values())):
+            at = dict(zip(sizes, places, strict=True))
             settings = settings_at(study, at)
             n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
             mode = Mode(
@@ -130,7 +136,7 @@ def build_tasks(
                 cost=seconds_an_iteration(n_unknowns) * iterations_of_mode(len(amplitudes)),
                 n_unknowns=n_unknowns,
                 joint=joint,
-                mode=(study.axes.mode or ())[at["mode"]],
+                mode=study.axes.mode[at["mode"]],
                 direction=study.axes.sweep[at["sweep"]],
                 amplitudes=tuple(amplitudes[place] for place in ascending),
                 variables=asked,
@@ -139,23 +145,12 @@ def build_tasks(
     indices = {
         mode: [
             # dimensions of one value have no place
-            tuple(tuple({**line, "modal_amplitude": place}.get(name, 0) for name in names) for line in lines)
+            tuple(tuple({**at, "modal_amplitude": place}.get(name, 0) for name in study.dimensions) for at in lines)
             for place in ascending
         ]
         for mode, lines in modes.items()
     }
-    return number_points(indices, study, len(scenes.studies))
-
-
-def _lines(study: Study) -> Iterator[dict[str, int]]:
-    """Indices along the axes of which a mode has one value, but for those of parts of the study."""
-    sizes = {"mode": len(study.axes.mode or ()), "sweep": len(study.axes.sweep)}
-    sizes |= {name: len(getattr(study, name)) for name in SOLVER_AXES}
-    for places in itertools.product(*map(range, sizes.values())):
-        yield dict(zip(sizes, places, strict=True))
-
-
-TIME = "to a factor of three; a mode that is lost at a large amplitude takes longer"
+    return number_points(indices, study)
 
 
 def describe_tasks(tasks: Sequence[Task]) -> str:

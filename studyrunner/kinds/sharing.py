@@ -13,14 +13,11 @@ from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
-from studyrunner.kinds.task import Index
-from studyrunner.kinds.task_plan import EQUAL_POINTS, LeftOut
+from studyrunner.kinds.task import EQUAL_POINTS, Index
 from studyrunner.study.study import Study
 
-Choice = tuple[int, int, int]
-"""Indices on the axes wear_coefficient, step and scheme."""
-
 _SAME = 1e-12  # relative: numbers of steps that differ by round-off
+_OWN_STEPS = ("adaptive", "final")
 
 IDLE_RTOL, EQUAL = "rtol", "equal points"
 """Reasons that are no choice of wear coefficient, step and scheme."""
@@ -39,11 +36,11 @@ _REASONS = {
 
 @dataclass(frozen=True)
 class ScaledHistory:
-    """A history that is read from a computed history with scaled slow time, and the points that have this history.
+    """A history that is read from an integrated history with scaled slow time, and the points that have this history.
 
-    wear_coefficient: 1/Pa. The ratio to the wear coefficient of the computed history scales the slow time.
+    wear_coefficient: 1/Pa; its ratio to that of the integrated history scales the slow time.
     step: cycles; the step of the first point where the step does not matter.
-    points: indices along the dimensions of the study.
+    points: indices along the dimensions of the study, or choices: along wear_coefficient, step and scheme alone.
     """
 
     wear_coefficient: float
@@ -52,62 +49,99 @@ class ScaledHistory:
 
 
 @dataclass(frozen=True)
-class Alike:
-    """Choices whose histories one task computes.
+class Integrated:
+    """A history that is integrated, and the histories of other points that are read from it.
 
-    histories: for each history the choices that have this history. The first history is the computed one; it needs the
-        most cycles.
-    unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles.
+    scheme, largest_depth: as in `SlowTime`.
+    histories: one result each. The first is integrated; it needs the most cycles.
+    unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles. Step and scheme are then those of
+        the first point.
     """
 
-    histories: tuple[tuple[Choice, ...], ...]
-    unworn: bool = False
+    scheme: str
+    largest_depth: float | None
+    histories: tuple[ScaledHistory, ...]
+    unworn: bool
+
+    @property
+    def wear_coefficient(self) -> float:
+        """Of the integrated history, 1/Pa."""
+        return self.histories[0].wear_coefficient
+
+    @property
+    def step(self) -> float:
+        """Of the integrated history, cycles."""
+        return self.histories[0].step
+
+    def counts(self, cycles: Sequence[float], scaled: ScaledHistory) -> tuple[float, ...]:
+        """Cycle counts of the integrated history, ascending, at which a history is read, one for each of `cycles`.
+
+        A count at the end of a step is moved slightly before the end, so that round-off does not move the count to the
+        next step.
+        """
+        if self.unworn:
+            return (0.0,) * len(cycles)
+        if scaled == self.histories[0]:
+            return tuple(cycles)
+        if self.scheme in _OWN_STEPS:
+            ratio = scaled.wear_coefficient / self.wear_coefficient
+            return tuple(ratio * cycle for cycle in cycles)
+        steps = [cycle / scaled.step for cycle in cycles]
+        wholes = map(_whole_number, steps)
+        return tuple(
+            self.step * (n if whole is None else (1.0 - _SAME) * whole) for n, whole in zip(steps, wholes, strict=True)
+        )
+
+    def wear(self, scaled: ScaledHistory) -> tuple[float, float | None]:
+        """Wear coefficient of a history, and its step where the step matters."""
+        own_steps = self.unworn or self.scheme in _OWN_STEPS or self.largest_depth is not None
+        return scaled.wear_coefficient, None if own_steps else scaled.step
 
 
-def describe_left_out(causes: Mapping[str, int]) -> tuple[LeftOut, ...]:
-    """Numbers of points that are not computed alone, by reason. causes: these numbers by the name of the reason."""
-    return tuple(LeftOut(causes[cause], reason) for cause, reason in _REASONS.items() if causes.get(cause))
+def describe_left_out(causes: Mapping[str, int]) -> dict[str, int]:
+    """Numbers of points that are not computed alone, by reason in words. causes: by the name of the reason."""
+    return {reason: causes[cause] for cause, reason in _REASONS.items() if causes.get(cause)}
 
 
-def share_histories(study: Study) -> tuple[tuple[Alike, ...], Counter[str]]:
-    """The histories that have to be computed from each start state, and the number of choices by reason for sharing.
-
-    With `shortcuts = false` no history is shared.
+def share_histories(study: Study) -> tuple[tuple[Integrated, ...], Counter[str]]:
+    """The histories to integrate from each start state, whose points are choices; numbers of choices by reason for
+    sharing. With `shortcuts = false` no history is shared.
     """
     axes = study.axes
-    groups: dict[tuple[str, Hashable], list[Choice]] = {}
-    for choice in itertools.product(range(len(axes.wear_coefficient)), range(len(axes.step)), range(len(axes.scheme))):
-        groups.setdefault(_group(study, choice), []).append(choice)
-    tasks, causes = [], Counter[str]()
+    groups: dict[tuple[str, Hashable], list[Index]] = {}
+    sizes = len(axes.wear_coefficient), len(axes.step), len(axes.scheme)
+    for places in itertools.product(*map(range, sizes)):
+        groups.setdefault(_group(study, places), []).append(places)
+    found, causes = list[Integrated](), Counter[str]()
     for (cause, _), choices in groups.items():
-        by_wear: dict[int, list[Choice]] = {}
+        by_wear: dict[int, list[Index]] = {}
         for choice in sorted(choices, key=lambda choice: -axes.wear_coefficient[choice[0]]):
             by_wear.setdefault(choice[0], []).append(choice)
-        farthest, *others = (tuple(same) for same in by_wear.values())
-        shared = [same for same in others if cause != "steps" or _ends_with_a_step(study, same[0])]
-        tasks.append(Alike((farthest, *shared), unworn=cause in ("cycles", "unworn")))
-        alone = [same for same in others if same not in shared]
-        tasks += [Alike((same,)) for same in alone]
+        farthest, *others = (
+            ScaledHistory(axes.wear_coefficient[wear], axes.step[same[0][1]], tuple(same))
+            for wear, same in by_wear.items()
+        )
+        alone = [each for each in others if cause == "steps" and not _ends_with_a_step(study, each)]
+        scheme, unworn = axes.scheme[farthest.points[0][2]], cause in ("cycles", "unworn")
+        depth = study.slow_time.largest_depth if scheme == "explicit" else None
+        shared = (farthest, *(each for each in others if each not in alone))
+        found += [Integrated(scheme, depth, each, unworn) for each in (shared, *((one,) for one in alone))]
         causes[cause] += len(choices) - 1 - len(alone)
-    tasks.sort(key=lambda alike: min(itertools.chain.from_iterable(alike.histories)))
-    return tuple(tasks), causes
+    return tuple(sorted(found, key=lambda each: min(point for one in each.histories for point in one.points))), causes
 
 
-def _group(study: Study, choice: Choice) -> tuple[str, Hashable]:
+def _group(study: Study, choice: Index) -> tuple[str, Hashable]:
     """Reason for which a choice may share a history, and what choices that do have in common."""
     wear, step, scheme = choice
-    value, word, proportional = (
-        study.axes.wear_coefficient[wear],
-        study.axes.scheme[scheme],
-        study.wear_law.proportional,
-    )
+    value, word = study.axes.wear_coefficient[wear], study.axes.scheme[scheme]
+    proportional = study.wear_law.proportional
     if not study.solver.shortcuts:
         return "alone", choice
     if study.cycles_kept[-1] == 0.0:
         return "cycles", wear
     if proportional and value == 0.0:
         return "unworn", wear
-    if word in ("adaptive", "final"):
+    if word in _OWN_STEPS:
         return word, None if proportional else wear
     if word == "explicit" and study.slow_time.largest_depth is not None:
         # the last of the steps by Eq. (22) is shortened, so that other wear coefficients have other histories
@@ -116,33 +150,12 @@ def _group(study: Study, choice: Choice) -> tuple[str, Hashable]:
     return "steps", (scheme, f"{value * study.axes.step[step]:.11e}" if proportional else choice)
 
 
-def _ends_with_a_step(study: Study, choice: Choice) -> bool:
+def _ends_with_a_step(study: Study, history: ScaledHistory) -> bool:
     """Whether the last step of a history ends at the last count; else it is shortened, and is no step of another one.
 
     Integration to the steady state has no shortened last step.
     """
-    return study.to_the_end or _whole_number(study.cycles_kept[-1] / study.axes.step[choice[1]]) is not None
-
-
-def counts_of(
-    cycles: Sequence[float], scaled: ScaledHistory, computed: ScaledHistory, steps_of_given_length: bool
-) -> tuple[float, ...]:
-    """Cycle counts, ascending, at which a scaled history at `cycles` is read from the computed history.
-
-    A count at the end of a step is moved slightly before the end, so that round-off does not move the count to the next
-    step.
-    """
-    if scaled == computed:
-        return tuple(cycles)
-    if not steps_of_given_length:
-        ratio = scaled.wear_coefficient / computed.wear_coefficient
-        return tuple(ratio * cycle for cycle in cycles)
-    counts = []
-    for cycle in cycles:
-        n_steps = cycle / scaled.step
-        whole = _whole_number(n_steps)
-        counts.append(computed.step * (n_steps if whole is None else (1.0 - _SAME) * whole))
-    return tuple(counts)
+    return study.to_the_end or _whole_number(study.cycles_kept[-1] / history.step) is not None
 
 
 def _whole_number(value: float) -> int | None:

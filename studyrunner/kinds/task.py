@@ -1,4 +1,4 @@
-"""What a rank computes at a time, and what it gives back.
+"""What a rank computes at a time, what it gives back, and all tasks of a study.
 
 A task gives one result or several, one after the other, each at a place of its own. There are four kinds: `Sweep` and
 `History` (`wear`), `Mode` (`modes`), `Mission` (`missions`). What hands tasks out, saves and shows them uses this base
@@ -11,9 +11,9 @@ import hashlib
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -23,12 +23,10 @@ from solver.packing import Packed
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.cost_model import CostKeys
-from studyrunner.scene.drawn_contacts import ContactChange
-from studyrunner.study.realisation import Realisation
+from studyrunner.scene.pairs import ContactChange
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
-from studyrunner.system.machine_faults import MachineFaultError, tells_of_machine
-from studyrunner.system.source_digest import package_digest
+from studyrunner.system.machine import MachineFaultError, package_digest, tells_of_machine
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -40,13 +38,16 @@ Index = tuple[int, ...]
 Keep = Callable[[Packed | str | float], None]
 """Takes the progress of a task: data to continue from, words, or the share that is done, 0 to 1."""
 
+EQUAL_POINTS = "all values are those of another point"
+"""Reason for a result that points share, whatever the kind of study."""
+
 
 @dataclass(frozen=True)
 class Joint:
     """The joint that a task computes.
 
-    scene: number of the scene (`studyrunner.scene.scene_set`). friction_coefficient: of all pairs; None where each pair
-    has its own. contact: arrays of the contact interface that a sample draws, in place of those of the scene.
+    scene: number of the scene (`SceneSet`). friction_coefficient: of all pairs; None where each pair has its own.
+    contact: arrays of the contact interface in place of those of the scene.
     """
 
     scene: int
@@ -60,10 +61,10 @@ class Joint:
         return replace(model, contact=replace(model.contact, **drawn)) if drawn else model
 
 
-def joint_of(part: Realisation, scene: int, contact: ContactChange) -> Joint:
+def joint_of(study: Study, scene: int, contact: ContactChange) -> Joint:
     """The joint of a part of a study. scene: its number. contact: what is drawn for its pairs."""
     of_pairs = any(name == "friction_coefficient" for name, _ in contact)
-    return Joint(scene, None if of_pairs else part.study.friction_coefficient, contact)
+    return Joint(scene, None if of_pairs else study.friction_coefficient, contact)
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class StartResult:
     """Start state at one frequency of a sweep.
 
     moves: whether any pair slips or lifts; otherwise nothing wears. n_unknowns: of the state; 0 where there is none.
-    fault: fault of the machine that ended the computation; then this is no result. Empty without a fault.
+    fault: of the machine, which ended the computation; then this is no result. Empty without a fault.
     """
 
     place: int
@@ -100,10 +101,9 @@ def unpack_start(place: int, packed: Packed) -> StartResult:
 class PointResult:
     """The result of one point, or of several points that share it.
 
-    points: indices along the dimensions of the study.
-    values: variables of the result by name, with the dimensions after the axes. Values that were not reached are NaN,
-        or 0 in whole numbers; missing variables are NaN, 0 or an empty text in the file.
-    progress: progress of a history that was ended by its time limit.
+    points: indices along the dimensions of the study. values: variables of the result by name, with the dimensions
+    after the axes; NaN, or 0 in whole numbers, where not reached, as are missing variables in the file. progress: of a
+    history that was ended by its time limit.
     """
 
     points: tuple[Index, ...]
@@ -118,7 +118,7 @@ class PointResult:
 
     @property
     def fault(self) -> str:
-        """Fault of the machine that ended the computation; then this is no result. Empty without a fault."""
+        """As in `StartResult`."""
         return str(self.values["message"]) if self.outcome == Outcome.NOT_COMPUTED else ""
 
 
@@ -135,7 +135,7 @@ def solver_digest() -> str:
 class Identity:
     """What the results of a study depend on beside their tasks.
 
-    scenes: hash of the model of each scene, see SceneFacts. record: hash of the variables of a result and their sizes.
+    scenes: hash of the model of each scene (`SceneFacts.digest`). record: hash of the variables and their sizes.
     """
 
     scenes: tuple[str, ...]
@@ -153,9 +153,8 @@ class Task(ABC):
     number: among the sweeps, or the other tasks, of the study. cost: estimated time, s.
     n_unknowns: of its largest state; an estimate where the number of harmonics is automatic.
     known: places whose results are not needed, or are there from an earlier run.
-    resume: progress of an earlier run; None to begin at the beginning.
-    key: hash of the task in the file of the run.
-    models: reduced models of `scenes`, or files with them, for a rank that does not have them.
+    resume: progress of an earlier run; None for none.
+    key: hash of the task in the file of the run. models: of `scenes`, for a rank that does not have them.
     variables: names of the variables in a result. indices: for each place the points of the study that have its result;
         none for start states.
     """
@@ -257,6 +256,11 @@ def digest(*values: object) -> str:
     return hashlib.sha256(json.dumps(values, allow_nan=True).encode()).hexdigest()[:32]
 
 
+def up_or_down(n_places: int, direction: str) -> tuple[int, ...]:
+    """Places in the order in which they are computed, ascending but with the direction "down"."""
+    return tuple(reversed(range(n_places)) if direction == "down" else range(n_places))
+
+
 def settings_at(study: Study, at: Mapping[str, int]) -> SolverSettings:
     """Settings of the solver. at: indices along the axes, those of `SOLVER_AXES` among them."""
     return SolverSettings(
@@ -299,3 +303,51 @@ class Reached:
     def after(self, outcome: Outcome) -> Packed | None:
         """From where a history goes on with more time; None where it has not run out of it."""
         return self.last if outcome is Outcome.TIME_LIMIT else None
+
+
+@dataclass(frozen=True)
+class TaskPlan:
+    """All tasks of a study.
+
+    results: tasks that give the results of points; histories wait for a start state. sweeps: they give start states.
+    left_out: numbers of points that are not computed alone, by reason. n_points: of the study.
+    """
+
+    results: tuple[Task, ...]
+    left_out: Mapping[str, int]
+    n_points: int
+    sweeps: tuple[Task, ...] = ()
+
+    @cached_property
+    def waiting(self) -> Mapping[tuple[int, int], tuple[Task, ...]]:
+        """Tasks that wait for a start state, by number of the sweep and place."""
+        found: dict[tuple[int, int], list[Task]] = {}
+        for task in self.results:
+            if task.waits_for is not None:
+                found.setdefault(task.waits_for, []).append(task)
+        return {start: tuple(tasks) for start, tasks in found.items()}
+
+    @property
+    def n_unknowns(self) -> int:
+        """Of the largest task."""
+        return max(task.n_unknowns for task in self.results)
+
+    @property
+    def cost(self) -> float:
+        """Estimated time on one rank, s, where every point wears."""
+        return sum(task.cost for task in (*self.sweeps, *self.results))
+
+    @property
+    def longest(self) -> float:
+        """Estimated time, s, of the longest task, with the sweep that it waits for."""
+        before = [0.0 if task.waits_for is None else self.sweeps[task.waits_for[0]].cost for task in self.results]
+        return max(task.cost + cost for task, cost in zip(self.results, before, strict=True))
+
+
+def number_points(tasks: Mapping[Any, Sequence[tuple[Index, ...]]], study: Study) -> TaskPlan:
+    """The plan of a study without start states. tasks: each, without number and points, with its `indices`."""
+    results = tuple(
+        replace(task, number=number, indices=tuple(indices)) for number, (task, indices) in enumerate(tasks.items())
+    )
+    shared = study.n_points - sum(len(task.order) for task in results)
+    return TaskPlan(results, {EQUAL_POINTS: shared} if shared else {}, study.n_points)

@@ -16,8 +16,8 @@ from solver.contact.wear_law import WearLaw
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
 from solver.settings import FollowedFrequency, Resolution, SolverSettings, ToTheEnd, WearTarget
-from studyrunner.kinds.estimate import ITERATIONS_A_STATE, iterations_of_sweep
-from studyrunner.kinds.sharing import ScaledHistory, counts_of
+from studyrunner.kinds.estimate import iterations_of_sweep
+from studyrunner.kinds.sharing import Integrated
 from studyrunner.kinds.task import (
     Identity,
     Index,
@@ -29,13 +29,14 @@ from studyrunner.kinds.task import (
     described,
     digest,
     raise_fault,
+    up_or_down,
 )
 from studyrunner.mpi.cost_model import CostKeys
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
-    from solver.results.history import StartState, WearHistory
-    from solver.wear.solutions import SlowTime
+    from solver.results.history import StartState
+    from solver.wear.integrate import SlowTime
 
 AT_REST = "history at rest"
 """Most general group of histories in which nothing wears, see `CostModel`."""
@@ -65,8 +66,7 @@ class Sweep(JointTask):
     @property
     def order(self) -> tuple[int, ...]:
         """Indices of the frequencies in the order of the sweep."""
-        places = range(len(self.frequencies))
-        return tuple(reversed(places) if self.direction == "down" else places)
+        return up_or_down(len(self.frequencies), self.direction)
 
     @property
     def cost_keys(self) -> CostKeys:
@@ -74,9 +74,9 @@ class Sweep(JointTask):
         return (("sweep", ("sweep", self.number)),)
 
     def cost_of(self, *, first: bool) -> float:
-        """Estimated time, s, of the first state with the sweep to it, or of one of the other states."""
-        share = iterations_of_sweep(self.direction, 1) if first else ITERATIONS_A_STATE
-        return self.cost * share / iterations_of_sweep(self.direction, self.n_results)
+        """The first state with the sweep to it, or one of the others."""
+        one, two = (iterations_of_sweep(self.direction, number) for number in (1, 2))
+        return self.cost * (one if first else two - one) / iterations_of_sweep(self.direction, self.n_results)
 
     def names(self, identity: Identity) -> tuple[str, ...]:
         """Hashes of the start states."""
@@ -126,43 +126,6 @@ class Sweep(JointTask):
         """Where the sweep goes."""
         how = "ramp" if self.direction == "ramp" else f"sweep {self.direction}"
         return f"{how} to {self.frequencies[place]:.6g} Hz"
-
-
-@dataclass(frozen=True)
-class Integrated:
-    """A history that is integrated, and the histories of other points that are read from it.
-
-    scheme, largest_depth: as in `SlowTime`.
-    histories: one result each. The first is integrated; it needs the most cycles.
-    unworn: whether nothing wears, so that the state at cycle 0 is that of all cycles. Step and scheme are then those of
-        the first point.
-    """
-
-    scheme: str
-    largest_depth: float | None
-    histories: tuple[ScaledHistory, ...]
-    unworn: bool
-
-    @property
-    def wear_coefficient(self) -> float:
-        """Of the integrated history, 1/Pa."""
-        return self.histories[0].wear_coefficient
-
-    @property
-    def step(self) -> float:
-        """Of the integrated history, cycles."""
-        return self.histories[0].step
-
-    def counts(self, cycles: tuple[float, ...], scaled: ScaledHistory) -> tuple[float, ...]:
-        """Cycle counts of the integrated history at which a history is read, one for each of `cycles`."""
-        if self.unworn:
-            return (0.0,) * len(cycles)
-        return counts_of(cycles, scaled, self.histories[0], self.scheme not in ("adaptive", "final"))
-
-    def wear(self, scaled: ScaledHistory) -> tuple[float, float | None]:
-        """Wear coefficient of a history, and its step where the step matters."""
-        own_steps = self.unworn or self.scheme in ("adaptive", "final") or self.largest_depth is not None
-        return scaled.wear_coefficient, None if own_steps else scaled.step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,13 +212,19 @@ class History(JointTask):
 
     def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
         """All histories, read from those that are integrated, as far as these went."""
+        from solver.wear.history import integrate_together
         from studyrunner.kinds.wear_result import build_result
 
+        if self.start is None:
+            raise TypeError(f"task without a start state: {self}")
         reached, progress = Reached(self, keep), None
         needed: dict[Integrated, list[int]] = {}
         for place in self.places:
             needed.setdefault(self.results[place][0], []).append(place)
-        histories = self.integrate(self.joint.model(models), tuple(needed), reached)
+        model, friction = self.joint.model(models), self.joint.friction_coefficient
+        # at all counts at which one of the others is read
+        asked, start = [self._asked(each) for each in needed], unpack(self.start)
+        histories = integrate_together(model, friction, self.settings, start, asked, reached, self.resume)
         for (each, places), history in zip(needed.items(), histories, strict=True):
             raise_fault(history.outcome, history.message)
             # one that its time limit has ended goes on from there when it gets more
@@ -264,21 +233,10 @@ class History(JointTask):
                 result = build_result(self, each, history, self.results[place][1])
                 yield replace(result, place=place, progress=progress)
 
-    def integrate(self, model: ReducedModel, integrated: tuple[Integrated, ...], keep: Keep) -> Iterator[WearHistory]:
-        """Integrated histories, at all counts at which one of the others is read."""
-        from solver.wear.history import integrate_together
-
-        if self.start is None:
-            raise TypeError(f"task without a start state: {self}")
-        asked = [self._asked(each) for each in integrated]
-        friction = self.joint.friction_coefficient
-        return integrate_together(model, friction, self.settings, unpack(self.start), asked, keep, self.resume)
-
     def _asked(self, integrated: Integrated) -> SlowTime:
         """What the solver integrates."""
-        from solver.wear.control import steps_of
-        from solver.wear.solutions import SlowTime
-        from solver.wear.wearing_joint import Fixed, Following
+        from solver.wear.integrate import SlowTime
+        from solver.wear.step import steps_of
 
         counts: NDArray[np.float64] | ToTheEnd
         if self.to_the_end is not None and not integrated.unworn:
@@ -294,7 +252,7 @@ class History(JointTask):
             law=self.law,
             until=self.until,
             loops=self.loops,
-            where=Fixed() if self.follow is None else Following(self.follow),
+            follow=self.follow,
         )
 
     def describe(self, place: int) -> str:

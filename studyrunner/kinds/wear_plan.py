@@ -6,15 +6,15 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from solver.settings import SolverSettings, ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_an_iteration
-from studyrunner.kinds.sharing import EQUAL, IDLE_RTOL, Alike, ScaledHistory, describe_left_out, share_histories
-from studyrunner.kinds.task import Index, Joint, Task, joint_of, n_unknowns_of, settings_at
-from studyrunner.kinds.task_plan import TaskPlan
-from studyrunner.kinds.wear import History, Integrated, Sweep
-from studyrunner.scene.drawn_contacts import ContactChange
+from studyrunner.kinds.sharing import EQUAL, IDLE_RTOL, Integrated, describe_left_out, share_histories
+from studyrunner.kinds.task import Index, Joint, Task, TaskPlan, joint_of, n_unknowns_of, settings_at
+from studyrunner.kinds.wear import History, Sweep
+from studyrunner.scene.pairs import ContactChange
 from studyrunner.scene.scene_set import SceneSet
 from studyrunner.study.realisation import Realisation
 from studyrunner.study.sections import AUTO, SOLVER_AXES
@@ -22,29 +22,25 @@ from studyrunner.study.study import Study
 from studyrunner.system.progress import count
 from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, LOOPS
 
-_OF_SWEEP = ("excitation_amplitude", "sweep")
-"""Axes of which each sweep has one value, beside those of the solver."""
-
 _OF_HISTORY = ("wear_coefficient", "step", "scheme")
 
 MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
 one of them: with 4 a fifth more than with all, and another rank may take the rest."""
 
-_FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
+TIME = "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long"
 
 
-@dataclass(frozen=True)
-class _Case:
-    """What the states of a sweep have in common. values: of `_OF_SWEEP`."""
+class _Case(NamedTuple):
+    """What the states of a sweep have in common."""
 
     joint: Joint
-    values: tuple[float | str, ...]
+    excitation_amplitude: float
+    direction: str
     settings: SolverSettings
 
 
-@dataclass(frozen=True)
-class _Start:
+class _Start(NamedTuple):
     """Points of one part of a study that start from one state. at: their indices along the axes but `_OF_HISTORY`."""
 
     part: Realisation
@@ -53,7 +49,7 @@ class _Start:
 
 def variables(study: Study) -> tuple[str, ...]:
     """Variables of a history: those asked for and those that the table at the end is made of."""
-    asked = (name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
+    asked = (name for name in ASKED if name in study.outputs.variables or name in CERTIFICATE)
     return (*asked, *(LOOPS if study.outputs.loops else ()), *(COUNTS if study.to_the_end else ()))
 
 
@@ -68,28 +64,24 @@ def build_tasks(
     planner = _Planner(study, n_displacements)
     for case, at in _cases(study, contacts, scenes).items():
         ascending = sorted(at)
-        for frequencies in [[one] for one in ascending] if "ramp" in case.values else [ascending]:
+        for frequencies in [[one] for one in ascending] if case.direction == "ramp" else [ascending]:
             planner.add_sweep(case, {frequency: at[frequency] for frequency in frequencies})
-    return TaskPlan(
-        results=tuple(planner.histories),
-        left_out=describe_left_out(planner.causes),
-        n_points=math.prod(len(values) for values in study.dimensions.values()),
-        n_scenes=len(n_displacements),
-        sweeps=tuple(planner.sweeps),
-    )
+    left_out = describe_left_out(planner.causes)
+    return TaskPlan(tuple(planner.histories), left_out, study.n_points, tuple(planner.sweeps))
 
 
 def _cases(study: Study, contacts: Sequence[ContactChange], scenes: SceneSet) -> dict[_Case, dict[float, list[_Start]]]:
     """Points that one sweep reaches, by frequency, in the order of the study."""
     cases: dict[_Case, dict[float, list[_Start]]] = {}
-    names = (*_OF_SWEEP, *SOLVER_AXES)
-    sizes = [len(getattr(study.axes if name in _OF_SWEEP else study, name)) for name in names]
-    lines = [dict(zip(names, places, strict=True)) for places in itertools.product(*map(range, sizes))]
+    sizes = {name: len(getattr(study.axes, name)) for name in ("excitation_amplitude", "sweep")}
+    sizes |= {name: len(getattr(study, name)) for name in SOLVER_AXES}
+    lines = [dict(zip(sizes, places, strict=True)) for places in itertools.product(*map(range, sizes.values()))]
     settings_of = [_settings(study, at) for at in lines]
     for part, scene, contact in zip(scenes.parts, scenes.numbers, contacts, strict=True):
-        axes, joint = part.study.axes, joint_of(part, scene, contact)
+        axes, joint = part.study.axes, joint_of(part.study, scene, contact)
         for at, settings in zip(lines, settings_of, strict=True):
-            case = _Case(joint, tuple(getattr(axes, name)[at[name]] for name in _OF_SWEEP), settings)
+            amplitude = axes.excitation_amplitude[at["excitation_amplitude"]]
+            case = _Case(joint, amplitude, axes.sweep[at["sweep"]], settings)
             for place, frequency in enumerate(axes.frequency):
                 start = _Start(part, {**at, "frequency": place})
                 cases.setdefault(case, {}).setdefault(frequency, []).append(start)
@@ -110,7 +102,7 @@ class _Planner:
         self._study = study
         self._n_displacements = n_displacements
         self._variables = variables(study)
-        self._shared: dict[object, tuple[tuple[Alike, ...], Counter[str]]] = {}
+        self._shared: dict[object, tuple[tuple[Integrated, ...], Counter[str]]] = {}
         self.causes: Counter[str] = Counter()
         self.sweeps: list[Sweep] = []
         self.histories: list[History] = []
@@ -118,17 +110,13 @@ class _Planner:
     def add_sweep(self, case: _Case, at: Mapping[float, Sequence[_Start]]) -> None:
         """A sweep and its histories. at: by frequency."""
         n_unknowns = n_unknowns_of(self._n_displacements[case.joint.scene], case.settings.harmonics)
-        amplitude, direction = case.values
         sweep = Sweep(
             number=len(self.sweeps),
-            joint=case.joint,
-            excitation_amplitude=float(amplitude),
-            direction=str(direction),
-            settings=case.settings,
             frequencies=tuple(at),
-            cost=seconds_an_iteration(n_unknowns) * iterations_of_sweep(str(direction), len(at)),
+            cost=seconds_an_iteration(n_unknowns) * iterations_of_sweep(case.direction, len(at)),
             n_unknowns=n_unknowns,
             follow=self._study.follow,
+            **case._asdict(),
         )
         self.sweeps.append(sweep)
         for position, starts in enumerate(at.values()):
@@ -144,42 +132,41 @@ class _Planner:
         for start in starts:
             for place, value in enumerate(start.part.study.axes.wear_coefficient):
                 owners.setdefault(value, []).append((start, place))
-        study = _with_wear_coefficients(starts[0].part.study, tuple(owners))
+        study = starts[0].part.study
+        axes = study.axes.model_copy(update={"wear_coefficient": tuple(owners)})
+        study = study.model_copy(update={"axes": axes})
         key = (study.wear_law, tuple(owners))
         if key not in self._shared:
             # the same from each start state
             self._shared[key] = share_histories(study)
-        tasks, causes = self._shared[key]
+        found, causes = self._shared[key]
         of_value = list(owners.values())
-        n_others = len(study.axes.step) * len(study.axes.scheme)
-        n_points, n_parts = (
-            sum(map(len, of_value)),
-            sum(len({id(start.part) for start, _ in each}) for each in of_value),
-        )
+        n_others, n_points = len(study.axes.step) * len(study.axes.scheme), sum(map(len, of_value))
+        n_parts = sum(len({id(start.part) for start, _ in each}) for each in of_value)
         self.causes += causes
         self.causes[IDLE_RTOL] += n_others * (n_points - n_parts)
         self.causes[EQUAL] += n_others * (n_parts - len(of_value))
         together: dict[object, list[Integrated]] = {}
-        for alike in tasks:
-            each = self._integrated(study, alike, of_value)
+        for each in found:
             alone = each.unworn or not study.solver.shortcuts
-            together.setdefault(alike if alone else each.wear_coefficient, []).append(each)
+            together.setdefault(each if alone else each.wear_coefficient, []).append(self._placed(each, of_value))
         for integrated in together.values():
             for begin in range(0, len(integrated), MOST_TOGETHER):
                 self._add_history(study, sweep, position, tuple(integrated[begin : begin + MOST_TOGETHER]))
 
-    def _integrated(self, study: Study, alike: Alike, of_value: Sequence[Sequence[tuple[_Start, int]]]) -> Integrated:
-        """A history, and those that are read from it. of_value: points, and their places, by wear coefficient."""
+    def _placed(self, integrated: Integrated, of_value: Sequence[Sequence[tuple[_Start, int]]]) -> Integrated:
+        """With the points of the study in place of choices. of_value: starts and places by wear coefficient."""
         histories = []
-        for choices in alike.histories:
-            points = tuple(
-                self._point(start, (wear, *choice[1:])) for choice in choices for start, wear in of_value[choice[0]]
-            )
-            wear, step, _ = choices[0]
-            histories.append(ScaledHistory(study.axes.wear_coefficient[wear], study.axes.step[step], points))
-        scheme = study.axes.scheme[alike.histories[0][0][2]]
-        depth = study.slow_time.largest_depth if scheme == "explicit" else None
-        return Integrated(scheme, depth, tuple(histories), alike.unworn)
+        for each in integrated.histories:
+            owners = ((start, (wear, *rest)) for first, *rest in each.points for start, wear in of_value[first])
+            points = tuple(self._point(start, dict(zip(_OF_HISTORY, choice, strict=True))) for start, choice in owners)
+            histories.append(replace(each, points=points))
+        return replace(integrated, histories=tuple(histories))
+
+    def _point(self, start: _Start, choice: Mapping[str, int]) -> Index:
+        """Index of a point along the dimensions of the study."""
+        places = {**start.at, **choice}
+        return (*(places[name] for name in self._study.own_axes), *start.part.place)
 
     def _add_history(self, study: Study, sweep: Sweep, position: int, integrated: tuple[Integrated, ...]) -> None:
         cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.cycles_kept[-1]
@@ -208,33 +195,18 @@ class _Planner:
             )
         )
 
-    def _point(self, start: _Start, choice: Sequence[int]) -> Index:
-        """Index of a point along the dimensions of the study. choice: places along `_OF_HISTORY`."""
-        places = {**start.at, **dict(zip(_OF_HISTORY, choice, strict=True))}
-        return (*(places[name] for name in self._study.own_axes), *start.part.place)
-
-
-def _with_wear_coefficients(study: Study, values: tuple[float, ...]) -> Study:
-    if values == study.axes.wear_coefficient:
-        return study
-    return study.model_copy(update={"axes": study.axes.model_copy(update={"wear_coefficient": values})})
-
-
-TIME = "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long"
-
 
 def describe_tasks(tasks: Sequence[Task]) -> str:
     """Tasks in words."""
     sweeps = [task for task in tasks if isinstance(task, Sweep)]
-    histories = [task for task in tasks if isinstance(task, History)]
-    n_histories = count(sum(len(task.integrated) for task in histories), "wear history", "wear histories")
+    n_histories = sum(len(task.integrated) for task in tasks if isinstance(task, History))
+    histories = count(n_histories, "wear history", "wear histories")
     if not sweeps:
-        return n_histories
+        return histories
     n_ramps = sum(sweep.direction == "ramp" for sweep in sweeps)
     ways = [(len(sweeps) - n_ramps, "sweep"), (n_ramps, "ramp")]
     named = " and ".join(count(number, way) for number, way in ways if number)
-    n_starts = count(sum(sweep.n_results for sweep in sweeps), "start state")
-    return f"{n_starts} by {named}, and {n_histories}"
+    return f"{count(sum(sweep.n_results for sweep in sweeps), 'start state')} by {named}, and {histories}"
 
 
 def slow_time(study: Study) -> list[tuple[str, str]]:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from solver.results.history import WearHistory
 from solver.results.verdict import describe_cut_off, judge, last_error
+from studyrunner.kinds.sharing import Integrated
 from studyrunner.kinds.task import PointResult
-from studyrunner.kinds.wear import History, Integrated
+from studyrunner.kinds.wear import History
 from studyrunner.percent import describe_reach, show_count
 from studyrunner.variables import KEPT
 

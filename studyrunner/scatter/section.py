@@ -163,9 +163,14 @@ class ScatterSection(Section):
         return {name: extra[name] for name in sorted(extra, key=lambda name: (order.index(extra[name].of), name))}
 
     @property
+    def rows_a_sample(self) -> int:
+        """Rows of the design for each of `samples`: A, B, and A with one input from B after the other (Saltelli)."""
+        return 2 + len(self.inputs) if self.method == "saltelli" else 1
+
+    @property
     def realisations(self) -> int:
         """Length of the dimension `sample`."""
-        return self.samples * (2 + len(self.inputs) if self.method == "saltelli" else 1)
+        return self.samples * self.rows_a_sample
 
 
 def flat_table(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,12 +9,12 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from solver.packed_model import pack_model, unpack_model
-from solver.packing import Packed, pack, unpack
+from solver.packing import Packed, pack, pack_model, unpack, unpack_model
 from studies.scene_answers import NaturalFrequencies
-from studies.scenes import scene_frequencies, scene_has
+from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, scene_frequencies, scene_has
+from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
-from studyrunner.system.source_digest import package_digest
+from studyrunner.system.machine import package_digest
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
@@ -42,30 +42,37 @@ class InMemory(dict[str, Packed]):
     read_computed = dict.get
 
 
-def model_once(study: Study, n_harmonics: int, computed: Computed, build: Callable[[], ReducedModel]) -> ReducedModel:
+def harmonics_to_build(study: Study) -> int:
+    """Number of harmonics that a scene is built for, those that show the error of a given number included."""
+    # two levels up: 1, 3, 5, 7, 9, 13, 19, 27...
+    shown = 2 * max(study.given_harmonics, default=0) + 3
+    return max(shown, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else shown
+
+
+def model_once(study: Study, computed: Computed, build: Callable[[], ReducedModel]) -> ReducedModel:
     """The reduced model of a scene that is not read from a scene file, built or from an earlier run.
 
-    Both are equal to the last bit, and so are all results (`solver.packed_model`).
+    Both are equal to the last bit, and so are all results (`solver.packing`).
     """
-    return _once(model_key(study, n_harmonics), computed, build, pack_model, unpack_model)
+    return _once(model_key(study), computed, build, pack_model, unpack_model)
 
 
-def model_key(study: Study, n_harmonics: int) -> str:
+def model_key(study: Study) -> str:
     """Hash under which the model of a scene is kept."""
-    return _key("model", study, n_harmonics)
+    return _key("model", study, harmonics_to_build(study))
 
 
-def keep_model(study: Study, n_harmonics: int, model: ReducedModel, computed: Computed) -> None:
+def keep_model(study: Study, model: ReducedModel, computed: Computed) -> None:
     """Keeps a model, however long it has taken. Raises ValueError where the model cannot be kept."""
     packed = pack_model(model)
     if packed is None:
         raise ValueError(f"the matrices of {study.scene.model} are not stored by rows")
-    computed.keep_computed(model_key(study, n_harmonics), packed)
+    computed.keep_computed(model_key(study), packed)
 
 
-def read_model(study: Study, n_harmonics: int, computed: Computed) -> ReducedModel:
+def read_model(study: Study, computed: Computed) -> ReducedModel:
     """A model that `keep_model` has kept. Raises RuntimeError where it is no longer there."""
-    packed = computed.read_computed(model_key(study, n_harmonics))
+    packed = computed.read_computed(model_key(study))
     if packed is None:
         raise RuntimeError(f"the model of {study.scene.model} has gone")
     return unpack_model(packed)
@@ -112,15 +119,23 @@ def scene_parameters_of(study: Study) -> dict[str, object]:
     return given
 
 
-def _key(what: str, study: Study, *more: object) -> str:
-    """Hash of a value of the scene of a study: its model, parameters and files, and the source of the scenes."""
-    # imported here: most studies have no finite-element model
-    origin: dict[str, str] = {}
+def describe_origin(study: Study) -> dict[str, str]:
+    """Attributes on the files of a finite-element model; none for other scenes. Raises OSError, SceneError."""
+    # imported where they are used: most studies have no such model
     if study.scene.files is not None:
-        from studies.fe_models.from_files.scene import describe_origin
+        from studies.fe_models.from_files.scene import describe_origin as describe_files
 
-        origin = describe_origin(study.scene.files, study.scene.parameters)
+        return describe_files(study.scene.files, study.scene.parameters)
+    if study.scene.path is None:
+        return {}
+    from studies.scene_file import read_origin
+
+    return read_origin(study.scene.path)
+
+
+def _key(what: str, study: Study, *more: object) -> str:
+    """Hash of a value of a scene that is built: its model, parameters and files, and the source of the scenes."""
     sources = [package_digest(package) for package in ("studies", "solver")]
-    given = study.scene.model, scene_parameters_of(study), origin, more
+    given = study.scene.model, scene_parameters_of(study), describe_origin(study), more
     text = json.dumps((what, sources, given), sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]

@@ -18,17 +18,26 @@ from solver.contact.wear_law import surface_factors
 from studies.contact_compliance import make_compliant
 from studies.scene_answers import stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
-from studyrunner.scene.computed import Computed, InMemory, model_once, scene_parameters_of
+from studies.scenes import build_scene, scene_has, scene_mesh
+from studyrunner.scene.computed import (
+    Computed,
+    InMemory,
+    describe_origin,
+    harmonics_to_build,
+    model_once,
+    scene_parameters_of,
+)
 from studyrunner.scene.edge_pairs import edge_pairs
-from studyrunner.scene.variables import build_mesh, check_outputs
 from studyrunner.study.mistakes import scene_errors
-from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
+from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
+    from studies.scene_answers import SurfaceMesh
+
+_LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
 
 
 @dataclass(frozen=True)
@@ -40,8 +49,8 @@ class SceneFacts:
     digest: SHA-256 of all arrays and names of the reduced model, hexadecimal.
     largest_harmonics: largest number of harmonics for this scene; None without limit.
     stuck_frequency: Hz, first natural frequency with the joint stuck; NaN where there is none.
-    gap, friction_coefficient (n_contact,): m and 1, of each pair; friction None where the study gives one for all.
     edge (n_contact,): whether a pair is at the edge of the contact (`edge_pairs`); False where unknown.
+    gap, friction_coefficient (n_contact,): m and 1, of each pair; friction None where the study gives one for all.
     """
 
     n_displacements: int
@@ -76,55 +85,23 @@ def build_study_scene(
 
     Raises UserError where the parameters or the scene file are wrong, or the scene lacks what the study asks for.
     """
-    model = _build(study, progress, InMemory() if computed is None else computed)
-    check_outputs(study, model)
-    _check_surfaces(study, model)
-    return model
-
-
-def harmonics_to_build(study: Study) -> int:
-    """Number of harmonics that a scene is built for, those that show the error of a given number included."""
-    # two levels up: 1, 3, 5, 7, 9, 13, 19, 27...
-    shown = 2 * max(study.given_harmonics, default=0) + 3
-    return max(shown, AUTOMATIC_HARMONICS_OF_A_WAVE) if AUTO in study.harmonics else shown
-
-
-def _build(study: Study, progress: Callable[[str], None], computed: Computed) -> ReducedModel:
-    given, scene = max(study.given_harmonics, default=1), study.scene
+    scene = study.scene
     # far from what can be, numbers overflow; what is wrong with them is found by the checks of the model
     with scene_errors(study.source, scene.path), np.errstate(all="ignore"):
         if scene.path is None:
-            build = partial(_build_here, study, progress)
-            return model_once(study, harmonics_to_build(study), computed, build)
-        # h5py is loaded for scene files only: the bundled scenes do without it.
-        from studies.scene_file import read_scene
+            kept = InMemory() if computed is None else computed
+            model = model_once(study, kept, partial(_build_here, study, progress))
+        else:
+            # h5py is loaded for scene files only: the bundled scenes do without it.
+            from studies.scene_file import read_scene
 
-        model = read_scene(scene.path, given, scene.group)
-        # a scene in a result file is the one that was computed with
-        if not scene.group:
-            model = make_compliant(model, dict(scene.parameters)["contact_stiffness"])
-    _check_friction(study, model)
+            model = read_scene(scene.path, max(study.given_harmonics, default=1), scene.group)
+            # a scene in a result file is the one that was computed with
+            if not scene.group:
+                model = make_compliant(model, dict(scene.parameters)["contact_stiffness"])
+    _check_pairs(study, model)
+    _check_outputs(study, model)
     return model
-
-
-def _check_friction(study: Study, model: ReducedModel) -> None:
-    """Raises UserError where both study and scene file give the friction coefficient, or neither."""
-    key, own, value = "scene.friction_coefficient", model.contact.friction_coefficient, study.friction_coefficient
-    if own is None and value is None:
-        raise UserError(study.source, key, None, "missing: give it, or contact/friction_coefficient in the scene file")
-    if own is not None and value is not None:
-        remedy = "remove it: the scene file gives each pair its own in contact/friction_coefficient"
-        raise UserError(study.source, key, value, remedy)
-
-
-def _check_surfaces(study: Study, model: ReducedModel) -> None:
-    """Raises UserError where the study gives wear factors of surfaces that the scene does not have."""
-    if study.wear.surfaces is None:
-        return
-    try:
-        surface_factors(model.contact.surface, study.wear_law.surfaces)
-    except ValueError as error:
-        raise UserError(study.source, "wear.surfaces", study.wear.surfaces, str(error)) from None
 
 
 def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
@@ -139,9 +116,70 @@ def _build_here(study: Study, progress: Callable[[str], None]) -> ReducedModel:
         raise
     except (ArithmeticError, ValueError, MemoryError) as error:
         # what a parameter alone does not show: LinAlgError is a ValueError, too
-        raise SceneError(
-            "model", f"{study.scene.model} cannot be built: {error}", "give parameters of a possible structure"
-        ) from None
+        what = f"{study.scene.model} cannot be built: {error}"
+        raise SceneError("model", what, "give parameters of a possible structure") from None
+
+
+def _check_pairs(study: Study, model: ReducedModel) -> None:
+    """Raises UserError where friction is given twice or not at all, or wear factors are of surfaces without pairs."""
+    key, own, value = "scene.friction_coefficient", model.contact.friction_coefficient, study.friction_coefficient
+    if own is None and value is None and study.scene.path is not None:
+        raise UserError(study.source, key, None, "missing: give it, or contact/friction_coefficient in the scene file")
+    if own is not None and value is not None and study.scene.path is not None:
+        remedy = "remove it: the scene file gives each pair its own in contact/friction_coefficient"
+        raise UserError(study.source, key, value, remedy)
+    if study.wear.surfaces is not None:
+        try:
+            surface_factors(model.contact.surface, study.wear_law.surfaces)
+        except ValueError as error:
+            raise UserError(study.source, "wear.surfaces", study.wear.surfaces, str(error)) from None
+
+
+def _check_outputs(study: Study, model: ReducedModel) -> None:
+    """Raises UserError where the study asks for loops of pairs or natural frequencies that the scene does not have."""
+    loops, n_contact = study.outputs.loops, model.contact.n_contact
+    for pair in loops:
+        if pair >= n_contact:
+            remedy = f"give indices from 0 to {n_contact - 1}, the contact pairs of the scene"
+            raise UserError(study.source, "outputs.loops", pair, remedy)
+    own = {"contact": n_contact, "response": len(model.response_names), "cycle": len(study.cycles_kept)}
+    sizes = {**own, **study.sizes}
+    # the variables of the certificate are there whether they are asked for or not
+    n_values = sum(math.prod(sizes[name] for name in each.dimensions) for each in study.kind.asked.values())
+    if (size := 8.0 * (loop_numbers(study) + n_values)) > _LARGEST_HISTORY:
+        remedy = f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB"
+        key = "outputs.loops" if loops else "slow_time.outputs"
+        raise UserError(study.source, key, list(loops) if loops else len(study.cycles_kept), remedy)
+    if "natural_frequency" in study.scene_variables and not has_frequencies(study):
+        with scene_errors(study.source, None):
+            stuck_frequencies(model)
+
+
+def loop_numbers(study: Study) -> int:
+    """Numbers in the loops of one point."""
+    return len(study.outputs.loops) * len(study.cycles_kept) * LOOP_PHASES * len(LOOP_COMPONENTS) * len(LOOPS)
+
+
+def has_frequencies(study: Study) -> bool:
+    """Whether the scene knows more natural frequencies than those of its reduced model."""
+    rigid = dict(study.scene.parameters)["contact_stiffness"] is None
+    return study.scene.is_bundled and rigid and scene_has(study.scene.model, "natural_frequencies")
+
+
+def build_mesh(study: Study) -> SurfaceMesh | None:
+    """Mesh of the study's scene, None where it has none. Raises SceneError."""
+    scene = study.scene
+    if "mesh" not in scene.offers:
+        return None
+    if scene.files is not None:
+        from studies.fe_models.from_files.scene import describe_model_mesh
+
+        return describe_model_mesh(scene.files, scene.parameters)
+    if scene.path is None:
+        return scene_mesh(scene.model, scene.parameters)
+    from studies.scene_file import read_mesh
+
+    return read_mesh(scene.path, scene.group)
 
 
 def write_study_scene(study: Study, path: Path, progress: Callable[[str], None] = _silent) -> None:
@@ -188,20 +226,6 @@ def scene_to_keep(study: Study, model: ReducedModel) -> KeptScene | None:
     with scene_errors(study.source, study.scene.path):
         datasets = tuple(scene_datasets(model, build_mesh(study)))
         return KeptScene(scene_attributes(model), datasets, describe_origin(study))
-
-
-def describe_origin(study: Study) -> dict[str, str]:
-    """Attributes on the files of a finite-element model; none for other scenes. Raises OSError, SceneError."""
-    scene = study.scene
-    if scene.files is not None:
-        from studies.fe_models.from_files.scene import describe_origin as describe_files
-
-        return describe_files(scene.files, scene.parameters)
-    if scene.path is None:
-        return {}
-    from studies.scene_file import read_origin
-
-    return read_origin(scene.path)
 
 
 def describe_scene(model: ReducedModel) -> SceneFacts:

@@ -1,21 +1,25 @@
-"""The scenes of a study: which of its parts share one, and what the result file says of all of them."""
+"""The scenes of a study: which of its parts share one, which `--plan` builds, what a result file says of them."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import math
-from collections.abc import Hashable, Sequence
+import time
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.scene.computed import scene_parameters_of
-from studyrunner.scene.scene import SceneFacts, harmonics_to_build
+from studyrunner.scene.computed import harmonics_to_build, scene_parameters_of
+from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene
 from studyrunner.study.realisation import Realisation, realise
+from studyrunner.study.scene_axes import keys_as_given
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
+
+_MOST_PLANNED = 8
 
 
 @dataclass(frozen=True)
@@ -43,22 +47,21 @@ def find_scenes(study: Study) -> SceneSet:
 
     Raises UserError where a result file is to keep the scene, and there are several.
     """
+    studies: dict[str, Study] = {}
     numbers: dict[str, int] = {}
-    studies: list[Study] = []
     of_blocks = []
     parts = realise(study)
     for part in parts:
         of_part = part.study.block_studies or (part.study,)
         keys = [_key(each) for each in of_part]
         for key, each in zip(keys, of_part, strict=True):
-            if key not in numbers:
-                numbers[key] = len(numbers)
-                studies.append(each)
+            numbers.setdefault(key, len(numbers))
+            studies.setdefault(key, each)
         of_blocks.append(tuple(numbers[key] for key in keys))
     if study.outputs.scene and len(studies) > 1:
         remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
         raise UserError(study.source, "outputs.scene", True, remedy)
-    return SceneSet(tuple(studies), parts, tuple(of_part[0] for of_part in of_blocks), tuple(of_blocks))
+    return SceneSet(tuple(studies.values()), parts, tuple(own[0] for own in of_blocks), tuple(of_blocks))
 
 
 def _key(study: Study) -> str:
@@ -86,23 +89,48 @@ def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
     return replace(scenes, parts=tuple(parts))
 
 
-def frequencies_of_ratios(
-    study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
-) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
-    """Excitation frequencies, Hz: their dimensions, the first one frequency_ratio; None where the study gives Hz."""
-    if study.axes.frequency_ratio is None:
-        return None
-    names, stuck = stuck_frequencies_of(study, facts, scenes)
-    return ("frequency_ratio", *names), np.multiply.outer(study.axes.frequency_ratio, stuck)
+@dataclass(frozen=True)
+class PlannedScenes:
+    """Scenes of a study as `--plan` knows them.
+
+    facts: of each scene, or of one that is as large. seconds_left: time for building the others, s.
+    """
+
+    scenes: SceneSet
+    facts: tuple[SceneFacts, ...]
+    seconds_left: float
+
+    @property
+    def largest(self) -> SceneFacts:
+        """Facts of the scene with the most pairs."""
+        return max(self.facts, key=lambda each: len(each.area))
+
+    def describe(self) -> str:
+        """Number of scenes, and of their pairs; empty for one scene."""
+        if len(self.facts) == 1:
+            return ""
+        fewest, most = min(len(each.area) for each in self.facts), len(self.largest.area)
+        of_pairs = f"{most}" if fewest == most else f"{fewest} to {most}"
+        return f"{len(self.facts)}, built once each, with {of_pairs} contact pair{'' if of_pairs == '1' else 's'}"
 
 
-def check_blocks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> None:
-    """Raises UserError where the blocks of a mission do not have equal pairs. facts: of each scene."""
-    for numbers in scenes.of_blocks:
-        for block, number in zip(study.mission, numbers, strict=True):
-            if facts[numbers[0]].pairs != facts[number].pairs:
-                remedy = f"give parameters with which it has the contact pairs of {study.mission[0].name}, which wear"
-                raise UserError(study.source, f"mission.{block.name}", None, remedy)
+def plan_scenes(study: Study, say: Callable[[str], None]) -> PlannedScenes:
+    """Builds some scenes of a study: those that may differ in their sizes, at most eight.
+
+    Scenes that differ only in numbers with a fraction are taken to have the same sizes. Raises UserError where a scene
+    is wrong.
+    """
+    scenes, built = find_scenes(study), dict[str, SceneFacts]()
+    began, facts = time.monotonic(), []
+    for number, each in enumerate(scenes.studies):
+        sizes = str([value for _, value in each.scene.parameters if not isinstance(value, float)])
+        if sizes not in built and len(built) < _MOST_PLANNED:
+            say(f"building scene {number + 1} of {len(scenes.studies)}")
+            with keys_as_given(study.scene_axes):
+                built[sizes] = describe_scene(build_study_scene(each, say))
+        facts.append(built.get(sizes) or next(reversed(built.values())))
+    left = (time.monotonic() - began) / len(built) * (len(facts) - len(built))
+    return PlannedScenes(at_ratios(scenes, facts), tuple(facts), left)
 
 
 def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
@@ -143,8 +171,7 @@ def pair_arrays(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet | No
     if not names:
         one = facts[0]
         return PairArrays(("contact",), one.position, one.area, np.array(one.surface), None)
-    n_contact = max(len(each.area) for each in facts)
-    shape = (len(facts), n_contact)
+    shape = (len(facts), max(len(each.area) for each in facts))
     position, area = np.full((*shape, 3), np.nan), np.full(shape, np.nan)
     surface = np.full(shape, "", np.array([label for each in facts for label in each.surface]).dtype)
     for number, each in enumerate(facts):
@@ -161,6 +188,16 @@ def stuck_frequencies_of(
     found = np.array([each.stuck_frequency for each in facts])
     names, numbers = axes_of_difference(study, scenes, [each.tobytes() for each in found])
     return names, found[numbers]
+
+
+def frequencies_of_ratios(
+    study: Study, facts: Sequence[SceneFacts], scenes: SceneSet
+) -> tuple[tuple[str, ...], NDArray[np.float64]] | None:
+    """Excitation frequencies, Hz: their dimensions, the first one frequency_ratio; None where the study gives Hz."""
+    if study.axes.frequency_ratio is None:
+        return None
+    names, stuck = stuck_frequencies_of(study, facts, scenes)
+    return ("frequency_ratio", *names), np.multiply.outer(study.axes.frequency_ratio, stuck)
 
 
 def axes_of_difference(

@@ -8,8 +8,7 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.percent import show_percent
-from studyrunner.statistics.estimates import FEWEST
-from studyrunner.statistics.samples import Array
+from studyrunner.statistics.samples import FEWEST, Array
 
 _MM3 = 1e9
 _MEASURES = ("first_index", "rank_correlation")

@@ -9,16 +9,18 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from studyrunner.scatter.design import SaltelliLayout
-from studyrunner.statistics.estimates import exceedance, quantiles, rank_correlations, saltelli_indices
 from studyrunner.statistics.samples import (
     CYCLE,
     DRAWN,
     SAMPLE,
     Array,
     SampleValues,
+    exceedance,
+    quantiles,
+    rank_correlations,
     read_inputs,
     read_samples,
+    saltelli_indices,
     scatter_of,
 )
 from studyrunner.statistics.two_groups import deciding_pair, density, two_groups
@@ -70,16 +72,16 @@ def worn_volume_statistics(
         # each point has counts of its own: they share the last one only
         dataset = dataset.isel({CYCLE: [-1]})
     section = scatter_of(dataset)
-    layout = SaltelliLayout(len(section.inputs)) if section is not None and section.method == "saltelli" else None
     rows = np.arange(dataset.sizes[SAMPLE])
-    if layout is not None:
+    is_saltelli = section is not None and section.method == "saltelli"
+    if section is not None and is_saltelli:
         # A and B are independent samples
-        rows = rows[rows % layout.rows_per_base < 2]
+        rows = rows[rows % section.rows_a_sample < 2]
     everything, names = read_samples(dataset, "worn_volume")
     values = everything.at((..., rows))
     found, coords = _of_values(dataset, values, rows, names, quantiles, confidence, (exceed, depth))
     if inputs := read_inputs(dataset):
-        found |= _of_inputs(dataset, everything, layout, confidence, names)
+        found |= _of_inputs(dataset, everything, confidence, names, is_saltelli=is_saltelli)
         coords["input"] = ("input", list(inputs), _about("1", "input that scatters"))
     found |= _of_groups(dataset.isel({SAMPLE: rows}), values, names)
     kept = {name: array for name, array in dataset.coords.items() if set(array.dims) <= set(names)}
@@ -137,14 +139,14 @@ def _of_values(
 
 
 def _of_inputs(
-    dataset: xr.Dataset, values: SampleValues, layout: SaltelliLayout | None, confidence: float, names: tuple[str, ...]
+    dataset: xr.Dataset, values: SampleValues, confidence: float, names: tuple[str, ...], *, is_saltelli: bool
 ) -> _Arrays:
     """What each input decides."""
     inputs, dims = read_inputs(dataset), (*names, "input")
     table = np.stack(list(inputs.values()), axis=1)
-    if layout is not None:
+    if is_saltelli:
         words = "share of the variance that the input decides"
-        first, total = saltelli_indices(layout, table, values, confidence)
+        first, total = saltelli_indices(table, values, confidence)
         found = _bands("first_index", f"{words} alone", "1", first, dims)
         return found | _bands("total_index", f"{words}, with the others", "1", total, dims)
     words = "rank correlation of the worn volume with the input"

@@ -11,7 +11,7 @@ from collections import Counter
 
 import numpy as np
 
-from solver.continuation.static_state import solve_static_state
+from solver.continuation.first_state import solve_static_state
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings

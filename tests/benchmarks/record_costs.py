@@ -13,7 +13,7 @@ import time
 
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import StartResult
-from studyrunner.scene.drawn_contacts import contact_changes
+from studyrunner.scene.pairs import contact_changes
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study

@@ -22,8 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from studyrunner.kinds.kind import build_tasks
-from studyrunner.kinds.task import StartResult
-from studyrunner.kinds.task_plan import TaskPlan
+from studyrunner.kinds.task import StartResult, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.study.study_file import read_study
 from tests.benchmarks.frame import Table, arguments

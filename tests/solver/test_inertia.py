@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver.contact.coulomb import STICK
-from solver.contact.rigid_slider import step_line
+from solver.contact.sliding_masses import step_line
 from solver.structure.fourier import build_basis, to_complex
 from tests.solver import mass_twin
 from tests.solver.kernel_cases import FRICTION, mass_case, run_masses
@@ -70,7 +70,7 @@ def series(row, omega):
 def marched(case):
     """Complex harmonics 0, 1, 2, 3 of the friction force of the one pair, and its slip work."""
     found, line = run_masses(case, case.predicted_h), int(case.line[0])
-    force_h = (found.force_t @ case.basis.analysis)[0, 1 + line] / case.step_share
+    force_h = (found.force_t @ case.basis.analysis)[0, 1 + line] / case.basis.step_mean
     return np.concatenate([[force_h[0]], to_complex(force_h)]), float(found.slip_work[0])
 
 
@@ -105,13 +105,13 @@ def plane_case(seed, n_samples):
     predicted_h = random.normal(size=(1, 3, 7)) * 4.0
     predicted_h[:, 0, 0] = 15.0
     predicted_h[:, 1:, 0] *= 0.1
-    return replace(case, predicted_h=predicted_h, line=np.array([-1]), has_normal=np.ones(1, bool))
+    return replace(case, predicted_h=predicted_h, line=np.array([-1]))
 
 
 def plane_result(seed, n_samples):
     case = plane_case(seed, n_samples)
     found = run_masses(case, case.predicted_h)
-    return (found.force_t @ case.basis.analysis)[0, 1:] / case.step_share, float(found.slip_work[0])
+    return (found.force_t @ case.basis.analysis)[0, 1:] / case.basis.step_mean, float(found.slip_work[0])
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

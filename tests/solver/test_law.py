@@ -37,12 +37,11 @@ def predicted(joint, seed=2):
     return values, history
 
 
-def of_pairs(joint, pairs):
-    """The same joint with some of its pairs alone; its structure is not used."""
-    penalty = replace(joint.penalty, **{name: value[pairs] for name, value in vars(joint.penalty).items()})
-    contact = replace(joint.contact, dofs=joint.contact.dofs[pairs], area=joint.contact.area[pairs])
-    friction = joint.friction_coefficient[pairs]
-    return replace(joint, penalty=penalty, contact=contact, friction_coefficient=friction)
+def of_pairs(law, pairs):
+    """The law of some of the pairs alone."""
+    penalty = replace(law.penalty, **{name: value[pairs] for name, value in vars(law.penalty).items()})
+    contact = replace(law.contact, dofs=law.contact.dofs[pairs], area=law.contact.area[pairs])
+    return replace(law, penalty=penalty, contact=contact, friction_coefficient=law.friction_coefficient[pairs])
 
 
 def assert_same(found, expected, pairs):
@@ -67,13 +66,13 @@ def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution, friction):
     force_tangent, slip_tangent = joint.law.tangent(together)
     groups = [FREE, elastic, *([pair] for pair in range(6))]
     for pairs in groups:
-        part = of_pairs(joint, pairs)
-        alone = part.law.march(values[pairs], history[pairs])
+        part = of_pairs(joint.law, pairs)
+        alone = part.march(values[pairs], history[pairs])
         assert_same(together, alone, pairs)
-        its_force_tangent, its_slip_tangent = part.law.tangent(alone)
+        its_force_tangent, its_slip_tangent = part.tangent(alone)
         assert force_tangent[pairs] == pytest.approx(its_force_tangent, abs=1e-11)
         assert slip_tangent[pairs] == pytest.approx(its_slip_tangent, abs=1e-11 * np.abs(slip_tangent).max())
-    largest_error = max(of_pairs(joint, [p]).law.march(values[[p]], history[[p]]).periodicity_error for p in range(6))
+    largest_error = max(of_pairs(joint.law, [p]).march(values[[p]], history[[p]]).periodicity_error for p in range(6))
     assert together.periodicity_error == pytest.approx(largest_error, rel=1e-3, abs=1e-9 * PRELOAD)
 
 

@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
+from solver.accuracy.resolved_state import ResolvedState
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
 from studies.model_check import check_model
 from tests.benchmarks.random_scenes import run_scene, solved
 from tests.random_scenes import COMPONENTS, random_scene
+from tests.solver.models import branch_states
 
 SCENES = [random_scene(seed) for seed in range(200)]
 
@@ -50,3 +54,18 @@ def test_some_scenes_are_solved():
         assert record["march"] != "wear falls"
     assert sum(record.get("slips", False) for record in records) >= 5
     assert 2 <= sum(record.get("opens", False) for record in records) <= 7
+
+
+@pytest.mark.slow
+def test_an_impact_that_few_harmonics_do_not_show_starts_from_the_force_samples(monkeypatch):
+    scene = random_scene(16)
+    asked = scene.model, scene.friction, scene.amplitude, [2.0 * np.pi * scene.frequency_hz], SolverSettings()
+    assert branch_states(*asked)[0].outcome is Outcome.CONVERGED
+    # started from zero, Newton's method diverges
+    solve_at = ResolvedState.solve_at
+
+    def from_zero(*given, with_tail=False):
+        return None if with_tail else solve_at(*given)
+
+    monkeypatch.setattr(ResolvedState, "solve_at", from_zero)
+    assert branch_states(*asked)[0].outcome is Outcome.INACCURATE

@@ -1,4 +1,4 @@
-"""Static states: found from any start and under any friction, or the reason why there is none."""
+"""Static states, found under any friction, or the reason why there is none; first periodic states from there."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -6,20 +6,22 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.continuation.static_state import solve_static_state
+from solver.continuation.first_state import solve_first_state, solve_static_state
+from solver.harmonic_balance.state import State
+from solver.loading_history.start_states import follow_branch
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.condensation import condense
 from solver.structure.joint import build_case
-from studies.finite_element.elements.solid_mesh import Material
-from studies.finite_element.joint.pairing import ContactSurfaces
-from studies.finite_element.joint.surfaces import surface_of_faces
+from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
+from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene
+from studies.finite_element.surfaces import surface_of_faces
 from tests.benchmarks.random_decks import run_deck
 from tests.random_decks import equilibrium_possible, law_errors, random_deck
-from tests.solver.models import dovetail
+from tests.solver.models import dovetail, scene
 from tests.studies.fe_models.sectors import faces_where
 from tests.studies.fe_models.solid_meshes import block, joined
 
@@ -87,16 +89,11 @@ def stacked(force, direction=(0.0, 0.0, -1.0), interference=None, edge=False):
     return build_fe_scene(model, joint, ReductionOptions(n_modes=10), 1).model
 
 
-def needed_friction(model):
-    """Friction coefficient from which the glued structure slips nowhere."""
-    force = glued_force(model)
-    assert force[:, 0].min() > 0.0
-    return float((np.hypot(force[:, 1], force[:, 2]) / force[:, 0]).max())
-
-
 def test_beyond_the_friction_that_holds_all_pairs_the_static_state_is_the_glued_one():
     model = pressed_dovetail()
-    needed, force = needed_friction(model), glued_force(model)
+    force = glued_force(model)
+    # from this friction coefficient on the glued structure slips nowhere
+    needed = float((np.hypot(force[:, 1], force[:, 2]) / force[:, 0]).max())
     assert 1.5 < needed < 100.0, "the test means nothing"
     for friction in (1.01 * needed, 5.0 * needed, 1000.0):
         evaluation = static_point(model, friction).evaluation
@@ -148,3 +145,28 @@ def test_random_decks_have_a_static_state_where_the_forces_can_balance(seed):
     exists, outcome, errors, _ = run_deck(random_deck(seed))
     assert (outcome is Outcome.CONVERGED) is (exists == "possible")
     assert max(errors.values(), default=0.0) < 1e-7
+
+
+@pytest.mark.slow
+def test_with_more_friction_the_vibration_comes_to_that_of_the_glued_structure():
+    model = pressed_dovetail()
+    glued = None
+    away = []
+    for friction in (0.06, 0.08, 0.1, 5.0, 1000.0):
+        case = build_case(model, friction, OMEGA, SETTINGS)
+        point = solve_first_state(case, OMEGA, 0.5, np.zeros(PAIRS), Run(case.settings.tolerance))
+        assert isinstance(point, State), f"friction {friction}"
+        joint = case.joint(OMEGA, 0.5)
+        glued = complex(joint.structure.harmonic_offset[0])
+        cosine, sine = joint.structure.response_h(joint.to_relative(point.evaluation.displacement_h))[0, 1:3]
+        away.append(abs(complex(cosine, -sine) - glued))
+    assert glued is not None
+    assert away[0] > away[1] > away[2] > 0.01 * abs(glued)
+    assert max(away[3:]) < 1e-6 * abs(glued)
+
+
+def test_a_mass_that_slides_all_the_time_needs_no_reference_sweep():
+    ((_, start),) = follow_branch(scene("sdof_slider"), 0.5, 10.0, np.array([160.0]), "up", SolverSettings())
+    assert start.reference is None
+    assert 0.0 < start.response_error < 1e-2
+    assert start.newton_iterations < 120

@@ -5,14 +5,14 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from solver.continuation.static_state import solve_static_state
+from solver.continuation.first_state import solve_static_state
 from solver.harmonic_balance.dlft import Balance
 from solver.model import ContactInterface, LinearModel, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.rate_slope import LARGEST_MOVED_LOAD, moved_fraction, rate_slope, too_long
+from solver.wear.rate_slope import moved_fraction, rate_slope
 from solver.wear.wearing_joint import WearingJoint
 from tests.solver.models import branch_states, dovetail, march_wear, scene
 
@@ -41,17 +41,6 @@ def test_the_share_is_that_by_which_the_normal_forces_change():
     change = np.linalg.norm(after - before) / np.linalg.norm(before)
     assert change > 0.01
     assert moved_fraction(joint, states[0], depth) == pytest.approx(change, rel=1e-6, abs=0.0)
-
-
-def test_the_reason_names_the_step_and_one_that_would_do():
-    joint, (at,) = static_states(FRICTION, np.zeros(16))
-    one = 1e-9 * np.eye(16)[0]
-    unit = moved_fraction(joint, at, one)
-    assert too_long(joint, at, 0.9 * LARGEST_MOVED_LOAD / unit * one, 3000.0, 1000.0) is None
-    said = too_long(joint, at, 20.0 / unit * one, 3000.0, 1000.0)
-    assert said is not None
-    assert "1000 cycles at once from cycle 3000 on moves 20 times" in said
-    assert "at most 5 cycles" in said
 
 
 @pytest.mark.slow

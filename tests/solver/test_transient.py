@@ -9,7 +9,6 @@ from scipy.linalg import expm
 from solver.continuation import transient
 from solver.continuation.arc_length import Arc
 from solver.continuation.natural import NEAR_ITERATIONS
-from solver.continuation.static_state import solve_static_state
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
@@ -17,10 +16,9 @@ from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
-from solver.stability.hill import is_stable
-from solver.structure.fourier import change_orders
+from solver.stability.floquet import is_stable
 from solver.structure.joint import build_case
-from tests.references import coulomb_orbit, slider_orbit
+from tests.references import coulomb_orbit
 from tests.solver.models import converged_state, crossings, first_point, scene
 from tests.solver.reconstruction import full_motion
 from tests.solver.test_natural import WALL_OMEGA, wall
@@ -29,38 +27,15 @@ FORCE = 0.02
 NATURAL = np.sqrt(1.6e6)
 
 
-def from_rest(model, friction, amplitude, omega, settings):
-    """First harmonics, m, that build up from rest."""
-    case = build_case(model, friction, omega, settings)
-    idle = np.zeros(model.contact.n_contact)
-    quiet = case.joint(omega, 0.0)
-    static = solve_static_state(quiet, idle, Run(settings.tolerance))
-    still = Balance(quiet, static.history, idle)
-    at = static.evaluation
-    orders = case.resolution.orders
-    start = still.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
-    rest = Run(settings.tolerance).solve(still, start)
-    assert rest.converged
-    joint = case.joint(omega, amplitude)
-    point = relax_to_periodic(case, joint, idle, rest.evaluation, quiet, static.history, Run(case.settings.tolerance))
-    assert point.evaluation.scaled_residual() <= settings.tolerance
-    return np.abs(full_motion(model, periodic_state(joint, point)).displacement[1])
-
-
 @pytest.mark.parametrize("omega", [0.3, 0.6, 1.3])
 def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
     orbit = coulomb_orbit([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2, omega)
-    found = from_rest(scene("two_masses"), 0.5, 20.0, omega, SolverSettings(21, 256))
-    assert found == pytest.approx([abs(orbit.harmonic(dof)) for dof in (0, 1)], rel=0.02, abs=0.0)
-
-
-@pytest.mark.parametrize("ratio", [0.3, 0.8, 1.1])
-def test_the_slider_relaxes_from_rest_to_its_exact_motion(ratio):
-    # 0.3: with stops
-    exact = abs(slider_orbit(0.1, 0.0, 1.6e5, 10.0, 3.0, ratio * NATURAL).harmonic(0))
-    model = scene("sdof_slider", normal_stiffness=0.0)
-    found = from_rest(model, 0.3, 10.0, ratio * NATURAL, SolverSettings(21, 256))
-    assert found == pytest.approx([exact], rel=0.02, abs=0.0)
+    case, idle = build_case(scene("two_masses"), 0.5, omega, SolverSettings(21, 256)), np.zeros(1)
+    rest = first_point(case, omega, 0.0, idle)
+    quiet, joint = case.joint(omega, 0.0), case.joint(omega, 20.0)
+    found = relax_to_periodic(case, joint, idle, rest, quiet, Run(1e-8))
+    moved = np.abs(full_motion(case.model, periodic_state(joint, found)).displacement[1])
+    assert moved == pytest.approx([abs(orbit.harmonic(dof)) for dof in (0, 1)], rel=0.02, abs=0.0)
 
 
 def upper_state(case, omega):
@@ -82,9 +57,7 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega):
     before, joint = case.joint(1.55, FORCE), case.joint(omega, FORCE)
     start = upper_state(case, 1.55)
     budget = Budget()
-    found = relax_to_periodic(
-        case, joint, np.zeros(1), start.evaluation, before, start.history, Run(case.settings.tolerance, budget)
-    )
+    found = relax_to_periodic(case, joint, np.zeros(1), start, before, Run(case.settings.tolerance, budget))
     assert found is not None
     moved = full_motion(case.model, periodic_state(joint, found)).displacement[1][1]
     assert abs(moved) == pytest.approx(FORCE / abs(1 - omega**2 + 0.05j * omega), rel=1e-6, abs=0.0)
@@ -103,9 +76,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
     middle = next(filter(grows, crossings(Arc(balance_at, start, 0.03, Run(1e-9)), 0.03, 1.0)))
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
-    found = relax_to_periodic(
-        case, joint, np.zeros(1), middle.evaluation, before, middle.history, Run(case.settings.tolerance)
-    )
+    found = relax_to_periodic(case, joint, np.zeros(1), middle, before, Run(case.settings.tolerance))
     assert isinstance(found, State)
     assert found is not None
     landed = replace(found, parameter=0.03 * (1.0 + change))
@@ -154,9 +125,7 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch)
     for most in (transient.SEARCH_ITERATIONS, 10):
         monkeypatch.setattr(transient, "SEARCH_ITERATIONS", most)
         budget = Budget()
-        outcome = relax_to_periodic(
-            case, joint, idle, rest.evaluation, quiet, rest.history, Run(case.settings.tolerance, budget)
-        )
+        outcome = relax_to_periodic(case, joint, idle, rest, quiet, Run(case.settings.tolerance, budget))
         outcomes.append(Outcome.CONVERGED if isinstance(outcome, State) else outcome)
         # one step and one search for the periodic state may be under way
         assert budget.iterations <= most + 2 * NEAR_ITERATIONS

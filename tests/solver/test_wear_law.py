@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline, RegularGridInterpolator
 from scipy.optimize import brentq
 
-from solver.contact.wear_law import ARCHARD, ARCHARDS_WORK, WearingWork, WearLaw, WearTable, wearing_work
+from solver.contact.wear_law import ARCHARD, ARCHARDS_WORK, PairFactors, WearingWork, WearLaw, WearTable, wearing_work
 from solver.settings import Scheme, SolverSettings
 from tests.solver.models import march_wear, random_balance, random_model
 from tests.solver.test_balance import jacobian_by_differences
@@ -26,25 +26,22 @@ THRESHOLD = 20.0  # J/m2: the slider begins with about 45 of them
 def random_work(seed, n_contact, n_pressures=4, n_depths=5):
     """All that a law can have, for forces of about 100 N on 1e-4 m2 and depths of micrometres."""
     random = np.random.default_rng(seed)
-    return WearingWork(
-        factor=random.uniform(0.5, 2.0, n_contact),
-        least=random.uniform(0.0, 1e-4, n_contact),
-        pressure=np.sort(random.uniform(0.1e6, 2e6, n_pressures)),
-        depth=np.sort(random.uniform(0.0, 5e-6, n_depths)),
-        table=random.uniform(0.0, 2.0, (n_pressures, n_depths)),
-        area=random.uniform(0.5e-4, 2e-4, n_contact),
-    )
+    factor, least = random.uniform(0.5, 2.0, n_contact), random.uniform(0.0, 1e-4, n_contact)
+    pressure, depth = np.sort(random.uniform(0.1e6, 2e6, n_pressures)), np.sort(random.uniform(0.0, 5e-6, n_depths))
+    values = random.uniform(0.0, 2.0, (n_pressures, n_depths))
+    return WearingWork(factor, least, PairFactors(pressure, depth, values, random.uniform(0.5e-4, 2e-4, n_contact)))
 
 
 def test_a_table_is_bilinear_and_constant_beyond_its_ends():
-    law, random = replace(random_work(0, 200), factor=None, least=None), np.random.default_rng(1)
+    table, random = random_work(0, 200).table, np.random.default_rng(1)
+    law = WearingWork(table=table)
     force, depth = random.uniform(0.0, 400.0, 200), random.uniform(-1e-6, 6e-6, 200)
-    assert law.area is not None
-    reference = RegularGridInterpolator((law.pressure, law.depth), law.table)
-    inside = np.clip(force / law.area, law.pressure[0], law.pressure[-1]), np.clip(depth, law.depth[0], law.depth[-1])
+    reference = RegularGridInterpolator((table.pressure, table.depth), table.factor)
+    inside = np.clip(force / table.area, *table.pressure[[0, -1]]), np.clip(depth, *table.depth[[0, -1]])
     assert law.work(np.ones(200), force, depth) == pytest.approx(reference(np.stack(inside, axis=1)), rel=1e-12)
-    assert law.largest_factor == np.max(law.table)
-    single = replace(law, pressure=law.pressure[:1], depth=law.depth[:1], table=np.array([[0.3]]))
+    assert law.largest_factor == np.max(table.factor)
+    one = replace(table, pressure=table.pressure[:1], depth=table.depth[:1], factor=np.array([[0.3]]))
+    single = WearingWork(table=one)
     assert np.array_equal(single.work(np.ones(200), force, depth), np.full(200, 0.3))
     assert not np.any(single.slopes(np.ones(200), force, depth)[1:])
 

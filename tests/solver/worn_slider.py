@@ -11,8 +11,7 @@ from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
-from solver.wear.state import WearState
-from solver.wear.wearing_joint import WearingJoint
+from solver.wear.wearing_joint import WearingJoint, WearState
 from tests.references import slider_amplitude, slider_wear_depth
 from tests.solver.models import branch_states, march_wear, scene
 
@@ -23,7 +22,6 @@ WEAR = 1.1e-11  # 1/Pa
 AREA = 1e-4
 END = 8e4
 COARSE = SolverSettings(harmonics=5, samples=64, tolerance=1e-11)
-FINE = SolverSettings(harmonics=21, samples=256)
 CYCLES = np.linspace(0.0, END, 9)
 
 

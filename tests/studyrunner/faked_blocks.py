@@ -8,9 +8,9 @@ import pytest
 from solver.harmonic_balance.state import Failure
 from solver.missions import integrate
 from solver.missions.block_run import BlockRun
-from solver.missions.blocks import Passage
+from solver.missions.mission import Passage
 from solver.outcome import Outcome
-from solver.wear.solutions import Like
+from solver.wear.integrate import Like
 
 STUDY = """
 [study]
@@ -67,7 +67,7 @@ class FakedBlocks:
             return Failure(self.fails[block.name])
         slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
         return BlockRun(
-            cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, like=Like((), 1.0, 1), iterations=7
+            cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, like=Like((), 1.0), iterations=7
         )  # fmt: skip
 
 

@@ -7,9 +7,9 @@ from solver.packing import Packed, pack
 from studies.scenes import sector
 from studyrunner.scene import computed as computed_module
 from studyrunner.scene import scene as scene_module
+from studyrunner.scene.answers import build_scene_variables
 from studyrunner.scene.computed import InMemory
 from studyrunner.scene.scene import _parts, build_study_scene, describe_scene
-from studyrunner.scene.variables import build_scene_variables
 from studyrunner.study.study_file import read_study
 
 SCENES: dict[str, tuple[str, list[str]]] = {
@@ -68,7 +68,7 @@ def test_natural_frequencies_are_computed_once(monkeypatch):
 
 
 def key_of(study):
-    return {computed_module._key("model", study, scene_module.harmonics_to_build(study))}
+    return {computed_module.model_key(study)}
 
 
 def test_a_changed_file_or_source_makes_another_scene(tmp_path, monkeypatch):

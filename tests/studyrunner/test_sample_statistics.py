@@ -6,9 +6,15 @@ from scipy.special import ndtri
 from scipy.stats import norm, spearmanr
 from scipy.stats import t as student
 
-from studyrunner.scatter.design import SaltelliLayout, unit_design
-from studyrunner.statistics.estimates import FEWEST, exceedance, quantiles, rank_correlations, saltelli_indices
-from studyrunner.statistics.samples import SampleValues
+from studyrunner.scatter.draws import unit_design
+from studyrunner.statistics.samples import (
+    FEWEST,
+    SampleValues,
+    exceedance,
+    quantiles,
+    rank_correlations,
+    saltelli_indices,
+)
 from studyrunner.statistics.two_groups import deciding_pair, density, two_groups
 
 # Archard: V = k_w P s N, with lognormal k_w, P, s
@@ -102,7 +108,7 @@ def test_bands_hold_what_the_missing_samples_would_have_said():
 )
 def test_indices_of_a_saltelli_design(model, first, total):
     design = unit_design("saltelli", 2, 1024, 3)
-    found = saltelli_indices(SaltelliLayout(3), design, known(model(design)), 0.95)
+    found = saltelli_indices(design, known(model(design)), 0.95)
     for (ends, interval), exact in zip(found, (first, total), strict=True):
         np.testing.assert_allclose(ends, np.stack([exact] * 2, axis=-1), atol=0.06)
         assert inside(exact, interval + [-0.01, 0.01]).all()

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, sobol_indices
 
-from studyrunner.scatter.design import SaltelliLayout, unit_design
-from studyrunner.scatter.drawn_values import ScatteredPairs, drawn
+from studyrunner.scatter.draws import ScatteredPairs, drawn, unit_design
 from studyrunner.scatter.section import ScatterSection, flat_table
 from studyrunner.user_error import WrongValueError
 
@@ -63,11 +62,9 @@ def test_a_scrambled_sobol_sequence_is_a_digital_net():
 
 def test_rows_of_saltelli_are_those_of_scipy():
     """Indices of a linear function of three groups of columns; the second group has two columns."""
-    layout = SaltelliLayout(3)
     design = unit_design("saltelli", 1, 1024, 4, (1, 2, 1))
-    assert design.shape == (1024 * layout.rows_per_base, 4)
-    f_A, f_B, f_AB = layout.split(design @ [1.0, 2.0, 2.0, 4.0])
-    found = sobol_indices(func={"f_A": f_A[None], "f_B": f_B[None], "f_AB": f_AB[:, None]}, n=1024)
+    f_A, f_B, *f_AB = (design @ [1.0, 2.0, 2.0, 4.0]).reshape(1024, 5).T
+    found = sobol_indices(func={"f_A": f_A[None], "f_B": f_B[None], "f_AB": np.array(f_AB)[:, None]}, n=1024)
     np.testing.assert_allclose(found.first_order, np.array([1.0, 8.0, 16.0]) / 25.0, atol=0.03)
     np.testing.assert_allclose(found.total_order, np.array([1.0, 8.0, 16.0]) / 25.0, atol=0.03)
 

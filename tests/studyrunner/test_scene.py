@@ -19,7 +19,7 @@ from studyrunner.scene.scene import (
     largest_harmonics,
     write_study_scene,
 )
-from studyrunner.scene_models import SceneModels
+from studyrunner.scene_building import SceneModels
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.user_error import UserError
 from tests.studies.scene_models import plain, sector

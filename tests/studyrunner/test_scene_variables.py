@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studies.finite_element.joint.reduction import GluedStructureError, Reduction
+from studies.finite_element.elimination import NotPositiveDefiniteError
+from studies.finite_element.reduction import Reduction
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
 from studyrunner.scene import computed
+from studyrunner.scene.answers import build_scene_variables, exact_answers
 from studyrunner.scene.computed import InMemory
 from studyrunner.scene.scene import build_study_scene
-from studyrunner.scene.scene_variables import exact_answers
-from studyrunner.scene.variables import build_scene_variables
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.fakes import FACTS, fake_histories
 from tests.studyrunner.results import build_dataset, write_dataset
@@ -102,7 +102,7 @@ def test_a_sector_that_spins_too_fast_is_bad_input(tmp_path, monkeypatch, capsys
     monkeypatch.chdir(tmp_path)
 
     def unstable(*_):
-        raise GluedStructureError(unstable=True)
+        raise NotPositiveDefiniteError(unstable=True)
 
     monkeypatch.setattr(Reduction, "frequencies", unstable)
     # on a busy machine the scene may take so long that it would be kept for another run

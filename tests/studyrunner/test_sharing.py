@@ -16,7 +16,7 @@ from solver.packing import pack
 from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.kinds.kind import build_tasks
-from studyrunner.kinds.sharing import ScaledHistory, counts_of, describe_left_out, share_histories
+from studyrunner.kinds.sharing import Integrated, ScaledHistory, describe_left_out, share_histories
 from studyrunner.kinds.wear_result import build_result
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
@@ -36,6 +36,10 @@ def study_with(wears, steps, schemes, *overrides):
     axes = {"wear_coefficient": wears, "step": steps}
     texts = [f"axes.{name}=[{', '.join(values)}]" for name, values in axes.items()]
     return study_of(*texts, f"axes.scheme={schemes}", *overrides)
+
+
+def choices_of(integrated):
+    return [choice for scaled in integrated.histories for choice in scaled.points]
 
 
 def some(values):
@@ -66,21 +70,17 @@ def test_histories_are_shared_where_they_are_the_same(wears, steps, schemes, by_
     overrides = ["slow_time.largest_depth=1e-6"] if by_depth else []
     study = study_with(wears, steps, schemes, *overrides)
     tasks, causes = share_histories(study)
-    task_of = {
-        choice: number
-        for number, found in enumerate(tasks)
-        for choice in itertools.chain.from_iterable(found.histories)
-    }
+    task_of = {choice: number for number, found in enumerate(tasks) for choice in choices_of(found)}
     choices = list(itertools.product(*(range(len(axis)) for axis in (wears, steps, schemes))))
     assert sorted(task_of) == choices
     exact = [[Fraction(text) for text in axis] for axis in (wears, steps)]
     for one, other in itertools.combinations(choices, 2):
         assert (task_of[one] == task_of[other]) == alike(study, *exact, one, other)
-    assert sum(item.n_points for item in describe_left_out(causes)) == len(choices) - len(tasks)
+    assert sum(describe_left_out(causes).values()) == len(choices) - len(tasks)
     for found in tasks:
-        by_history = [{study.axes.wear_coefficient[wear] for wear, _, _ in scaled} for scaled in found.histories]
-        assert all(len(of_one) == 1 for of_one in by_history)
-        descending = [min(of_one) for of_one in by_history]
+        descending = [scaled.wear_coefficient for scaled in found.histories]
+        for scaled in found.histories:
+            assert {study.axes.wear_coefficient[wear] for wear, _, _ in scaled.points} == {scaled.wear_coefficient}
         assert descending == sorted(descending, reverse=True)
         assert found.unworn == (descending[0] == 0.0)
 
@@ -98,7 +98,7 @@ def test_histories_are_shared_where_they_are_the_same(wears, steps, schemes, by_
 )
 def test_what_is_left_out_has_a_reason(overrides, expected):
     study = study_of("axes.frequency=[150, 160]", "axes.scheme=['implicit', 'explicit']", *overrides)
-    found = {item.reason: item.n_points for item in build_tasks(study, 2).left_out}
+    found = build_tasks(study, 2).left_out
     assert len(found) == len(expected)
     for (reason, n_points), (begins, n_a_frequency) in zip(found.items(), expected.items(), strict=True):
         assert reason.startswith(begins)
@@ -111,11 +111,12 @@ def test_counts_at_the_ends_of_steps_belong_to_the_step_that_ends_there(faster, 
     own = ScaledHistory(1e-12 * faster, step, ((0,),))
     other = ScaledHistory(1e-12 * slower, step * faster / slower, ((1,),))
     cycles = tuple(n * other.step for n in sorted(set(whole)))
-    counts = counts_of(cycles, other, own, steps_of_given_length=True)
+    integrated = Integrated("implicit", None, (own, other), unworn=False)
+    counts = integrated.counts(cycles, other)
     for n, count in zip(sorted(set(whole)), counts, strict=True):
         assert n - 1 < count / step <= n * (1.0 - 5e-13)
         assert count / step == pytest.approx(n, rel=2e-12)
-    assert counts_of(cycles, own, own, steps_of_given_length=True) == cycles
+    assert integrated.counts(cycles, own) == cycles
 
 
 @pytest.mark.parametrize(
@@ -135,10 +136,8 @@ def test_rtol_shares_sweeps_where_nothing_uses_it(overrides, n_sweeps):
     assert len(plan.sweeps) == n_sweeps
     points = Counter(point for task in plan.results for point in points_of(task))
     assert len(points) == points.total() == plan.n_points
-    assert sum(item.n_points for item in plan.left_out) == plan.n_points - sum(
-        len(task.integrated) for task in plan.results
-    )
-    assert any(item.reason.startswith("rtol") for item in plan.left_out) == (n_sweeps in (1, 5))
+    assert sum(plan.left_out.values()) == plan.n_points - sum(len(task.integrated) for task in plan.results)
+    assert any(reason.startswith("rtol") for reason in plan.left_out) == (n_sweeps in (1, 5))
 
 
 def test_a_law_whose_rate_is_not_proportional_shares_no_other_wear_coefficient(monkeypatch):
@@ -149,11 +148,9 @@ def test_a_law_whose_rate_is_not_proportional_shares_no_other_wear_coefficient(m
     # adaptive steps do not depend on the step axis, whatever the law is
     assert len(tasks) == 3 * (2 + 2 + 1)
     for found in tasks:
-        choices = list(itertools.chain.from_iterable(found.histories))
-        assert len({wear for wear, _, _ in choices}) == 1
+        assert len({wear for wear, _, _ in choices_of(found)}) == 1
         assert not found.unworn
-    left_out = {item.reason: item.n_points for item in describe_left_out(causes)}
-    assert list(left_out.values()) == [3]
+    assert list(describe_left_out(causes).values()) == [3]
     unworn = study_with(["0", "1e-12"], ["100", "200"], SCHEMES, "slow_time.cycles=0")
     assert all(found.unworn for found in share_histories(unworn)[0])
 

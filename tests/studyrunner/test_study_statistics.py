@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studyrunner.scatter.drawn_values import ScatteredPairs, drawn
+from studyrunner.scatter.draws import ScatteredPairs, drawn
 from studyrunner.scatter.section import ScatterSection
 from studyrunner.statistics.sentence import deciding_input, describe_ranking, describe_volumes
 from studyrunner.statistics.study_statistics import worn_volume_statistics

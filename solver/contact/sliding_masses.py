@@ -1,0 +1,286 @@
+"""Friction of a mass that sits directly on a slider, through one period, and derivatives. Floats and arrays only.
+
+A rigid Coulomb force jumps where the mass turns, so that its harmonics fall as 1/n only and a balance of a few
+harmonics is wrong by some per cent. Above the highest harmonic H, however, the structure acts by its mass alone. So
+the motion of such a pair is marched through the period,
+
+    m v' + c v = p - lambda,                       lambda = projection on the friction disc, against the motion,   (*)
+
+where p is the predicted force of the pair, whose harmonics up to H are the unknowns of the balance. Equation (*) gives
+their motion, `u_n = (p_n - lambda_n) / (i n w (i n w m + c))`: p is the paper's `F_r - Z_r u + eps u` with
+`eps -> (i n w)^2 m + i n w c`. The harmonics of lambda above H act on the mass m in the march, as in the structure, up
+to a relative error of `k / (n w)^2 m`. The drag c, in p and in the march alike, removes the influence of the start.
+
+In a step of length dt the force p (mean over the step) and the friction limit are constant. The instant in the step at
+which the mass turns or comes to rest is resolved, so that the residual is smooth and the error of second order in dt.
+With two tangents there is no such instant, and the step is divided instead.
+
+Results of a step are (friction (2), velocity after the step (2), mean velocity (2), mean speed), and its derivatives
+(5, 5) those of (friction, velocity after, mean speed) by (force (2), velocity before (2), friction limit).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_force, friction_limit, slip_tangent
+from solver.contact.elastic_pairs import MOST_PERIODS, Period, Tangents, assemble, periodic_start, start_columns
+from solver.model import FloatArray, IntArray
+
+PARTS = 8  # parts of a step of a pair with two tangents
+SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
+
+
+class Masses(NamedTuple):
+    """Mass, kg, drag, N s/m, and line (`ContactInterface`) of each pair (n_contact,); time between two samples, s."""
+
+    mass: FloatArray
+    drag: FloatArray
+    line: IntArray
+    step: float
+
+
+@njit(cache=True)
+def step_gains(mass: float, drag: float, step: float) -> tuple[float, float]:
+    """`m/dt + c/2` and `m/dt - c/2`, so that `gain * velocity after = force - friction + loss * velocity before`."""
+    return mass / step + 0.5 * drag, mass / step - 0.5 * drag
+
+
+@njit(cache=True)
+def step_line(
+    force: float, velocity: float, limit: float, gain: float, loss: float, tangent: FloatArray
+) -> tuple[float, float, float, float]:
+    """One step along one line: mean friction force, velocity after the step, mean velocity and mean speed in the step.
+
+    - force, velocity, limit: mean force, N, velocity before the step, m/s, and friction limit, N.
+    - tangent (3, 3): receives the derivatives of (friction, velocity after, mean speed) by (force, velocity, limit).
+    """
+    tangent[:, :] = 0.0
+    if velocity == 0.0 and abs(force) <= limit:
+        tangent[0, 0] = 1.0
+        return force, 0.0, 0.0, 0.0
+    sign = 1.0 if velocity > 0.0 or (velocity == 0.0 and force > 0.0) else -1.0
+    after = (force - sign * limit + loss * velocity) / gain
+    if after * sign > 0.0:
+        tangent[0, 2] = sign
+        _add_velocity(tangent, gain, loss)
+        for k in range(3):
+            tangent[2, k] = 0.5 * sign * (tangent[1, k] + (k == 1))
+        return sign * limit, after, 0.5 * (velocity + after), 0.5 * abs(velocity + after)
+    # the mass comes to rest after the fraction of the step in which the retarding force takes its momentum
+    retarding, speed = limit - sign * force, sign * velocity
+    fraction = sign * loss * velocity / retarding
+    by = (sign * fraction / retarding, sign * loss / retarding, -fraction / retarding)  # of the fraction
+    if sign * force >= -limit:
+        # the mass remains at rest: in the rest of the step friction equals the force
+        tangent[0, 0] = 1.0
+        tangent[0, 1] = loss
+        for k in range(3):
+            tangent[2, k] = 0.5 * (by[k] * speed + (fraction * sign if k == 1 else 0.0))
+        return force + loss * velocity, 0.0, 0.5 * fraction * velocity, 0.5 * fraction * speed
+    friction = (2.0 * fraction - 1.0) * sign * limit
+    for k in range(3):
+        tangent[0, k] = 2.0 * sign * limit * by[k]
+    tangent[0, 2] += (2.0 * fraction - 1.0) * sign
+    _add_velocity(tangent, gain, loss)
+    after = (force - friction + loss * velocity) / gain
+    backward = -sign * after
+    for k in range(3):
+        tangent[2, k] = 0.5 * (by[k] * (speed - backward) - (1.0 - fraction) * sign * tangent[1, k])
+    tangent[2, 1] += 0.5 * fraction * sign
+    mean = 0.5 * (fraction * velocity + (1.0 - fraction) * after)
+    return friction, after, mean, 0.5 * (fraction * speed + (1.0 - fraction) * backward)
+
+
+@njit(cache=True)
+def _add_velocity(tangent: FloatArray, gain: float, loss: float) -> None:
+    """Derivative of the velocity after a step, row 1, from that of the friction, row 0 of `tangent` (3, 3)."""
+    for k in range(3):
+        tangent[1, k] = -tangent[0, k] / gain
+    tangent[1, 0] += 1.0 / gain
+    tangent[1, 1] += loss / gain
+
+
+@njit(cache=True)
+def _add_speed(tangent: FloatArray, first: float, second: float, inner: FloatArray) -> float:
+    """The speed of a velocity; adds half its derivative to that of the mean speed. inner (2, 5): of the velocity."""
+    speed = float(np.hypot(first, second))
+    if speed > 0.0:
+        for k in range(5):
+            tangent[4, k] += 0.5 * (first * inner[0, k] + second * inner[1, k]) / speed / PARTS
+    return speed
+
+
+@njit(cache=True)
+def step_plane(
+    force: FloatArray, velocity: FloatArray, limit: float, gains: tuple[float, float], out: FloatArray, by: FloatArray
+) -> None:
+    """One step in the plane, in `PARTS` implicit parts; arguments as in `step_line`, force and velocity (2,).
+
+    gains: see `step_gains`. out (7,), by (5, 5): receive results and derivatives.
+    """
+    mass, drag = 0.5 * (gains[0] + gains[1]), gains[0] - gains[1]
+    gain, loss = PARTS * mass + 0.5 * drag, PARTS * mass - 0.5 * drag
+    out[:] = 0.0
+    by[:, :] = 0.0
+    first, second = velocity[0], velocity[1]
+    inner = np.zeros((2, 5))  # derivative of the velocity with respect to (force, velocity, limit)
+    inner[0, 2] = inner[1, 3] = 1.0
+    drive, friction = np.empty((2, 5)), np.empty((2, 5))
+    for _ in range(PARTS):
+        drive_1 = force[0] + loss * first
+        drive_2 = force[1] + loss * second
+        drive[:, :] = loss * inner
+        drive[0, 0] += 1.0
+        drive[1, 1] += 1.0
+        before = _add_speed(by, first, second, inner)
+        force_1, force_2, sticks = friction_force(drive_1, drive_2, limit)
+        if sticks:
+            # the whole force is friction: the mass is at rest after the part
+            friction[:, :] = drive
+        else:
+            n_1, n_2, _, across_11, across_12, across_22 = slip_tangent(drive_1, drive_2, limit)
+            for k in range(5):
+                friction[0, k] = across_11 * drive[0, k] + across_12 * drive[1, k]
+                friction[1, k] = across_12 * drive[0, k] + across_22 * drive[1, k]
+            friction[0, 4] += n_1
+            friction[1, 4] += n_2
+        next_1 = (drive_1 - force_1) / gain
+        next_2 = (drive_2 - force_2) / gain
+        inner[:, :] = (drive - friction) / gain
+        by[:2] += friction / PARTS
+        after = _add_speed(by, next_1, next_2, inner)
+        out[0] += force_1 / PARTS
+        out[1] += force_2 / PARTS
+        out[4] += 0.5 * (first + next_1) / PARTS
+        out[5] += 0.5 * (second + next_2) / PARTS
+        out[6] += 0.5 * (before + after) / PARTS
+        first, second = next_1, next_2
+    out[2], out[3] = first, second
+    by[2:4] = inner
+
+
+@njit(cache=True)
+def step_mass(
+    force: FloatArray,
+    velocity: FloatArray,
+    limit: float,
+    gains: tuple[float, float],
+    line: int,
+    out: FloatArray,
+    tangent: FloatArray,
+) -> None:
+    """One step of a pair, as `step_plane`. line: index of the only tangent; -1 for two."""
+    if line < 0:
+        step_plane(force, velocity, limit, gains, out, tangent)
+        return
+    out[:] = 0.0
+    tangent[:, :] = 0.0
+    small = np.empty((3, 3))
+    out[line], out[2 + line], out[4 + line], out[6] = step_line(force[line], velocity[line], limit, *gains, small)
+    places = (line, 2 + line, 4)
+    for i in range(3):
+        for j in range(3):
+            tangent[places[i], places[j]] = small[i, j]
+
+
+@njit(cache=True)
+def march_masses(pairs: IntArray, period: Period, masses: Masses) -> None:
+    """March masses (n,) through the period until their velocity repeats.
+
+    The tangential predicted forces are means over the steps, and so are the contact forces. The state is the
+    displacement since the start of the period, m, the start receives the velocity there, m/s.
+    """
+    out, tangent = np.empty(7), np.empty((5, 5))
+    step, n_samples = masses.step, period.status_t.shape[1]
+    for pair in pairs:
+        gains = step_gains(masses.mass[pair], masses.drag[pair], step)
+        predicted_t, force_t, place_t = period.predicted_t[pair], period.force_t[pair], period.state_t[pair]
+        start, velocity, largest = period.start[pair], np.zeros(2), np.abs(predicted_t[1:]).max()
+        # far more periods than needed: the drag halves the change in each period
+        for _ in range(MOST_PERIODS):
+            start[:] = velocity
+            work = 0.0
+            for n in range(n_samples):
+                normal = max(predicted_t[0, n], 0.0)
+                rests = velocity[0] == 0.0 and velocity[1] == 0.0
+                limit = friction_limit(period.friction[pair], normal)
+                step_mass(predicted_t[1:, n], velocity, limit, gains, masses.line[pair], out, tangent)
+                force_t[0, n], force_t[1, n], force_t[2, n] = normal, out[0], out[1]
+                for i in range(2):
+                    velocity[i] = out[2 + i]
+                    place_t[i, n + 1] = place_t[i, n] + step * out[4 + i]
+                work += normal * out[6] * step
+                if predicted_t[0, n] <= 0.0:
+                    period.status_t[pair, n] = SEPARATED
+                elif rests and out[2] == 0.0 and out[3] == 0.0:
+                    period.status_t[pair, n] = STICK
+                else:
+                    period.status_t[pair, n] = SLIP
+            period.slip_work[pair] = work
+            change = np.hypot(velocity[0] - start[0], velocity[1] - start[1]) * masses.mass[pair]
+            period.change[pair] = change / step
+            if change <= SAME_VELOCITY * largest * step * n_samples:
+                break
+
+
+@njit(cache=True)
+def mass_slopes(
+    force_t: FloatArray, limit_t: FloatArray, start: FloatArray, gains: tuple[float, float], line: int
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives (N, 5, 5) of the steps of a mass through a period, and its mean speeds (N,), m/s.
+
+    force_t (2, N), limit_t (N,): predicted force and friction limit, N. start (2,): velocity, m/s.
+    """
+    slopes, speed_t = np.empty((limit_t.size, 5, 5)), np.empty(limit_t.size)
+    out, velocity = np.empty(7), start.copy()
+    for n in range(limit_t.size):
+        step_mass(force_t[:, n], velocity, limit_t[n], gains, line, out, slopes[n])
+        velocity[:] = out[2:4]
+        speed_t[n] = out[6]
+    return slopes, speed_t
+
+
+@njit(cache=True)
+def mass_tangent(
+    pairs: IntArray,
+    period: Period,
+    masses: Masses,
+    synthesis: FloatArray,
+    step_mean: FloatArray,
+    analysis: FloatArray,
+    out: Tangents,
+) -> None:
+    """Derivatives of the results of `march_masses` of some pairs (n,), with the periodicity, into `out`.
+
+    synthesis (m, N), step_mean (m,), analysis (N, m): as in `FourierBasis`.
+    """
+    point_t = np.ascontiguousarray(synthesis.T)
+    mean_t, analysis_t = point_t * step_mean, np.ascontiguousarray((analysis / step_mean).T)
+    n_samples, m = point_t.shape
+    for pair in pairs:
+        friction, normal_t = period.friction[pair], np.maximum(period.predicted_t[pair, 0], 0.0)
+        gains = step_gains(masses.mass[pair], masses.drag[pair], masses.step)
+        limit_t = friction_limit(friction, normal_t)
+        pulls = period.predicted_t[pair, 1:]
+        slopes, speed_t = mass_slopes(pulls, limit_t, period.start[pair], gains, masses.line[pair])
+        dforce_t, work, leave = np.empty((n_samples, 2, 3 * m + 2)), np.zeros(3 * m + 2), np.empty((5, 3 * m + 2))
+        entry = start_columns(3 * m)
+        for n in range(n_samples):
+            by_limit = friction if normal_t[n] > 0.0 else 0.0
+            for row in range(5):
+                by = slopes[n, row]
+                leave[row] = by[2] * entry[0] + by[3] * entry[1]
+                for k in range(m):
+                    leave[row, m + k] += by[0] * mean_t[n, k]
+                    leave[row, 2 * m + k] += by[1] * mean_t[n, k]
+                    leave[row, k] += by[4] * (by_limit * point_t[n, k])
+            dforce_t[n] = leave[:2]
+            work += normal_t[n] * masses.step * leave[4]
+            if normal_t[n] > 0.0:
+                work[:m] += speed_t[n] * masses.step * point_t[n]
+            entry[:, :] = leave[2:4]
+        assemble(out[0][pair], out[1][pair], dforce_t, work, periodic_start(entry)[0], analysis_t)

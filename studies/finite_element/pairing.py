@@ -1,0 +1,336 @@
+"""Contact pairs of two surfaces: nodes of one surface, and points of the other; the meshes need not match."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from solver.model import BoolArray, FloatArray, IntArray
+from studies.finite_element.closest_points import closest_points
+from studies.finite_element.cut_faces import CyclicAxis
+from studies.finite_element.surfaces import Surface
+from studies.scene_error import SceneError
+
+_TOLERANCE = 0.05  # largest distance of the nodes of a pair over the size of a facet, or the root of an area
+_OVERLAP = 0.5
+"""Largest overlap of two bodies over the depth of their elements. Interference takes thousandths of it, flat facets on
+curved surfaces hundredths; between both faces of one body it is 1 or more."""
+_STRAIGHT = 0.7  # part of the way to the closest point that is along the normal, where the way goes through material
+
+
+@dataclass(frozen=True)
+class ContactSurfaces:
+    """Two surfaces in contact.
+
+    first, second: the nodes of the finer surface move, those of the first one where both are alike. Where one surface
+        alone is covered by the other, its nodes move.
+    tolerance: largest distance of a node that is paired, m; None for a share of the size of a facet.
+    friction_coefficient: of these surfaces; None where all pairs have the same.
+    with_gaps: whether distances in the mesh are gaps of the joint. Otherwise they are errors of flat facets on curved
+        surfaces, and the pairs touch.
+    clearance: gap of all pairs in place of the distances, m, negative for an interference; None for the distances.
+    label: of the pairs; the names of both surfaces if empty.
+    sector: of the second surface, counted from that of the first one: 1 where it belongs to the next sector in the
+        sense of the axis, -1 to the one before, 0 to the same.
+    """
+
+    first: Surface
+    second: Surface
+    tolerance: float | None = None
+    friction_coefficient: float | None = None
+    with_gaps: bool = False
+    clearance: float | None = None
+    label: str = ""
+    sector: int = 0
+
+    @property
+    def name(self) -> str:
+        """Label of the pairs."""
+        return self.label or f"{self.first.name}-{self.second.name}"
+
+    @property
+    def turned_round(self) -> ContactSurfaces:
+        """The same contact with the surfaces in the other order."""
+        return replace(self, first=self.second, second=self.first, sector=-self.sector, label=self.name)
+
+
+@dataclass(frozen=True)
+class ContactPairs:
+    """Contact pairs, `n_contact` of them.
+
+    moving (n_contact,): nodes. The relative displacement is that of the node minus that of the opposite point.
+    opposite (n_contact, n_nodes): interpolation weights of the opposite points; rows sum to 1.
+    sector (n_contact,): of the opposite point, counted from that of the moving node: 0, 1 or -1. The weights are of the
+        nodes of this sector that the point is the image of.
+    frames (n_contact, 3, 3): rows are unit vectors: normal (out of the moving body, so that motion along it closes the
+        pair), first tangent, second tangent.
+    present (n_contact, 3): whether a relative displacement exists; the others are held.
+    area (n_contact,): m2. position (n_contact, 3): of the moving node, m.
+    distance (n_contact,): along the normal, positive where the pair is open, m. gap (n_contact,): initial gap, m.
+    surface (n_contact,): number of the pair of surfaces. moving_name, opposite_name: of each pair of surfaces.
+    """
+
+    moving: IntArray
+    opposite: sparse.csr_matrix
+    sector: IntArray
+    frames: FloatArray
+    present: BoolArray
+    area: FloatArray
+    position: FloatArray
+    distance: FloatArray
+    gap: FloatArray
+    surface: IntArray
+    moving_name: tuple[str, ...]
+    opposite_name: tuple[str, ...]
+
+    @property
+    def n_contact(self) -> int:
+        """Number of pairs."""
+        return len(self.moving)
+
+    def chosen(self, which: IntArray | BoolArray) -> ContactPairs:
+        """Some of the pairs."""
+        return replace(self, **{name: getattr(self, name)[which] for name in ("opposite", *_ARRAYS)})
+
+
+_ARRAYS = ("moving", "sector", "frames", "present", "area", "position", "distance", "gap", "surface")
+
+
+def build_contact_pairs(
+    coordinates: FloatArray,
+    numbers: IntArray,
+    contacts: Sequence[ContactSurfaces],
+    along: FloatArray,
+    axis: CyclicAxis | None = None,
+) -> ContactPairs:
+    """Pairs of all surfaces, those of the first ones first, each by its moving nodes in ascending order.
+
+    coordinates (n_nodes, 3): m. numbers (n_nodes,): of the nodes in the file, for messages. contacts: at least one.
+    along (3,): the first tangents are the projections of this direction where it does not stand on the surface; else
+    of the axis of coordinates that lies flattest on it. axis: of the cyclic structure, for contacts between sectors.
+
+    Raises SceneError where nodes find no point of the other surface, do not face it, or find it behind their own body,
+    and where nodes belong to two pairs.
+    """
+    parts = []
+    for place, contact in enumerate(contacts):
+        match, used = _find_match(coordinates, numbers, contact, axis)
+        frames = local_frames(match.normals, along)
+        parts.append(_pairs_of(coordinates, used, place, match.weights, match.area, frames, match.distance))
+    return _joined(parts, numbers)
+
+
+def match_nodes(
+    coordinates: FloatArray,
+    numbers: IntArray,
+    contacts: Sequence[ContactSurfaces],
+    given: tuple[FloatArray, FloatArray, FloatArray],
+    axis: CyclicAxis | None,
+) -> ContactPairs:
+    """Pairs of nodes that meet, of reduced matrices, which have no facets.
+
+    As `build_contact_pairs`, of the nodes of the first surface of each contact and the nearest ones of the second.
+    given: areas (n_nodes,), m2, normals (n_nodes, 3), unit vectors out of the body, and initial gaps (n_nodes,), m; NaN
+    where there is none; those of the first surface count. The first tangents are as near to the axis as possible, else
+    to z.
+
+    Raises SceneError where a node has no area or normal, or finds no node that it meets.
+    """
+    along = np.array([0.0, 0.0, 1.0]) if axis is None else axis.axis
+    area, normals, gap = given
+    parts = []
+    for place, contact in enumerate(contacts):
+        nodes, others = contact.first.nodes, contact.second.nodes
+        unknown = nodes[~((area[nodes] > 0.0) & np.isfinite(normals[nodes]).all(axis=1))]
+        if len(unknown):
+            found = f"{len(unknown)} nodes of {contact.first.name} have no area or normal, as node"
+            raise SceneError("contact", f"{found} {numbers[unknown[0]]}", "give both in the table of nodes")
+        there = coordinates if axis is None or not contact.sector else axis.turned(coordinates, contact.sector)
+        apart, nearest = cKDTree(there[others]).query(coordinates[nodes])
+        tolerance = contact.tolerance or _TOLERANCE * float(np.sqrt(area[nodes].min()))
+        far = np.flatnonzero(apart > tolerance)
+        if len(far):
+            turned = " after a turn by one sector" if contact.sector else ""
+            found = (
+                f"{len(far)} of {len(nodes)} nodes of {contact.first.name} are farther than {tolerance:.3g} m from"
+                f" those of {contact.second.name}{turned}, as node {numbers[nodes[far[0]]]}"
+            )
+            raise SceneError("contact", found, "give nodes that meet, node by node, or a larger tolerance")
+        n, opposite = len(nodes), others[nearest]
+        weights = sparse.csr_matrix((np.ones(n), (np.arange(n), opposite)), shape=(n, len(coordinates)))
+        distance = np.einsum("ij,ij->i", there[opposite] - coordinates[nodes], normals[nodes])
+        frames = local_frames(normals[nodes], along)
+        pairs = _pairs_of(coordinates, contact, place, weights, area[nodes], frames, distance)
+        parts.append(replace(pairs, gap=np.where(np.isnan(gap[nodes]), pairs.gap, gap[nodes])))
+    return _joined(parts, numbers)
+
+
+def _pairs_of(
+    coordinates: FloatArray,
+    contact: ContactSurfaces,
+    place: int,
+    weights: sparse.csr_matrix,
+    area: FloatArray,
+    frames: FloatArray,
+    distance: FloatArray,
+) -> ContactPairs:
+    """Pairs of the nodes of the first surface; place: of the contact among all."""
+    n = len(area)
+    gap = distance if contact.with_gaps else np.zeros(n)
+    return ContactPairs(
+        moving=contact.first.nodes,
+        opposite=weights,
+        sector=np.full(n, contact.sector),
+        frames=frames,
+        present=np.ones((n, 3), dtype=np.bool_),
+        area=area,
+        position=coordinates[contact.first.nodes],
+        distance=distance,
+        gap=gap if contact.clearance is None else np.full(n, contact.clearance),
+        surface=np.full(n, place),
+        moving_name=(contact.first.name,),
+        opposite_name=(contact.second.name,),
+    )
+
+
+def _joined(parts: Sequence[ContactPairs], numbers: IntArray) -> ContactPairs:
+    """Pairs of several surfaces, one after the other. Raises SceneError where a node moves in two of them."""
+    joined = ContactPairs(
+        opposite=sparse.vstack([part.opposite for part in parts], format="csr"),
+        moving_name=tuple(name for part in parts for name in part.moving_name),
+        opposite_name=tuple(name for part in parts for name in part.opposite_name),
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS},
+    )
+    unique, count = np.unique(joined.moving, return_counts=True)
+    twice = unique[count > 1]
+    if len(twice):
+        names = " and ".join(joined.moving_name[place] for place in joined.surface[joined.moving == twice[0]])
+        found = f"{len(twice)} nodes move in two pairs, in {names}, as node {numbers[twice[0]]}"
+        raise SceneError("contact", found, "take them out of one of the surfaces")
+    return joined
+
+
+def local_frames(normals: FloatArray, along: FloatArray) -> FloatArray:
+    """Frames (n, 3, 3) of unit normals (n, 3): rows normal, first tangent near `along`, second tangent."""
+    candidates = [along / np.linalg.norm(along), *np.eye(3)]
+    steepest = [np.abs(normals @ each).max(initial=0.0) for each in candidates]
+    # one direction for the whole surface, so that neighbouring frames are alike
+    direction = candidates[0] if steepest[0] < 0.9 else candidates[1 + int(np.argmin(steepest[1:]))]
+    first = direction - (normals @ direction)[:, None] * normals
+    flat = np.linalg.norm(first, axis=1) < 0.1
+    for place in np.flatnonzero(flat):  # on a closed surface no direction lies on it everywhere
+        axis = np.eye(3)[np.argmin(np.abs(normals[place]))]
+        first[place] = axis - (normals[place] @ axis) * normals[place]
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([normals, first, np.cross(normals, first)], axis=1)
+
+
+@dataclass(frozen=True)
+class _Match:
+    """Nodes of one surface, and the closest points of the other.
+
+    weights (n, n_nodes): of the points. area, normals (n,), (n, 3): of the nodes. apart (n,): to the facets, m.
+    distance (n,): along the normals, m. facing (n,): cosine between the normals of node and point. depth (n,): of the
+    elements below node or point, the smaller one, m.
+    """
+
+    weights: sparse.csr_matrix
+    area: FloatArray
+    normals: FloatArray
+    apart: FloatArray
+    distance: FloatArray
+    facing: FloatArray
+    depth: FloatArray
+
+
+def _match(coordinates: FloatArray, contact: ContactSurfaces, axis: CyclicAxis | None) -> _Match:
+    """The first surface, which moves, and the second one where its sector has it."""
+    moving, opposite, there = contact.first, contact.second, coordinates
+    if contact.sector:
+        if axis is None:
+            raise ValueError("a contact between sectors needs the axis of the cyclic structure")
+        there = axis.turned(coordinates, contact.sector)
+    found = closest_points(coordinates[moving.nodes], opposite, there)
+    area, normals = moving.areas_and_normals(coordinates)
+    point, corner = np.nonzero(found.weights)
+    entries = (found.weights[point, corner], (point, found.nodes[point, corner]))
+    weights = sparse.csr_matrix(entries, shape=(len(moving.nodes), len(coordinates)))
+    facing, depth = np.zeros_like(coordinates), np.zeros(len(coordinates))
+    facing[opposite.nodes] = opposite.areas_and_normals(there)[1]
+    depth[opposite.nodes] = opposite.depth
+    offset = weights @ there - coordinates[moving.nodes]
+    return _Match(
+        weights=weights,
+        area=area,
+        normals=normals,
+        apart=found.distance,
+        distance=np.einsum("ij,ij->i", offset, normals),
+        facing=np.einsum("ij,ij->i", weights @ facing, normals),
+        depth=np.minimum(moving.depth, weights @ depth),
+    )
+
+
+def _check_match(match: _Match, contact: ContactSurfaces, numbers: IntArray, facet: float) -> None:
+    """Raises SceneError where no tolerance makes pairs of these nodes. facet: size of the larger facets, m."""
+    turned = " after a turn by one sector" if contact.sector else ""
+    moving, opposite, n = contact.first.name, contact.second.name, len(match.apart)
+    if (match.facing > 0.0).all():
+        raise SceneError("contact", f"{moving} and {opposite} face the same way", "give faces that touch")
+    inside = (match.distance < -_OVERLAP * match.depth) & (match.distance < -_STRAIGHT * match.apart)
+    if inside.any():
+        deepest = np.argmin(match.distance)
+        found = (
+            f"between {moving} and {opposite} there is material: at {inside.sum()} of {n} nodes {opposite} is up to"
+            f" {-match.distance[deepest]:.3g} m below {moving}, whose elements are {match.depth[deepest]:.3g} m deep"
+        )
+        remedy = "give two surfaces that face each other in the same sector, or name them in next_sector"
+        raise SceneError("contact", found, remedy)
+    away = match.apart > facet
+    if away.any():
+        found = (
+            f"{away.sum()} of {n} nodes of {moving} are farther from {opposite} than a facet ({facet:.3g} m);"
+            f" the farthest is at {match.apart.max():.3g} m{turned}"
+        )
+        remedy = f"give surfaces that touch{turned}, one of which covers the other: a larger tolerance is no remedy"
+        raise SceneError("contact", found, remedy)
+    aside = np.flatnonzero(match.facing > 0.0)
+    if len(aside):
+        found = f"{len(aside)} of {n} nodes of {moving} do not face {opposite}, as node"
+        remedy = "leave them out of the surface"
+        raise SceneError("contact", f"{found} {numbers[contact.first.nodes[aside[0]]]}", remedy)
+
+
+def _find_match(
+    coordinates: FloatArray, numbers: IntArray, contact: ContactSurfaces, axis: CyclicAxis | None
+) -> tuple[_Match, ContactSurfaces]:
+    """Pairs of a contact, and the contact with the surface whose nodes move first."""
+    first, second = contact.first, contact.second
+    shared = np.intersect1d(first.nodes, second.nodes)
+    if len(shared):
+        found = f"{first.name} and {second.name} share {len(shared)} nodes"
+        raise SceneError("contact", found, "give the two bodies nodes of their own where they touch")
+    sizes = first.facet_size(coordinates), second.facet_size(coordinates)
+    if sizes[1] < (1.0 - 1e-6) * sizes[0]:
+        contact = contact.turned_round
+    tolerance = _TOLERANCE * max(sizes) if contact.tolerance is None else contact.tolerance
+    match = _match(coordinates, contact, axis)
+    far = match.apart > tolerance
+    if far.any():
+        # a coarse surface may lie inside a finer one that goes on
+        other = _match(coordinates, contact.turned_round, axis)
+        if (other.apart > tolerance).any():
+            _check_match(match, contact, numbers, max(sizes))
+            count = f"{np.count_nonzero(far)} of {len(far)} nodes of {contact.first.name}"
+            found = f"{count} are farther than {tolerance:g} m from {contact.second.name}"
+            remedy = (
+                f"give a larger tolerance (the farthest is at {match.apart.max():.3g} m), or surfaces of which one"
+                " covers the other"
+            )
+            raise SceneError("contact", found, remedy)
+        match, contact = other, contact.turned_round
+    _check_match(match, contact, numbers, max(sizes))
+    return match, contact

@@ -1,0 +1,255 @@
+"""Surfaces of a mesh in linear facets, with areas and normals of their nodes.
+
+Faces of quadratic elements are split at their mid-side nodes: the consistent areas of a quadratic face are negative or
+zero at its corners, those of its facets are positive at all nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from solver.model import FloatArray, IntArray
+from studies.finite_element.elements import CORNERS, ELEMENT_KINDS, HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
+from studies.finite_element.solid_mesh import SolidMesh
+from studies.scene_answers import SurfaceMesh
+from studies.scene_error import SceneError
+
+
+@dataclass(frozen=True)
+class FaceShape:
+    """Shape functions of an element face: those of an element whose face it is.
+
+    element, nodes: the element and its nodes on the face, corners first. height: reference coordinate zeta of the face.
+    facets: its linear facets, by the face's nodes.
+    """
+
+    element: ReferenceElement
+    nodes: tuple[int, ...]
+    height: float
+    facets: tuple[tuple[int, ...], ...]
+
+    @property
+    def places(self) -> FloatArray:
+        """Reference coordinates (n_nodes, 2) of its nodes."""
+        return self.element.nodes[list(self.nodes), :2]
+
+    def values(self, places: FloatArray) -> FloatArray:
+        """Shape functions (n, n_nodes) at places (n, 2) of the face."""
+        return self.element.values(np.column_stack([places, np.full(len(places), self.height)]))[:, list(self.nodes)]
+
+    def derivatives(self, places: FloatArray) -> FloatArray:
+        """Their derivatives (n, n_nodes, 2)."""
+        points = np.column_stack([places, np.full(len(places), self.height)])
+        return self.element.derivatives(points)[:, list(self.nodes), :2]
+
+
+_QUADRATIC = ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7))
+FACE_SHAPES = {
+    3: FaceShape(TET_4, (0, 1, 2), 0.0, ((0, 1, 2),)),
+    4: FaceShape(HEX_8, (0, 1, 2, 3), -1.0, ((0, 1, 2, 3),)),
+    6: FaceShape(TET_10, (0, 1, 2, 4, 5, 6), 0.0, ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5))),
+    8: FaceShape(HEX_20, (0, 1, 2, 3, 8, 9, 10, 11), -1.0, _QUADRATIC),
+}
+"""Element faces by their number of nodes."""
+
+_QUAD_POINTS = CORNERS[:4, :2] / np.sqrt(3.0)
+_GAUSS = np.polynomial.legendre.leggauss(3)
+_QUAD_RULE = np.stack(np.meshgrid(_GAUSS[0], _GAUSS[0]), axis=-1).reshape(-1, 2), np.outer(_GAUSS[1], _GAUSS[1]).ravel()
+# of the square, its side eta = 1 drawn together to a corner: exact to the fourth degree
+_XI, _ETA = _QUAD_RULE[0].T
+_TRIANGLE_RULE = (
+    np.stack([(1.0 + _XI) * (1.0 - _ETA) / 4.0, (1.0 + _ETA) / 2.0], axis=1),
+    _QUAD_RULE[1] * (1.0 - _ETA) / 8.0,
+)
+_THIRDS = np.full(3, 1.0 / 3.0)
+
+
+def quad_values(points: FloatArray) -> FloatArray:
+    """Bilinear shape functions (..., 4) at points (..., 2) of the square from -1 to 1, corners anticlockwise."""
+    return np.asarray(np.prod(1.0 + points[..., None, :] * CORNERS[:4, :2], axis=-1) / 4.0)
+
+
+def quad_derivatives(points: FloatArray) -> FloatArray:
+    """Their derivatives (..., 4, 2)."""
+    factors = 1.0 + points[..., None, :] * CORNERS[:4, :2]
+    return np.asarray(CORNERS[:4, :2] * factors[..., ::-1] / 4.0)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface of one body.
+
+    triangles (n_triangles, 3), quads (n_quads, 4): facets, rows of `SolidMesh.coordinates`, anticlockwise as seen from
+    outside the body. faces (n_triangles + n_quads, 8): nodes of the element face that each facet is of, -1 after the
+    last. places (n_triangles + n_quads, 4, 2): reference coordinates on that face of the corners of the facet, of a
+    triangle the last one twice. depth (n_nodes,): how deep the elements are below each of `nodes`, the least one, m.
+    """
+
+    name: str
+    triangles: IntArray
+    quads: IntArray
+    faces: IntArray
+    places: FloatArray
+    depth: FloatArray
+
+    @cached_property
+    def nodes(self) -> IntArray:
+        """Its nodes, ascending."""
+        return np.unique(np.concatenate([self.triangles.ravel(), self.quads.ravel()]))
+
+    def areas_and_normals(self, coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Area (n_nodes,), m2, and unit outward normal (n_nodes, 3) of each of `nodes`.
+
+        The area of a node is the integral of its shape function on the facets; the normal is the mean of those of the
+        facets, weighted alike.
+        """
+        area, normal = np.zeros(len(coordinates)), np.zeros((len(coordinates), 3))
+        corners = coordinates[self.triangles]
+        vectors = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        np.add.at(normal, self.triangles, vectors[:, None, :] * _THIRDS[:, None])
+        np.add.at(area, self.triangles, np.linalg.norm(vectors, axis=1)[:, None] * _THIRDS)
+        tangents = np.einsum("pna,fnj->fapj", quad_derivatives(_QUAD_POINTS), coordinates[self.quads])
+        vectors = np.cross(tangents[:, 0], tangents[:, 1])
+        values = quad_values(_QUAD_POINTS)
+        np.add.at(normal, self.quads, np.einsum("pn,fpj->fnj", values, vectors))
+        np.add.at(area, self.quads, np.linalg.norm(vectors, axis=2) @ values)
+        sizes = np.linalg.norm(normal[self.nodes], axis=1)
+        if not (sizes > 1e-6 * area[self.nodes]).all():
+            found = f"surface {self.name} folds back on itself"
+            raise SceneError("contact", found, "give a smooth surface of one body")
+        return area[self.nodes], normal[self.nodes] / sizes[:, None]
+
+    def facet_size(self, coordinates: FloatArray) -> float:
+        """Typical size of a facet, m: root of the mean area."""
+        area, _ = self.areas_and_normals(coordinates)
+        return float(np.sqrt(area.sum() / (len(self.triangles) + len(self.quads))))
+
+
+def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray) -> Surface:
+    """Surface of faces of elements, as `loops_of_faces` has them."""
+    return _surface(mesh, name, *loops_of_faces(mesh, name, elements, faces))
+
+
+def loops_of_faces(
+    mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray
+) -> tuple[list[IntArray], list[IntArray]]:
+    """Nodes of faces, corners anticlockwise from outside, then mid-side nodes; and all nodes of their elements.
+
+    name: for messages. elements (n_faces,): element numbers. faces (n_faces,): 1 to 6, the faces S1 to S6 of CalculiX
+    and Abaqus.
+
+    Raises SceneError where there is no such element or face.
+    """
+    loops: list[IntArray] = []
+    behind: list[IntArray] = []
+    left = np.ones(len(elements), dtype=np.bool_)
+    for group in mesh.groups:
+        table = ELEMENT_KINDS[group.kind].faces
+        order = np.argsort(group.numbers)
+        place = np.minimum(np.searchsorted(group.numbers, elements, sorter=order), len(order) - 1)
+        own = group.numbers[order[place]] == elements
+        left &= ~own
+        for chosen in np.flatnonzero(own):
+            if not 1 <= faces[chosen] <= len(table):
+                found = f"surface {name} names face S{faces[chosen]} of element {elements[chosen]} ({group.kind})"
+                raise SceneError("contact", found, f"give faces S1 to S{len(table)}")
+            behind.append(group.nodes[order[place[chosen]]])
+            loops.append(behind[-1][list(table[faces[chosen] - 1])])
+    if left.any():
+        raise SceneError("contact", f"surface {name} names element {elements[left][0]}", "there is no such element")
+    return loops, behind
+
+
+def pressure_forces(coordinates: FloatArray, loops: list[IntArray], pressure: float) -> FloatArray:
+    """Consistent nodal forces (3 n_nodes,), N, of a pressure, Pa, into the body; faces as `loops_of_faces` has them."""
+    forces = np.zeros(coordinates.shape)
+    for size, shape in FACE_SHAPES.items():
+        own = np.array([loop for loop in loops if len(loop) == size], dtype=np.int64).reshape(-1, size)
+        points, weights = _TRIANGLE_RULE if size in (3, 6) else _QUAD_RULE
+        tangents = np.einsum("pna,fnj->fapj", shape.derivatives(points), coordinates[own])
+        outward = np.cross(tangents[:, 0], tangents[:, 1])
+        np.add.at(forces, own, -pressure * np.einsum("p,pn,fpj->fnj", weights, shape.values(points), outward))
+    return forces.ravel()
+
+
+def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
+    """Surface of the outer faces all of whose nodes are among some nodes (n,), rows of the coordinates.
+
+    Raises SceneError where nodes belong to no such face.
+    """
+    inside = np.zeros(mesh.n_nodes, dtype=np.bool_)
+    inside[nodes] = True
+    chosen = [(loop, element) for loop, element, _ in outer_faces(mesh) if inside[loop].all()]
+    surface = _surface(mesh, name, [loop for loop, _ in chosen], [element for _, element in chosen])
+    lonely = np.setdiff1d(nodes, surface.nodes)
+    if len(lonely):
+        found = (
+            f"{len(lonely)} of {len(nodes)} nodes of {name} belong to no face whose nodes are all in the set, as node"
+        )
+        remedy = "give a surface of element faces, or a set of the nodes of whole faces"
+        raise SceneError("contact", f"{found} {mesh.numbers[lonely[0]]}", remedy)
+    return surface
+
+
+def surface_of_points(name: str, nodes: IntArray) -> Surface:
+    """Surface of nodes (n,) of a model without elements: triangles of no extent."""
+    n = len(nodes)
+    none = np.empty((0, 4), dtype=np.int64)
+    return Surface(name, np.tile(nodes[:, None], 3), none, np.full((n, 8), -1), np.zeros((n, 4, 2)), np.zeros(n))
+
+
+def outer_faces(mesh: SolidMesh) -> list[tuple[IntArray, IntArray, str]]:
+    """Faces of one element only: nodes, corners anticlockwise from outside; all nodes of the element; its part."""
+    faces: list[tuple[IntArray, IntArray, str]] = []
+    keys: list[IntArray] = []
+    for group in mesh.groups:
+        for face in ELEMENT_KINDS[group.kind].faces:
+            nodes = group.nodes[:, list(face)]
+            n_corners = 3 if len(face) in (3, 6) else 4
+            key = np.full((len(nodes), 4), -1)
+            key[:, :n_corners] = nodes[:, :n_corners]
+            faces += [(loop, element, group.part) for loop, element in zip(nodes, group.nodes, strict=True)]
+            keys.append(np.sort(key, axis=1))
+    _, first, count = np.unique(np.concatenate(keys), axis=0, return_index=True, return_counts=True)
+    return [faces[place] for place in np.sort(first[count == 1])]
+
+
+def describe_mesh(mesh: SolidMesh) -> SurfaceMesh:
+    """Outer faces of a mesh by their corners, for pictures; triangles repeat their last corner."""
+    outer = outer_faces(mesh)
+    corners = np.array([loop[[0, 1, 2, 2] if len(loop) in (3, 6) else [0, 1, 2, 3]] for loop, _, _ in outer])
+    used, quads = np.unique(corners, return_inverse=True)
+    parts = tuple(part for _, _, part in outer)
+    return SurfaceMesh(nodes=mesh.coordinates[used], quads=quads.reshape(corners.shape), parts=parts)
+
+
+def _surface(mesh: SolidMesh, name: str, loops: list[IntArray], behind: list[IntArray]) -> Surface:
+    """behind: nodes of the element of each face."""
+    if not loops:
+        raise SceneError("contact", f"surface {name} has no face", "give at least one face of an element")
+    facets: dict[int, list[IntArray]] = {3: [], 4: []}
+    faces: dict[int, list[IntArray]] = {3: [], 4: []}
+    places: dict[int, list[FloatArray]] = {3: [], 4: []}
+    depth = np.full(mesh.n_nodes, np.inf)
+    for loop, element in zip(loops, behind, strict=True):
+        first, second, third = mesh.coordinates[loop[:3]]
+        normal = np.cross(second - first, third - first)
+        below = (first - mesh.coordinates[element]) @ (normal / np.linalg.norm(normal))
+        depth[loop] = np.minimum(depth[loop], below.max())
+        shape = FACE_SHAPES[len(loop)]
+        padded = np.append(loop, np.full(8 - len(loop), -1))
+        for facet in shape.facets:
+            facets[len(facet)].append(loop[list(facet)])
+            faces[len(facet)].append(padded)
+            places[len(facet)].append(shape.places[[*facet, facet[-1]][:4]])
+    return Surface(
+        name,
+        np.array(facets[3], dtype=np.int64).reshape(-1, 3),
+        np.array(facets[4], dtype=np.int64).reshape(-1, 4),
+        np.array(faces[3] + faces[4]),
+        np.array(places[3] + places[4]),
+        depth[np.isfinite(depth)],
+    )

@@ -1,0 +1,206 @@
+"""What a study asks of its scenes beside their models: mesh, natural frequencies, exact answers, a check by eye."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel
+
+from studies.scene_answers import ExactAnswer, WearQuestion, stuck_frequencies
+from studies.scene_error import SceneError
+from studies.scenes import changed_keys, scene_answer
+from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner.scene.computed import Computed, frequencies_once, harmonics_to_build
+from studyrunner.scene.scene import build_mesh, has_frequencies
+from studyrunner.scene.scene_set import SceneSet, axes_of_difference
+from studyrunner.study.mistakes import scene_errors
+from studyrunner.study.realisation import realise
+from studyrunner.study.sections import SOLVER_AXES
+from studyrunner.study.study import Study
+from studyrunner.user_error import UserError, show_text
+from studyrunner.variables import Variable
+
+if TYPE_CHECKING:
+    from solver.model import ReducedModel
+
+
+@dataclass(frozen=True)
+class SceneVariable:
+    """A variable or coordinate of the result file that no task computes.
+
+    values: with the dimensions of the entry; for an exact answer the axes of the study come before them, of length 1
+    where it does not depend on an axis. axes: whether they do. coordinate: whether it is one.
+    """
+
+    name: str
+    entry: Variable
+    values: NDArray[np.generic]
+    axes: bool = False
+    coordinate: bool = False
+
+
+def build_scene_variables(study: Study, model: ReducedModel, computed: Computed) -> tuple[SceneVariable, ...]:
+    """What the study asks of its scene, but exact answers. Natural frequencies of a bundled sector take some seconds.
+
+    computed: holds those of an earlier run. Raises UserError where the scene cannot give them.
+    """
+    found: list[SceneVariable] = []
+    with scene_errors(study.source, None):
+        if "mesh" in study.scene_variables:
+            found += _mesh(study)
+        if "natural_frequency" in study.scene_variables:
+            found += _frequencies(computed, study, model)
+    return tuple(found)
+
+
+def _mesh(study: Study) -> Iterator[SceneVariable]:
+    mesh = build_mesh(study)
+    if mesh is None:
+        raise SceneError("variables", "mesh", "leave it out: the scene has none")
+    values: dict[str, NDArray[np.generic]] = {
+        **{f"mesh_{axis}": mesh.nodes[:, column] for column, axis in enumerate("xyz")},
+        "mesh_quad": mesh.quads.astype(np.int32),
+        "mesh_part": np.array(mesh.parts),
+    }
+    for name, entry in SCENE["mesh"].items():
+        yield SceneVariable(name, entry, values[name])
+
+
+def _frequencies(computed: Computed, study: Study, model: ReducedModel) -> Iterator[SceneVariable]:
+    found = frequencies_once(study, computed) if has_frequencies(study) else stuck_frequencies(model)
+    (entry,) = SCENE["natural_frequency"].values()
+    labels = {"nodal_diameter": found.nodal_diameters, "mode": range(1, found.frequencies.shape[1] + 1)}
+    yield SceneVariable("natural_frequency", entry, found.frequencies)
+    for name, values in labels.items():
+        yield SceneVariable(name, COORDINATES[name], np.array(values, dtype=np.int32), coordinate=True)
+
+
+def join_scene_variables(
+    study: Study, scenes: SceneSet, of_scenes: Sequence[Sequence[SceneVariable]]
+) -> tuple[tuple[SceneVariable, ...], tuple[str, ...]]:
+    """Variables of all scenes, and notes on those that are left out.
+
+    A variable that differs between the scenes gets the axes along which it differs as first dimensions. Variables of
+    different sizes, e.g. meshes of different density, are left out.
+    """
+    joined, left_out = [], []
+    for variables in zip(*of_scenes, strict=True):
+        first = variables[0]
+        if len({each.values.shape for each in variables}) > 1:
+            left_out.append(first.name)
+            continue
+        names, numbers = axes_of_difference(study, scenes, [each.values.tobytes() for each in variables])
+        if names:
+            values = np.stack([each.values for each in variables])[numbers]
+            entry = replace(first.entry, dimensions=(*names, *(first.entry.dimensions or (first.name,))))
+            first = replace(first, entry=entry, values=values, coordinate=False)
+        joined.append(first)
+    notes = [f"{', '.join(left_out)}: left out of the result, as the scenes differ in their sizes"] if left_out else []
+    return tuple(joined), tuple(notes)
+
+
+def exact_answers(study: Study) -> tuple[SceneVariable, ...]:
+    """Exact answers at all points, where the study asks for them; steps, schemes and settings change nothing.
+
+    Their axes are those of the study, of length 1 where nothing depends on an axis.
+    """
+    if "exact" not in study.outputs.variables:
+        return ()
+    parts = [_answers(part.study) for part in realise(study)]
+    shape = [len(values) for values in study.axes_of_parts.values()]
+    own = len(study.own_axes)
+    variables = []
+    for name, entry in SCENE["exact"].items():
+        values = np.stack([part[name] for part in parts], axis=own)
+        values = values.reshape(*values.shape[:own], *shape, *values.shape[own + 1 :])
+        variables.append(SceneVariable(name, entry, values, axes=True))
+    return tuple(variables)
+
+
+_HOW_TO_COMPUTE = {
+    "study": ("name", "title"),
+    "scene": ("model", "parameters"),
+    "axes": ("step", "scheme", "sweep", *SOLVER_AXES),
+    "slow_time": ("cycles", "final_share", "outputs", "until", "largest_depth"),
+    "solver": (*SOLVER_AXES, "shortcuts", "time_limit"),
+    "outputs": ("variables", "loops", "scene"),
+}
+_WITHOUT_INFLUENCE = frozenset(f"{table}.{key}" for table, keys in _HOW_TO_COMPUTE.items() for key in keys)
+"""Keys of a study that say how a point is computed and shown, and not which point. A key that is not among them may
+change the truth: only a closed form that knows the key still holds where it differs from its default."""
+
+
+def _changed(study: Study) -> frozenset[str]:
+    """Keys of a part of a study that differ from their defaults and may change the exact answer.
+
+    Without the parameters of the scene, which `scene_answer` looks at.
+    """
+    found: set[str] = set()
+    for name, field in type(study).model_fields.items():
+        table = getattr(study, name)
+        if not field.exclude and table:
+            found |= changed_keys(table, name) if isinstance(table, BaseModel) else {name}
+    return frozenset(found - _WITHOUT_INFLUENCE)
+
+
+def _answers(study: Study) -> dict[str, np.ndarray]:
+    axes, changed = study.axes, _changed(study)
+    (depth,) = (0.0,) if study.scene.worn is None else study.scene.worn.depths(1)
+    counts, given = np.array(study.cycles_kept), np.array(axes.wear_coefficient)
+
+    def answer(frequency: float, amplitude: float) -> ExactAnswer:
+        asked = WearQuestion(frequency, amplitude, given, counts, study.wear_law, depth, changed)
+        return scene_answer(study.scene.model, study.scene.parameters, asked)
+
+    answers = [[answer(one, other) for other in axes.excitation_amplitude] for one in axes.frequency]
+    others = (1,) * (len(study.own_axes) - 3)
+    found = {}
+    for name in SCENE["exact"]:
+        values = np.array([[getattr(each, name.removeprefix("exact_")) for each in row] for row in answers])
+        # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
+        values = np.swapaxes(values, 1, 2)
+        found[name] = values.reshape(*values.shape[:3], *others, *values.shape[3:])
+    return found
+
+
+def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:
+    """Label and text of each line on what was skipped in files, or read in one of two ways."""
+    if study.scene.files is None:
+        return ()
+    from studies.fe_models.mesh_files import read_mesh_file
+
+    return read_mesh_file(study.scene.files.mesh).remarks
+
+
+def check_study_model(study: Study, picture: Path, progress: Callable[[str], None]) -> str:
+    """Lines on the finite-element model of a study, for `--check`; the picture shows the contact pairs.
+
+    Raises UserError where the study has no such model, the model is wrong, or the picture cannot be written.
+    """
+    files = study.scene.files
+    if files is None:
+        remedy = f"give a study of a finite-element model: {study.scene.model} is none; --plan tells what is computed"
+        raise UserError("command line", "--check", study.source, remedy)
+    # what reads and reduces it is loaded where there is one
+    from studies.fe_models.from_files.check import describe_model
+    from studies.fe_models.from_files.model import load_model
+    from studies.fe_models.from_files.picture import draw_pairs
+    from studies.fe_models.from_files.scene import checked, describe_origin, reduce_model
+
+    parameters = checked(study.scene.parameters)
+    with scene_errors(study.source, None), np.errstate(all="ignore"):
+        loaded = load_model(files, parameters, progress)
+        scene = reduce_model(loaded, parameters, harmonics_to_build(study), progress)
+        rows = describe_model(loaded, scene, parameters, progress)
+        rows.insert(0, ("files", describe_origin(files, parameters)["model_files"]))
+    try:
+        draw_pairs(loaded, scene, picture)
+    except OSError as error:
+        remedy = f"give a folder that can be written to: {error.strerror or error}"
+        raise UserError("command line", "--check", str(picture), remedy) from None
+    return "\n".join(f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows)
