@@ -141,24 +141,6 @@ def test_nothing_wore_says_why():
     assert told.certainty.of == "response"
 
 
-def test_results_of_older_versions_have_an_answer():
-    """They hold fewer variables; a volume without an error says so."""
-    later = (
-        "last_cycle",
-        "error_estimate",
-        "worn_volume_error",
-        "largest_wear_depth",
-        "wear_depth_error",
-    )
-    old = wearing(*GRID, volume=lambda p: 1e-9 * p[0]).drop_vars([*later, "contact_edge"], errors="ignore")
-    found = summary(old)
-    assert found.wear.volume.value == 2e-9
-    assert math.isnan(found.wear.volume.error)
-    assert found.certainty.of == "response"
-    assert "error not known" in str(found)
-    assert summary(old.drop_vars(["response_error", "response_amplitude", "wear_depth"])).certainty is None
-
-
 # --- the resonance and the life ---
 
 
