@@ -68,11 +68,10 @@ class _WrongError(Exception):
 def open_result(path: str | Path) -> xr.Dataset:
     """Open a result file after a check that it is a result of `run-study`: sizes, dimensions and types.
 
-    The dataset is that of `xarray.open_dataset(path)`, read when it is needed, and has the accessor `fretwear`. Two
-    things are added for the reader: the coordinate `ended`, which is `outcome` in words; and loops have the dimension
-    `loop_contact`, the pairs that have loops, in place of `contact`, along which most are NaN. The file stays open
-    until the dataset is closed: use it in a `with` statement, or call its `load` and `close`. A file that is replaced
-    meanwhile, by another run, stays as it was for this dataset.
+    The dataset is that of `xarray.open_dataset(path)`, read when it is needed. Two things are added: the coordinate
+    `ended`, which is `outcome` in words; and loops have the dimension `loop_contact`, the pairs that have loops, in
+    place of `contact`. The file stays open until the dataset is closed: use it in a `with` statement, or call its
+    `load` and `close`. A file that is replaced meanwhile, by another run, stays as it was for this dataset.
 
     Raises
     ------
@@ -115,10 +114,7 @@ def _open(path: str | Path) -> tuple[xr.Dataset, xr.Dataset]:
 
 @contextmanager
 def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
-    """Turns errors of the libraries about a damaged file into UserError. source: name of the file for the user.
-
-    every: whether all errors are turned; for blocks that only read.
-    """
+    """Turns errors of the libraries about a damaged file into UserError; every: all errors, of a block that reads."""
     try:
         yield
     except UserError:
@@ -140,10 +136,7 @@ def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
 
 
 def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
-    """The effective study of a file, by table; empty where it is no TOML.
-
-    Raises UserError where the study is no text in UTF-8, too long, or nested too deeply.
-    """
+    """The effective study of a file, by table; empty where it is no TOML. Raises UserError: it is nested too deeply."""
     try:
         tables = read_toml(str(attributes.get("study", "")).encode("utf-8", "replace"), source)
     except NoTomlError:
@@ -156,8 +149,7 @@ def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str
 def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
     """Variables of a file that the report knows, their texts cleaned. Only coordinates, texts and the mesh are read.
 
-    source: name of the file for the user. Raises UserError where a needed variable is missing, or has a wrong shape or
-    type.
+    source: name of the file for the user. Raises UserError where a variable is missing, or has a wrong shape or type.
     """
     slow = "mission" if "mission" in dataset.dims else "cycle"
     lacking = [name for name in ("outcome", slow, "contact") if name not in dataset.variables]
