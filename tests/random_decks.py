@@ -14,11 +14,11 @@ from scipy.optimize import linprog
 from solver.harmonic_balance.state import State
 from solver.model import FloatArray, ReducedModel
 from solver.structure.joint import Joint
-from studies.finite_element.elements.solid_mesh import Material
-from studies.finite_element.joint.pairing import ContactSurfaces
-from studies.finite_element.joint.surfaces import surface_of_faces
+from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
+from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene
+from studies.finite_element.surfaces import surface_of_faces
 from tests.random_scenes import log_uniform
 from tests.studies.fe_models.sectors import faces_where
 from tests.studies.fe_models.solid_meshes import block, joined

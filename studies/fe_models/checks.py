@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from studies.fe_models.deck.mesh import Deck, FloatArray, IntArray
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.units import Units
-from studies.finite_element.elements.element_matrices import element_volumes
-from studies.finite_element.elements.kinds import ELEMENT_KINDS
-from studies.finite_element.elements.solid_mesh import Rotation
+from studies.finite_element.element_matrices import element_volumes
+from studies.finite_element.elements import ELEMENT_KINDS
+from studies.finite_element.solid_mesh import Rotation
 from studies.scene_error import SceneError
 
 # of each program: to export free nodes, to take contact out, to keep the prestress

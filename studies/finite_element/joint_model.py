@@ -9,25 +9,22 @@ import numpy as np
 from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
-from studies.finite_element.joint.constraints import Constraints
-from studies.finite_element.joint.cut_faces import CutFaces
-from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces
+from studies.finite_element.constraints import Constraints
+from studies.finite_element.cut_faces import CutFaces
+from studies.finite_element.pairing import ContactPairs, ContactSurfaces
+from studies.finite_element.solid_mesh import Rotation, SolidMesh
 
 
 @dataclass(frozen=True)
 class MeshModel:
     """A model whose matrices are assembled here.
 
-    mesh: the mesh.
     rotation: None for a model at rest.
     prestress: whether the stiffness contains the stress and the displacements of the glued structure under the
         centrifugal load, and spin softening.
     preload (3 n_nodes,): constant forces beside the centrifugal ones, N. They are no part of the prestress: forces that
         press on gaps and flanks act otherwise on a glued structure.
     gravity (3,): acceleration of all mass, m/s2, in the same way; None of none.
-    layers (n_nodes, n_directions): place of each node in a structured grid, for the order of elimination; None to use
-        the coordinates.
     extra (m,): numbers of nodes without elements, behind those of the mesh: others follow them.
     """
 
@@ -36,14 +33,11 @@ class MeshModel:
     prestress: bool = True
     preload: FloatArray | None = None
     gravity: FloatArray | None = None
-    layers: IntArray | None = None
     extra: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property
     def coordinates(self) -> FloatArray:
         """Nodes (n_nodes, 3), m; NaN for those without elements."""
-        if not len(self.extra):
-            return self.mesh.coordinates
         return np.vstack([self.mesh.coordinates, np.full((len(self.extra), 3), np.nan)])
 
     @property
@@ -53,8 +47,7 @@ class MeshModel:
 
     def padded(self, form: sparse.csr_matrix) -> sparse.csr_matrix:
         """A form of the mesh with empty rows for nodes without elements."""
-        if len(self.extra):
-            form.resize((3 * len(self.numbers), 3 * len(self.numbers)))
+        form.resize((3 * len(self.numbers), 3 * len(self.numbers)))
         return form
 
 
@@ -62,13 +55,11 @@ class MeshModel:
 class MatrixModel:
     """A model with matrices of another program.
 
-    coordinates (n_nodes, 3): m; NaN for nodes without a place, such as inner nodes of an element.
-    numbers (n_nodes,): of the nodes in the file.
+    coordinates (n_nodes, 3): m; NaN for nodes without a place, such as inner nodes of an element. numbers (n_nodes,):
+        of the nodes in the file.
     stiffness, mass (3 n_nodes, 3 n_nodes): N/m and kg, symmetric, unconstrained, displacements node by node in x, y, z.
         Prestress and spin softening of the other program stay in them.
-    rotation: for the centrifugal load, which follows from the mass; None for a model at rest.
-    preload (3 n_nodes,): constant forces beside the centrifugal ones, N.
-    gravity (3,): acceleration of all mass, m/s2; None of none.
+    rotation: for the centrifugal load, which follows from the mass. preload, gravity: as in `MeshModel`.
     damping (3 n_nodes, 3 n_nodes): viscous, N s/m; None for that of a loss factor.
     """
 
@@ -89,10 +80,10 @@ class MatrixModel:
 
     def with_nodes(self, numbers: IntArray) -> MatrixModel:
         """The same with further nodes (m,) that have no place and no matrices."""
-        n = len(self.numbers) + len(numbers)
+        size = 3 * (len(self.numbers) + len(numbers))
         forms = {name: form.copy() for name, form in self.forms.items()}
         for form in forms.values():
-            form.resize((3 * n, 3 * n))
+            form.resize((size, size))
         coordinates = np.vstack([self.coordinates, np.full((len(numbers), 3), np.nan)])
         return replace(self, coordinates=coordinates, numbers=np.concatenate([self.numbers, numbers]), **forms)
 
@@ -127,12 +118,9 @@ class SetMotion:
 
 @dataclass(frozen=True)
 class Retainer:
-    """A spring on the mean relative displacement of all pairs, weighted by area.
+    """A spring, N/m, on the mean relative displacement of all pairs, weighted by area, along a direction (3,).
 
-    stiffness: N/m.
-    direction (3,): of any length.
-
-    The spring keeps a joint from walking that friction alone holds; without it there may be no periodic state.
+    It keeps a joint from walking that friction alone holds; without it there may be no periodic state.
     """
 
     stiffness: float
@@ -143,15 +131,11 @@ class Retainer:
 class JointDefinition:
     """What is done with a model.
 
-    contacts: pairs of surfaces, at least one.
-    held (n_nodes, 3): displacements that are 0, or follow others by the constraints.
-    load: harmonic load of 1 N.
-    responses: by name.
+    contacts: pairs of surfaces, at least one. held (n_nodes, 3): displacements that are 0, or follow others by the
+        constraints. load: harmonic load of 1 N. responses: by name.
     cut: cut faces; None where the structure is no cyclic sector.
     along (3,): direction near the first tangents. None for the axis of rotation or of the cyclic structure, else z.
-    retainer: None for none.
-    ties: surfaces that are always glued.
-    constraints: displacements that follow others; None where there are none.
+    ties: surfaces that are always glued. constraints: displacements that follow others.
     pairs: pairs of the contacts in another order or with other frames than `build_contact_pairs` gives them.
     """
 
@@ -169,12 +153,7 @@ class JointDefinition:
 
 @dataclass(frozen=True)
 class ReductionOptions:
-    """Options of a reduction.
-
-    nodal_diameter: of the travelling wave that excites.
-    n_modes: number of stuck modes.
-    loss_factor: exact at the first glued frequency of this nodal diameter.
-    """
+    """nodal_diameter: of the travelling wave that excites. n_modes: stuck modes. loss_factor: see `build_fe_scene`."""
 
     nodal_diameter: int = 0
     n_modes: int = 20
@@ -185,9 +164,7 @@ class ReductionOptions:
 class ModelSummary:
     """Values for a user to check.
 
-    mass: kg.
-    centre (3,), extent (3,): m.
-    n_dofs: number of displacements that are not held.
+    mass: kg. centre (3,), extent (3,): m. n_dofs: number of displacements of nodes that are not held.
     glued_frequencies: of the glued structure, Hz, by nodal diameter.
     """
 

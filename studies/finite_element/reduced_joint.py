@@ -2,42 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
 from solver.model import (
+    BoolArray,
     ContactInterface,
     FloatArray,
-    IntArray,
     LinearModel,
     Matrix,
     ReducedModel,
     needed_nodal_diameters,
 )
-from studies.finite_element.elements.assembly import (
-    assemble_mass,
-    assemble_stiffness,
-    assemble_tangent_stiffness,
-    centrifugal_load,
-    check_elements,
-    spin_softening,
-)
-from studies.finite_element.elements.solid_mesh import Rotation
-from studies.finite_element.joint.constraints import check_followers, free_ones_first
-from studies.finite_element.joint.cut_faces import CyclicAxis
-from studies.finite_element.joint.layers import find_couplings, find_layers
-from studies.finite_element.joint.ordering import (
-    Supports,
-    consistent_supports,
-    order_structure,
-    pairs_of_sector,
-    ties_of_structure,
-)
-from studies.finite_element.joint.pairing import ContactPairs, build_contact_pairs
-from studies.finite_element.joint.reduction import GluedStructureError, Reduction
+from studies.finite_element.constraints import check_followers, free_ones_first
+from studies.finite_element.elimination import NotPositiveDefiniteError
 from studies.finite_element.joint_model import (
     JointDefinition,
     MatrixModel,
@@ -46,6 +27,18 @@ from studies.finite_element.joint_model import (
     ReductionOptions,
     Retainer,
 )
+from studies.finite_element.pairing import ContactPairs, build_contact_pairs
+from studies.finite_element.reduction import Reduction
+from studies.finite_element.solid_mesh import (
+    Rotation,
+    assemble_mass,
+    assemble_stiffness,
+    assemble_tangent_stiffness,
+    centrifugal_load,
+    check_elements,
+    spin_softening,
+)
+from studies.finite_element.structure import Structure, hold_cut_faces, hold_pairs, loose_ties, merge_cut_pairs
 from studies.scene_answers import N_MODES, NaturalFrequencies
 from studies.scene_error import SceneError
 
@@ -80,12 +73,7 @@ class PreparedModel:
     @property
     def pairs(self) -> ContactPairs:
         """Contact pairs."""
-        return self.reduction.ordered.pairs
-
-    def forces(self, vectors: FloatArray) -> FloatArray:
-        """Nodal forces (3 n_nodes,) on displacements that depend on no other."""
-        constraints = self.reduction.ordered.supports.constraints
-        return vectors if constraints is None else constraints.forces(vectors)
+        return self.reduction.structure.pairs
 
 
 def silent(_: str) -> None:
@@ -115,10 +103,9 @@ def build_fe_scene(
         most = f"use at most n_sectors // 2 = {n_sectors // 2}"
         raise SceneError("nodal_diameter", str(excited), most if n_sectors else "only a cyclic sector has one: use 0")
     wanted = needed_nodal_diameters(excited, n_sectors, n_harmonics)
-    prepared = prepare_model(model, joint, progress, n_reductions=len({excited, *wanted}))
-    pairs, n_nodes = prepared.pairs, len(model.numbers)
-    motions = [prepared.forces(each.row(n_nodes)) for each in (joint.load, *joint.responses.values())]
-    vectors = [prepared.static_load, *motions]
+    prepared = prepare_model(model, joint, progress)
+    motions = [each.row(len(model.numbers)) for each in (joint.load, *joint.responses.values())]
+    vectors = np.stack([prepared.static_load, *(_on_free(joint, each) for each in motions)], axis=1)
     linear: dict[int, LinearModel] = {}
     frequencies: dict[int, FloatArray] = {}
     damping = 0.0
@@ -127,8 +114,8 @@ def build_fe_scene(
     for number, k in enumerate(order):
         progress(f"reduction at nodal diameter {k} ({number + 1} of {len(order)})" if n_sectors else "reduction")
         try:
-            reduced = prepared.reduction.reduce(k, options.n_modes, np.stack(vectors, axis=1))
-        except GluedStructureError as error:
+            reduced = prepared.reduction.reduce(k, options.n_modes, vectors)
+        except NotPositiveDefiniteError as error:
             raise _refused(error, k, model.rotation) from error
         frequencies[k] = reduced.frequencies / (2.0 * np.pi)
         if k == excited:
@@ -139,62 +126,33 @@ def build_fe_scene(
             linear[k] = LinearModel(
                 mass=reduced.forms["mass"],
                 damping=reduced.forms.get("damping", damping * reduced.forms.get("elastic", stiffness)),
-                stiffness=_retained(stiffness, pairs, joint.retainer),
+                stiffness=_retained(stiffness, prepared.pairs, joint.retainer),
                 load_static=static.real * (k == 0),
                 load_harmonic=load.astype(complex) * (k == excited),
                 response=np.array(responses).conj(),
             )
-    return FeScene(
-        model=ReducedModel(
-            linear={k: linear[k] for k in wanted},
-            contact=_interface(pairs, joint),
-            response_names=tuple(joint.responses),
-            n_sectors=n_sectors,
-            nodal_diameter=excited,
-        ),
-        pairs=pairs,
-        summary=_summary(model, prepared, frequencies),
-    )
+    contact = _interface(prepared.pairs, joint)
+    reduced_model = ReducedModel({k: linear[k] for k in wanted}, contact, tuple(joint.responses), n_sectors, excited)
+    return FeScene(reduced_model, prepared.pairs, _summary(model, joint, prepared, frequencies))
 
 
-def prepare_model(
-    model: MeshModel | MatrixModel, joint: JointDefinition, progress: Progress = silent, n_reductions: int = 1
-) -> PreparedModel:
-    """Pairs, order of elimination and matrices of a model.
-
-    n_reductions: at how many nodal diameters the model will be reduced.
-
-    Raises SceneError where the model describes no possible joint.
-    """
+def prepare_model(model: MeshModel | MatrixModel, joint: JointDefinition, progress: Progress = silent) -> PreparedModel:
+    """Pairs and matrices of a model. Raises SceneError where the model describes no possible joint."""
     progress("pairing of the contact surfaces")
-    pairs = joint.pairs
-    if pairs is None:
-        contacts = joint.contacts if joint.constraints is None else free_ones_first(joint.constraints, joint.contacts)
-        pairs = build_contact_pairs(model.coordinates, model.numbers, contacts, _along(model, joint), _axis(joint))
-    supports = Supports(model.numbers, joint.held, joint.cut, n_reductions, joint.constraints)
-    glued = None
-    if joint.ties:
-        glued = build_contact_pairs(model.coordinates, model.numbers, joint.ties, _along(model, joint))
-    if joint.constraints is not None:
-        check_followers(joint.constraints, model.numbers, joint.cut, pairs, glued)
-    supports = consistent_supports(supports)
-    pairs = pairs_of_sector(pairs, supports)
-    ties = None if glued is None else ties_of_structure(glued, supports, pairs)
+    structure, constraints = _structure(model, joint), joint.constraints
     if isinstance(model, MatrixModel):
-        return _prepare(model, model.forms, joint, supports, pairs, ties)
+        return _prepare(model, joint, structure, model.forms)
     progress("assembly of stiffness and mass")
     check_elements(model.mesh)
     elastic, mass = (model.padded(form) for form in (assemble_stiffness(model.mesh), assemble_mass(model.mesh)))
-    still = _prepare(model, {"stiffness": elastic, "mass": mass}, joint, supports, pairs, ties)
+    still = _prepare(model, joint, structure, {"stiffness": elastic, "mass": mass})
     if not model.prestress or model.rotation is None:
         return still
     progress("static state of the glued structure under the centrifugal load")
-    ordered, constraints = still.reduction.ordered, joint.constraints
+    load = _on_free(joint, _centrifugal_load(mass, model.coordinates, model.rotation))
     try:
-        # by a reduction of its own: the factors of a large model are not to be kept beside those that follow
-        centrifugal = still.forces(_centrifugal_load(mass, model.coordinates, model.rotation))
-        displacements = Reduction(ordered, still.reduction.forms).solve_static(centrifugal)
-    except GluedStructureError as error:
+        displacements = still.reduction.solve_static(load)
+    except NotPositiveDefiniteError as error:
         raise _refused(error, 0, model.rotation) from error
     if constraints is not None:
         displacements = np.asarray(constraints.transformation @ displacements)
@@ -203,32 +161,73 @@ def prepare_model(
     stiffness = (model.padded(stressed) + spin_softening(mass, model.rotation)).tocsr()
     forms = {"stiffness": stiffness if constraints is None else constraints.apply(stiffness, stiffness=True)}
     forms |= {"mass": still.reduction.forms["mass"], "elastic": still.reduction.forms["stiffness"]}
-    return replace(still, reduction=Reduction(ordered, forms), at_rest=still.reduction)
+    return replace(still, reduction=replace(still.reduction, forms=forms), at_rest=still.reduction)
+
+
+def _structure(model: MeshModel | MatrixModel, joint: JointDefinition) -> Structure:
+    """The pairs of the joint, with the displacements that are held."""
+    numbers, coordinates, cut, constraints = model.numbers, model.coordinates, joint.cut, joint.constraints
+    axis = None if cut is None else cut.axis
+    along = joint.along
+    if along is None:
+        along = axis.axis if axis is not None else model.rotation.axis if model.rotation is not None else np.eye(3)[2]
+    pairs = joint.pairs
+    if pairs is None:
+        contacts = joint.contacts if constraints is None else free_ones_first(constraints, joint.contacts)
+        pairs = build_contact_pairs(coordinates, numbers, contacts, along, axis)
+    glued = build_contact_pairs(coordinates, numbers, joint.ties, along) if joint.ties else None
+    if constraints is not None:
+        check_followers(constraints, numbers, cut, pairs, glued)
+    held = hold_cut_faces(joint.held, cut, numbers)
+    pairs = merge_cut_pairs(hold_pairs(pairs, numbers, held, constraints, cut), cut, numbers)
+    ties = None if glued is None else loose_ties(glued, held, cut, pairs)
+    return Structure(held, cut, constraints, pairs, ties)
 
 
 def _prepare(
-    model: MeshModel | MatrixModel,
-    forms: dict[str, sparse.csr_matrix],
-    joint: JointDefinition,
-    supports: Supports,
-    pairs: ContactPairs,
-    ties: ContactPairs | None,
+    model: MeshModel | MatrixModel, joint: JointDefinition, structure: Structure, forms: dict[str, sparse.csr_matrix]
 ) -> PreparedModel:
     """A model with the forms as they are, without what depends on others."""
-    mass, constraints = forms["mass"], joint.constraints
-    load = _static_load(mass, model.coordinates, model)
-    along_x = np.where(np.isnan(model.coordinates), 0.0, np.array([1.0, 0.0, 0.0]))
+    mass, placed = forms["mass"], ~np.isnan(model.coordinates)
+    load = np.zeros(mass.shape[0]) if model.preload is None else model.preload
+    if model.gravity is not None:
+        load = load + mass @ (placed * model.gravity).ravel()
+    if model.rotation is not None:
+        load = load + _centrifugal_load(mass, model.coordinates, model.rotation)
+    along_x = placed * np.array([1.0, 0.0, 0.0])
     weight = (mass @ along_x.ravel()).reshape(-1, 3)[:, 0] * along_x[:, 0]
-    if constraints is not None:
-        forms = {name: constraints.apply(form, stiffness=name == "stiffness") for name, form in forms.items()}
-        load = constraints.forces(load)
-    coupled = find_couplings(forms["stiffness"])
-    if isinstance(model, MatrixModel):
-        coupled = coupled + find_couplings(forms["mass"])
-    layers = None if isinstance(model, MatrixModel) else model.layers
-    places = find_layers(model.coordinates, coupled, joint.cut) if layers is None else layers.astype(float)
-    ordered = order_structure(supports, pairs, ties, coupled, places)
-    return PreparedModel(Reduction(ordered, forms), load, None, model.rotation, weight)
+    if joint.constraints is not None:
+        apply = joint.constraints.apply
+        forms = {name: apply(form, stiffness=name == "stiffness") for name, form in forms.items()}
+    reduction = Reduction(structure, forms, _positions(model, joint, forms.values()))
+    return PreparedModel(reduction, _on_free(joint, load), None, model.rotation, weight)
+
+
+def _positions(
+    model: MeshModel | MatrixModel, joint: JointDefinition, forms: Iterable[sparse.csr_matrix]
+) -> FloatArray:
+    """Coordinates of the nodes, and radius, angle and height of a sector, over the extent of the mesh.
+
+    Nodes without a place stand among those to which the forms couple them. Rounded, layers of a regular mesh are
+    layers.
+    """
+    positions, nowhere = model.coordinates.copy(), np.asarray(np.isnan(model.coordinates).any(axis=1))
+    if nowhere.any():
+        node = sparse.kron(sparse.eye(len(nowhere)), np.ones((1, 3)), format="csr")
+        coupled = sum(node @ (abs(form) > 0.0).astype(float) @ node.T for form in forms).tocsr()
+        near = (coupled[nowhere][:, ~nowhere] > 0.0).astype(float)
+        count = np.maximum(np.asarray(near.sum(axis=1)), 1.0)
+        positions[nowhere] = (near @ positions[~nowhere]) / count.reshape(-1, 1)
+    extent = np.ptp(positions, axis=0).max()
+    directions = [positions]
+    if joint.cut is not None:
+        directions.append(joint.cut.axis.cylinder(positions) * [1.0, extent, 1.0])
+    return np.asarray(np.round(np.hstack(directions) / extent, 7))
+
+
+def _on_free(joint: JointDefinition, forces: FloatArray) -> FloatArray:
+    """Nodal forces (3 n_nodes,) on displacements that depend on no other."""
+    return forces if joint.constraints is None else joint.constraints.forces(forces)
 
 
 def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int) -> FloatArray:
@@ -238,15 +237,12 @@ def glued_frequencies(prepared: PreparedModel, nodal_diameter: int, n_modes: int
     """
     try:
         return prepared.reduction.frequencies(nodal_diameter, n_modes) / (2.0 * np.pi)
-    except GluedStructureError as error:
+    except NotPositiveDefiniteError as error:
         raise _refused(error, nodal_diameter, prepared.rotation) from error
 
 
 def natural_frequencies(prepared: PreparedModel, n_sectors: int) -> NaturalFrequencies:
-    """Lowest natural frequencies of the glued structure at all nodal diameters 0..n_sectors // 2.
-
-    Raises SceneError where the glued structure is not held, or unstable.
-    """
+    """Those at all nodal diameters 0..n_sectors // 2. Raises SceneError as `glued_frequencies` does."""
     found = np.full((n_sectors // 2 + 1, N_MODES), np.nan)
     for k, row in enumerate(found):
         own = glued_frequencies(prepared, k, N_MODES)
@@ -254,42 +250,22 @@ def natural_frequencies(prepared: PreparedModel, n_sectors: int) -> NaturalFrequ
     return NaturalFrequencies(tuple(range(len(found))), found)
 
 
-def _static_load(mass: sparse.csr_matrix, coordinates: FloatArray, model: MeshModel | MatrixModel) -> FloatArray:
-    load = np.zeros(mass.shape[0]) if model.preload is None else model.preload
-    if model.gravity is not None:
-        load = load + mass @ ((~np.isnan(coordinates)) * model.gravity).ravel()
-    return load if model.rotation is None else load + _centrifugal_load(mass, coordinates, model.rotation)
-
-
 def _centrifugal_load(mass: sparse.csr_matrix, coordinates: FloatArray, rotation: Rotation) -> FloatArray:
     # what has no place has no arm: an amplitude within an element
-    places = np.where(np.isnan(coordinates), rotation.point, coordinates)
-    return centrifugal_load(mass, places, rotation)
-
-
-def _along(model: MeshModel | MatrixModel, joint: JointDefinition) -> FloatArray:
-    if joint.along is not None:
-        return joint.along
-    axis = _axis(joint)
-    if axis is not None:
-        return axis.axis
-    return np.array([0.0, 0.0, 1.0]) if model.rotation is None else model.rotation.axis
-
-
-def _axis(joint: JointDefinition) -> CyclicAxis | None:
-    return None if joint.cut is None else joint.cut.axis
+    return centrifugal_load(mass, np.where(np.isnan(coordinates), rotation.point, coordinates), rotation)
 
 
 def _interface(pairs: ContactPairs, joint: JointDefinition) -> ContactInterface:
     given = [contact.friction_coefficient for contact in joint.contacts]
     friction = None
     if any(each is not None for each in given):
-        if any(each is None for each in given):
+        if None in given:
             missing = joint.contacts[given.index(None)].name
             raise SceneError("friction_coefficient", f"none for {missing}", "give one for every pair of surfaces")
         friction = np.array(given, dtype=float)[pairs.surface]
+    number = np.cumsum(pairs.present.ravel()).reshape(-1, 3) - 1
     return ContactInterface(
-        dofs=_contact_dofs(pairs),
+        dofs=np.where(pairs.present, number, -1).astype(np.int64),
         area=pairs.area,
         gap=pairs.gap,
         normal_load=np.zeros(pairs.n_contact),
@@ -297,12 +273,6 @@ def _interface(pairs: ContactPairs, joint: JointDefinition) -> ContactInterface:
         surface=tuple(joint.contacts[place].name for place in pairs.surface),
         friction_coefficient=friction,
     )
-
-
-def _contact_dofs(pairs: ContactPairs) -> IntArray:
-    """Places (n_contact, 3) of the relative displacements in the reduced model, -1 where there is none."""
-    number = np.cumsum(pairs.present.ravel()).reshape(-1, 3) - 1
-    return np.where(pairs.present, number, -1).astype(np.int64)
 
 
 def _retained(stiffness: Matrix, pairs: ContactPairs, retainer: Retainer | None) -> Matrix:
@@ -317,24 +287,28 @@ def _retained(stiffness: Matrix, pairs: ContactPairs, retainer: Retainer | None)
 
 
 def _summary(
-    model: MeshModel | MatrixModel, prepared: PreparedModel, frequencies: dict[int, FloatArray]
+    model: MeshModel | MatrixModel,
+    joint: JointDefinition,
+    prepared: PreparedModel,
+    frequencies: dict[int, FloatArray],
 ) -> ModelSummary:
-    weight = prepared.weight
+    weight, coordinates = prepared.weight, model.coordinates
+    free: BoolArray = np.asarray(~prepared.reduction.structure.held.all(axis=1))
+    if joint.cut is not None:
+        free[joint.cut.right] = False
     return ModelSummary(
         mass=float(weight.sum()),
-        centre=weight @ np.nan_to_num(model.coordinates) / weight.sum(),
-        extent=np.nanmax(model.coordinates, axis=0) - np.nanmin(model.coordinates, axis=0),
-        n_dofs=3 * len(prepared.reduction.ordered.free),
+        centre=weight @ np.nan_to_num(coordinates) / weight.sum(),
+        extent=np.nanmax(coordinates, axis=0) - np.nanmin(coordinates, axis=0),
+        n_dofs=3 * int(np.count_nonzero(free)),
         glued_frequencies=frequencies,
     )
 
 
-def _refused(error: GluedStructureError, nodal_diameter: int, rotation: Rotation | None) -> SceneError:
+def _refused(error: NotPositiveDefiniteError, nodal_diameter: int, rotation: Rotation | None) -> SceneError:
     if error.unstable:
         speed = "that of the matrices" if rotation is None else f"{np.sqrt(rotation.omega_squared) * 30.0 / np.pi:.6g}"
-        return SceneError("rotation_speed", speed, f"reduce it: at nodal diameter {nodal_diameter} {error}")
-    return SceneError(
-        "clamp",
-        f"at nodal diameter {nodal_diameter} {error}",
-        "clamp nodes, so that with all contact pairs glued no body can move as a whole",
-    )
+        found = "the glued structure is unstable: spin softening exceeds its stiffness"
+        return SceneError("rotation_speed", speed, f"reduce it: at nodal diameter {nodal_diameter} {found}")
+    found = f"at nodal diameter {nodal_diameter} nothing holds the glued structure: its stiffness is singular"
+    return SceneError("clamp", found, "clamp nodes, so that with all contact pairs glued no body can move as a whole")

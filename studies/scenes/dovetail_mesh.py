@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from solver.model import FloatArray, IntArray
 from studies.scenes.dovetail_parameters import Parameters
-from studies.scenes.structured_mesh import HexMesh, find_stations, graded, join_blocks
+from studies.scenes.structured_mesh import HexMesh, graded, join_blocks
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,6 @@ class DovetailMesh:
     left_nodes, right_nodes (n,): the cut faces at -pi/N and +pi/N, node by node images of each other under rotation
     by one sector. disk_flanks, blade_flanks (2, n_axial, n_flank): coincident nodes; flank 0 lies at y > 0 (intrados),
     flank 1 at y < 0 (extrados); from the leading to the trailing edge, then from the inner to the outer end.
-    stations (n_nodes, 3): place of each node along, across and through the sector, disk and blade each for itself.
     tip_nodes (n_thickness, n_axial): end face of the blade, from extrados to intrados, from leading to trailing edge.
     """
 
@@ -36,7 +35,6 @@ class DovetailMesh:
     right_nodes: IntArray
     disk_flanks: IntArray
     blade_flanks: IntArray
-    stations: IntArray
     tip_nodes: IntArray
 
 
@@ -61,9 +59,6 @@ def build_dovetail_mesh(parameters: Parameters) -> DovetailMesh:
         right_nodes=np.concatenate([web[:, -1], post_right[1:, -1]]).ravel(),
         disk_flanks=np.swapaxes(np.stack([post_right[flank, 0], post_left[flank, -1]]), 1, 2),
         blade_flanks=offset + np.swapaxes(np.stack([body[flank, -1], body[flank, 0]]), 1, 2),
-        stations=np.concatenate(
-            [find_stations(disk_grids, len(disk.nodes)), find_stations(blade_grids, len(blade.nodes))]
-        ),
         tip_nodes=offset + body[-1],
     )
 

@@ -18,12 +18,11 @@ from dataclasses import replace
 import numpy as np
 
 from solver.model import FloatArray
-from studies.finite_element.elements.assembly import check_elements
-from studies.finite_element.elements.solid_mesh import ElementGroup, SolidMesh
-from studies.finite_element.joint import surfaces
-from studies.finite_element.joint.cut_faces import CutFaces
-from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
+from studies.finite_element import surfaces
+from studies.finite_element.cut_faces import CutFaces
 from studies.finite_element.joint_model import JointDefinition, Retainer, SetMotion
+from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
+from studies.finite_element.solid_mesh import ElementGroup, SolidMesh, check_elements
 from studies.scene_error import SceneError
 from studies.scenes.dovetail_mesh import DovetailMesh, build_dovetail_mesh, chord_directions
 from studies.scenes.dovetail_parameters import Parameters, check_parameters
@@ -68,7 +67,7 @@ def define_sector(parameters: Parameters) -> Sector:
         retainer=Retainer(parameters.retainer, AXIS),
         pairs=_arranged(build_contact_pairs(solid.coordinates, solid.numbers, contacts, AXIS), mesh),
     )
-    return parameters.model_of(solid, mesh.stations), joint
+    return parameters.model_of(solid), joint
 
 
 def build_solid_mesh(parameters: Parameters, mesh: DovetailMesh) -> SolidMesh:

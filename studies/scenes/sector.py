@@ -11,14 +11,15 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.contact_compliance import ContactStiffness
-from studies.finite_element.elements.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
-from studies.finite_element.joint.cut_faces import CyclicAxis
-from studies.finite_element.joint.surfaces import describe_mesh
+from studies.finite_element.cut_faces import CyclicAxis
+from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, natural_frequencies, prepare_model
+from studies.finite_element.solid_mesh import ElementGroup, Rotation, SolidMesh
+from studies.finite_element.surfaces import describe_mesh
 from studies.scene_answers import NaturalFrequencies, SurfaceMesh
 from studies.scene_error import SceneError
-from studies.scenes.structured_mesh import find_stations, join_blocks
+from studies.scenes.structured_mesh import join_blocks
 
 AXIS, ORIGIN = np.array([0.0, 0.0, 1.0]), np.zeros(3)
 
@@ -61,10 +62,10 @@ class SectorParameters(BaseModel):
         """That of disk and blades."""
         return Material(self.young_modulus, self.poisson_ratio, self.density)
 
-    def model_of(self, mesh: SolidMesh, stations: IntArray) -> MeshModel:
-        """The turning mesh; stations: of its nodes in a structured grid."""
+    def model_of(self, mesh: SolidMesh) -> MeshModel:
+        """The turning mesh."""
         rotation = Rotation(self.angular_speed**2, ORIGIN, AXIS) if self.rotation_speed else None
-        return MeshModel(mesh, rotation, self.stress_stiffening, layers=stations)
+        return MeshModel(mesh, rotation, self.stress_stiffening)
 
     def check_wave(self) -> None:
         """Raises SceneError where the ring has no such nodal diameter."""
@@ -108,23 +109,21 @@ def functions_of(
         return describe_mesh(define_sector(parameters)[0].mesh)
 
     def frequencies(parameters: P) -> NaturalFrequencies:
-        n_all = parameters.n_sectors // 2 + 1
-        return natural_frequencies(prepare_model(*define_sector(parameters), n_reductions=n_all), parameters.n_sectors)
+        return natural_frequencies(prepare_model(*define_sector(parameters)), parameters.n_sectors)
 
     return build, mesh, frequencies
 
 
 def mesh_of_bodies(bodies: Sequence[tuple[Sequence[FloatArray], Sequence[str], Material]]) -> tuple[
-    SolidMesh, tuple[IntArray, ...], IntArray
+    SolidMesh, tuple[IntArray, ...]
 ]:  # fmt: skip
-    """Mesh of several bodies in hexahedra with incompatible modes, node numbers of all blocks, stations of the nodes.
+    """Mesh of several bodies in hexahedra with incompatible modes, and node numbers of all blocks.
 
     bodies: blocks of points (radial, tangential, axial, 3), the name of each block's part, material. Blocks of one body
     are joined where their points coincide; bodies are not.
     """
     nodes: list[FloatArray] = []
     grids: list[IntArray] = []
-    stations: list[IntArray] = []
     groups: list[ElementGroup] = []
     n_nodes = n_elements = 0
     for blocks, parts, material in bodies:
@@ -135,11 +134,10 @@ def mesh_of_bodies(bodies: Sequence[tuple[Sequence[FloatArray], Sequence[str], M
             numbers = np.arange(n_elements + first, n_elements + last) + 1
             groups.append(ElementGroup("C3D8I", mesh.elements[first:last] + n_nodes, numbers, material, part))
             first = last
-        stations.append(find_stations(own, len(mesh.nodes)))
         grids += [grid + n_nodes for grid in own]
         nodes.append(mesh.nodes)
         n_nodes, n_elements = n_nodes + len(mesh.nodes), n_elements + len(mesh.elements)
-    return SolidMesh(np.concatenate(nodes), np.arange(n_nodes) + 1, tuple(groups)), tuple(grids), np.vstack(stations)
+    return SolidMesh(np.concatenate(nodes), np.arange(n_nodes) + 1, tuple(groups)), tuple(grids)
 
 
 def block_of(

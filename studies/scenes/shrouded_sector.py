@@ -18,10 +18,10 @@ import numpy as np
 from pydantic import Field
 
 from solver.model import FloatArray
-from studies.finite_element.joint import surfaces
-from studies.finite_element.joint.cut_faces import CutFaces
-from studies.finite_element.joint.pairing import ContactSurfaces
+from studies.finite_element import surfaces
+from studies.finite_element.cut_faces import CutFaces
 from studies.finite_element.joint_model import JointDefinition, SetMotion
+from studies.finite_element.pairing import ContactSurfaces
 from studies.scene_error import SceneError
 from studies.scenes.sector import (
     Sector,
@@ -63,7 +63,7 @@ def define_sector(parameters: Parameters) -> Sector:
     """
     _check(parameters)
     p, m = parameters, parameters.mesh
-    solid, (disk, _, shroud), stations = mesh_of_bodies([(_blocks(p), ("disk", "blade", "shroud"), p.material)])
+    solid, (disk, _, shroud) = mesh_of_bodies([(_blocks(p), ("disk", "blade", "shroud"), p.material)])
     held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
     held[disk[0].ravel()] = True
     angle = radians(p.shroud_angle)
@@ -78,7 +78,7 @@ def define_sector(parameters: Parameters) -> Sector:
         responses={"tip": tip},
         cut=CutFaces(p.axis, disk[:, 0].ravel(), disk[:, -1].ravel()),
     )
-    return p.model_of(solid, stations), joint
+    return p.model_of(solid), joint
 
 
 def _check(parameters: Parameters) -> None:

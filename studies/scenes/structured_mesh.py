@@ -48,24 +48,6 @@ def join_blocks(blocks: Sequence[FloatArray]) -> tuple[HexMesh, tuple[IntArray, 
     return HexMesh(nodes=points[first], elements=np.concatenate([_cells(grid) for grid in grids])), grids
 
 
-def find_stations(grids: Sequence[IntArray], n_nodes: int) -> IntArray:
-    """Place (n_nodes, 3) of each node in one structured grid through all blocks of `join_blocks`.
-
-    Each block is counted on from one that it touches; those that touch none stand for themselves.
-    """
-    stations = np.zeros((n_nodes, 3), dtype=np.int64)
-    known = np.zeros(n_nodes, dtype=np.bool_)
-    for grid in grids:
-        nodes = grid.ravel()
-        own = np.indices(grid.shape).reshape(3, -1).T
-        common = np.flatnonzero(known[nodes])[:1]
-        offset = (stations[nodes] - own)[common].sum(axis=0)
-        new = ~known[nodes]
-        stations[nodes[new]] = own[new] + offset
-        known[nodes] = True
-    return stations
-
-
 def graded(stations: Sequence[float], divisions: Sequence[int]) -> FloatArray:
     """Values through all stations, with so many equal divisions from each station to the next."""
     spans = zip(pairwise(stations), divisions, strict=True)

@@ -19,11 +19,11 @@ import numpy as np
 from pydantic import Field
 
 from solver.model import FloatArray
-from studies.finite_element.elements.solid_mesh import Material
-from studies.finite_element.joint import surfaces
-from studies.finite_element.joint.cut_faces import CutFaces
-from studies.finite_element.joint.pairing import ContactSurfaces
+from studies.finite_element import surfaces
+from studies.finite_element.cut_faces import CutFaces
+from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import JointDefinition, Retainer, SetMotion
+from studies.finite_element.pairing import ContactSurfaces
 from studies.scene_error import SceneError
 from studies.scenes.sector import (
     AXIS,
@@ -73,7 +73,7 @@ def define_sector(parameters: Parameters) -> Sector:
     p, m = parameters, parameters.mesh
     blade_body = (_blade_body(p), ("disk", "shank", "platform", "blade"), p.material)
     wedge_body = ([_wedge(p)], ("wedge",), Material(p.young_modulus, p.poisson_ratio, p.damper_density))
-    solid, grids, stations = mesh_of_bodies([blade_body, wedge_body])
+    solid, grids = mesh_of_bodies([blade_body, wedge_body])
     disk, _, platform, blade, wedge = grids
     held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
     held[disk[0].ravel()] = True
@@ -96,7 +96,7 @@ def define_sector(parameters: Parameters) -> Sector:
         cut=CutFaces(p.axis, disk[:, 0].ravel(), disk[:, -1].ravel()),
         retainer=Retainer(p.retention_stiffness, AXIS),
     )
-    return p.model_of(solid, stations), joint
+    return p.model_of(solid), joint
 
 
 def _check(parameters: Parameters) -> None:

@@ -92,7 +92,8 @@ class AxesSection(Section):
 
     frequency: _Frequencies = Field(
         cast("Any", None),
-        description="Hz; a word is followed in the range of [loading]; needed for wear histories, or frequency_ratio",
+        description="Hz; with a word the excitation follows this resonance in the range of [loading]; a study of wear"
+        " has frequency or frequency_ratio",
     )
     frequency_ratio: Axis[Positive] | None = Field(
         None, description="in place of frequency: over the first natural frequency of the same scene, all pairs stuck"
@@ -226,10 +227,8 @@ class SlowTimeSection(Section):
 class SolverSection(Section):
     """[solver]: resolution and accuracy. Several values of the first keys are an axis, as under [axes]."""
 
-    harmonics: Axis[Harmonics] = Field((AUTO,), description="or number of harmonics above the static one")
-    samples: Axis[Samples] = Field(
-        (AUTO,), description="or number of time samples in a period, more than twice the harmonics"
-    )
+    harmonics: Axis[Harmonics] = Field((AUTO,), description="harmonics above the static one")
+    samples: Axis[Samples] = Field((AUTO,), description="time samples in a period, more than twice the harmonics")
     tolerance: Axis[Fraction] = Field((1e-8,), description="of the scaled residual")
     rtol: Axis[Fraction] = Field((1e-2,), description="aim for the relative error of worn volume and response")
     shortcuts: bool = Field(True, description="whether points with the same history share one")
@@ -268,3 +267,6 @@ SECTIONS: dict[str, type[Section]] = {
     "scatter": ScatterSection,
     "loading": LoadingSection,
 }
+
+ELSEWHERE = {key: f"{table}.{key}" for table, kind in reversed(SECTIONS.items()) for key in kind.model_fields}
+"""Where a key stands that is not known in another table."""

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from studies.finite_element.elements.solid_mesh import ElementGroup, SolidMesh
-from studies.finite_element.joint import surfaces
+from studies.finite_element import surfaces
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
 from studies.finite_element.reduced_joint import build_fe_scene
+from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
 
 
 def whole_ring(model: MeshModel, joint: JointDefinition) -> tuple[MeshModel, JointDefinition]:

@@ -5,8 +5,7 @@ import pytest
 from scipy import linalg
 
 from solver.model import needed_nodal_diameters
-from studies.finite_element.elements.assembly import assemble_mass, centrifugal_load
-from studies.finite_element.elements.solid_mesh import SolidMesh
+from studies.finite_element.solid_mesh import SolidMesh, assemble_mass, centrifugal_load
 from studies.scenes.dovetail_sector import Parameters, build, define_sector
 from tests.studies.static_contact import solve_static_contact
 

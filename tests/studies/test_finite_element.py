@@ -5,13 +5,13 @@ import pytest
 from scipy import linalg
 from scipy.sparse.linalg import spsolve
 
-from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness
-from studies.finite_element.elements.solid_mesh import ElementGroup, Material, SolidMesh
-from studies.finite_element.joint.cut_faces import CyclicAxis
-from studies.finite_element.joint.pairing import ContactSurfaces
-from studies.finite_element.joint.surfaces import surface_of_nodes
+from studies.finite_element.cut_faces import CyclicAxis
+from studies.finite_element.element_matrices import Material
 from studies.finite_element.joint_model import JointDefinition, MeshModel, ReductionOptions, SetMotion
+from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
+from studies.finite_element.solid_mesh import ElementGroup, SolidMesh, assemble_mass, assemble_stiffness
+from studies.finite_element.surfaces import surface_of_nodes
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, wedge_shape
 from tests.studies.fe_models.solid_meshes import STEEL, block, joined
 

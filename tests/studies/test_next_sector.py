@@ -33,7 +33,7 @@ SECTORS = [shrouded_sector.define_sector(STUBBY), underplatform_damper.define_se
 
 def frequencies_of_sector(sector=SECTORS[0], joint_of=lambda joint: joint):
     model, joint = sector
-    prepared = prepare_model(replace(model, rotation=None), joint_of(joint), n_reductions=N // 2 + 1)
+    prepared = prepare_model(replace(model, rotation=None), joint_of(joint))
     return [glued_frequencies(prepared, k, 4) for k in range(N // 2 + 1)]
 
 

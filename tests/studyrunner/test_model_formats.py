@@ -7,7 +7,7 @@ import pytest
 from scipy import io
 
 from solver import SolverSettings, march_wear
-from studies.finite_element.joint.surfaces import surface_of_nodes
+from studies.finite_element.surfaces import surface_of_nodes
 from studyrunner.cli import main
 from studyrunner.scene.scene import build_study_scene
 from studyrunner.study.study_file import read_study

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studies.finite_element.elements.solid_mesh import Material
+from studies.finite_element.element_matrices import Material
 from studyrunner.cli import main
 from tests.studies.fe_models.sectors import faces_where
 from tests.studies.fe_models.solid_meshes import block, deck_lines, joined, node_set

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from studies.finite_element.joint.reduction import GluedStructureError, Reduction
+from studies.finite_element.elimination import NotPositiveDefiniteError
+from studies.finite_element.reduction import Reduction
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
@@ -101,7 +102,7 @@ def test_a_sector_that_spins_too_fast_is_bad_input(tmp_path, monkeypatch, capsys
     monkeypatch.chdir(tmp_path)
 
     def unstable(*_):
-        raise GluedStructureError(unstable=True)
+        raise NotPositiveDefiniteError(unstable=True)
 
     monkeypatch.setattr(Reduction, "frequencies", unstable)
     # on a busy machine the scene may take so long that it would be kept for another run

@@ -24,7 +24,7 @@ from studies.fe_models.deck.mesh import (
 from studies.fe_models.deck.numbering import build_blocks, build_nodes, find_offsets
 from studies.fe_models.deck.sets import Key, Reference, Resolver, scope_of
 from studies.fe_models.text.read_errors import Place, shown
-from studies.finite_element.elements.kinds import ELEMENT_KINDS
+from studies.finite_element.elements import ELEMENT_KINDS
 
 FACES_OF_CORNERS = {4: 4, 10: 4, 6: 5, 15: 5, 8: 6, 20: 6}
 """Numbers of faces of an element by its number of nodes."""

@@ -10,7 +10,7 @@ import numpy as np
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.fe_models.deck.mesh import Deck, Equation, RigidMotion, Transform
 from studies.fe_models.units import Units
-from studies.finite_element.joint.constraints import Constraints, Dependence, eliminate
+from studies.finite_element.constraints import Constraints, Dependence, eliminate
 from studies.scene_error import SceneError
 
 _ROUND_OFF = 1e-9  # of a direction

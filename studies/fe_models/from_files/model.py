@@ -33,13 +33,12 @@ from studies.fe_models.mesh_files import read_mesh_file
 from studies.fe_models.model_files import ModelFiles
 from studies.fe_models.nodal_matrices import NodalMatrices, order_by_nodes
 from studies.fe_models.units import Units, find_units
-from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
-from studies.finite_element.joint.cut_faces import CyclicAxis
-from studies.finite_element.joint.matched_nodes import match_nodes
-from studies.finite_element.joint.pairing import ContactPairs
-from studies.finite_element.joint.surfaces import loops_of_faces, pressure_forces
+from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel, Retainer, RowMotion, SetMotion
+from studies.finite_element.pairing import ContactPairs, match_nodes
 from studies.finite_element.reduced_joint import Progress, silent
+from studies.finite_element.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.surfaces import loops_of_faces, pressure_forces
 from studies.scene_error import SceneError
 
 _SPEED_AGREES = 1e-3  # relative difference of the speed of a study from that of its matrices

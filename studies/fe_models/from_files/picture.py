@@ -11,9 +11,9 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from solver.model import FloatArray
 from studies.fe_models.from_files.model import LoadedModel
-from studies.finite_element.joint.pairing import ContactPairs
-from studies.finite_element.joint.surfaces import Surface
+from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduced_joint import FeScene
+from studies.finite_element.surfaces import Surface
 
 _MOST_NUMBERS = 150
 _COLOURS = ("tab:red", "tab:green", "tab:blue")  # normal, first and second tangent

@@ -13,9 +13,9 @@ from studies.fe_models.from_files.model import LoadedModel, load_mesh, load_mode
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.mesh_files import read_mesh_file
 from studies.fe_models.model_files import ModelFiles, file_digest
-from studies.finite_element.joint.surfaces import describe_mesh
 from studies.finite_element.joint_model import ReductionOptions
 from studies.finite_element.reduced_joint import FeScene, Progress, build_fe_scene, silent
+from studies.finite_element.surfaces import describe_mesh
 from studies.scene_answers import SurfaceMesh
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from solver.model import IntArray
 from studies.fe_models.deck.mesh import Deck
-from studies.finite_element.elements.solid_mesh import SolidMesh
-from studies.finite_element.joint.surfaces import Surface, surface_of_faces, surface_of_nodes, surface_of_points
+from studies.finite_element.solid_mesh import SolidMesh
+from studies.finite_element.surfaces import Surface, surface_of_faces, surface_of_nodes, surface_of_points
 from studies.scene_error import SceneError
 
 _MOST_NAMED = 6

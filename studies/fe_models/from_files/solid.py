@@ -10,7 +10,8 @@ from solver.model import IntArray
 from studies.fe_models.deck.mesh import Deck
 from studies.fe_models.from_files.parameters import MaterialTable, Parameters
 from studies.fe_models.units import Units
-from studies.finite_element.elements.solid_mesh import ElementGroup, Material, SolidMesh
+from studies.finite_element.element_matrices import Material
+from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
 from studies.scene_error import SceneError
 
 _NONE = Material(0.0, 0.0, 0.0)  # of a mesh whose matrices come from elsewhere

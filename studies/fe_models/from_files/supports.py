@@ -12,9 +12,9 @@ from studies.fe_models.deck.mesh import Deck
 from studies.fe_models.from_files.parameters import AxisTable, Parameters
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.units import Units
-from studies.finite_element.elements.solid_mesh import Rotation
-from studies.finite_element.joint.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
-from studies.finite_element.joint.pairing import ContactSurfaces
+from studies.finite_element.cut_faces import CutFaces, CyclicAxis, find_cut_faces, match_cut_faces
+from studies.finite_element.pairing import ContactSurfaces
+from studies.finite_element.solid_mesh import Rotation
 from studies.scene_error import SceneError
 
 

@@ -11,8 +11,8 @@ from studies.fe_models.deck.mesh import ContactPair, Deck
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.selections import Selections
 from studies.fe_models.units import Units
-from studies.finite_element.joint.cut_faces import CyclicAxis
-from studies.finite_element.joint.pairing import ContactSurfaces
+from studies.finite_element.cut_faces import CyclicAxis
+from studies.finite_element.pairing import ContactSurfaces
 from studies.scene_error import SceneError
 
 

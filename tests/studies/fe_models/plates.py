@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness
+from studies.finite_element.solid_mesh import assemble_mass, assemble_stiffness
 from tests.studies.fe_models.solid_meshes import block, deck_lines, joined, node_set
 
 SETS = ("GROUND", "UNDER", "OVER", "TIP")

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.linalg import eigh
 
 from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
-from studies.finite_element.elements.assembly import assemble_mass, assemble_stiffness
-from studies.finite_element.joint.pairing import local_frames
+from studies.finite_element.pairing import local_frames
+from studies.finite_element.solid_mesh import assemble_mass, assemble_stiffness
 from studies.scenes import shrouded_sector
 
 N = 6

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from studies.finite_element.elements.kinds import ELEMENT_KINDS
-from studies.finite_element.elements.solid_mesh import Rotation, SolidMesh
-from studies.finite_element.joint.cut_faces import CyclicAxis, match_cut_faces
-from studies.finite_element.joint.pairing import ContactSurfaces
-from studies.finite_element.joint.surfaces import surface_of_faces
+from studies.finite_element.cut_faces import CyclicAxis, match_cut_faces
+from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.joint_model import JointDefinition, MeshModel, SetMotion
+from studies.finite_element.pairing import ContactSurfaces
+from studies.finite_element.solid_mesh import Rotation, SolidMesh
+from studies.finite_element.surfaces import surface_of_faces
 from tests.studies.fe_models.solid_meshes import block, joined
 
 N_SECTORS = 12

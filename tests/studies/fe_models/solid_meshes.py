@@ -5,8 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from studies.finite_element.elements.kinds import ELEMENT_KINDS
-from studies.finite_element.elements.solid_mesh import ElementGroup, Material, SolidMesh
+from studies.finite_element.element_matrices import Material
+from studies.finite_element.elements import ELEMENT_KINDS
+from studies.finite_element.solid_mesh import ElementGroup, SolidMesh
 
 STEEL = Material(210e9, 0.3, 7800.0)
 

@@ -7,7 +7,11 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from studies.fe_models.matrices.read import read_matrices
-from studies.finite_element.elements.assembly import (
+from studies.finite_element.elements import ASSEMBLED_KINDS
+from studies.finite_element.solid_mesh import (
+    ElementGroup,
+    Rotation,
+    SolidMesh,
     assemble_mass,
     assemble_stiffness,
     assemble_tangent_stiffness,
@@ -15,8 +19,6 @@ from studies.finite_element.elements.assembly import (
     check_elements,
     spin_softening,
 )
-from studies.finite_element.elements.kinds import ASSEMBLED_KINDS
-from studies.finite_element.elements.solid_mesh import ElementGroup, Rotation, SolidMesh
 from studies.scene_error import SceneError
 from tests.studies.fe_models.solid_meshes import (
     EXPORT,

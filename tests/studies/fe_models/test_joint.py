@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from studies.finite_element.elements.kinds import ELEMENT_KINDS
-from studies.finite_element.joint.closest_point import closest_points
-from studies.finite_element.joint.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
-from studies.finite_element.joint.pairing import ContactSurfaces, build_contact_pairs
-from studies.finite_element.joint.surfaces import (
+from studies.finite_element.closest_points import closest_points
+from studies.finite_element.cut_faces import CyclicAxis, find_cut_faces, match_cut_faces
+from studies.finite_element.elements import ELEMENT_KINDS
+from studies.finite_element.pairing import ContactSurfaces, build_contact_pairs
+from studies.finite_element.surfaces import (
     loops_of_faces,
     pressure_forces,
     surface_of_faces,

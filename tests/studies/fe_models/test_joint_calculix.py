@@ -14,9 +14,9 @@ from studies.fe_models.from_files.scene import reduce_model
 from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.nodal_matrices import order_by_nodes
 from studies.fe_models.units import find_units
-from studies.finite_element.elements.solid_mesh import Rotation
 from studies.finite_element.joint_model import ReductionOptions
 from studies.finite_element.reduced_joint import build_fe_scene, glued_frequencies, prepare_model
+from studies.finite_element.solid_mesh import Rotation
 from studies.scene_error import SceneError
 from studies.scenes import shrouded_sector
 from tests.studies.fe_models.sectors import N_SECTORS, OMEGA_SQUARED, Sector, Z

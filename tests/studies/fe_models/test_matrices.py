@@ -8,7 +8,7 @@ import pytest
 
 from studies.fe_models.deck.read import read_deck
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
-from studies.finite_element.elements.assembly import assemble_stiffness
+from studies.finite_element.solid_mesh import assemble_stiffness
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import SECTOR
 from tests.studies.fe_models.matrix_files import (

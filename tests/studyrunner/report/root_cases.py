@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from studies.finite_element.joint.pairing import ContactPairs
+from studies.finite_element.pairing import ContactPairs
 from studies.scene_answers import SurfaceMesh
 from studies.scenes.dovetail_parameters import Parameters
 from studies.scenes.dovetail_sector import define_sector, describe_mesh

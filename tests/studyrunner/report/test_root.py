@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 
-from studies.finite_element.joint.pairing import build_contact_pairs
-from studies.finite_element.joint.surfaces import describe_mesh as describe_fe_mesh
+from studies.finite_element.pairing import build_contact_pairs
+from studies.finite_element.surfaces import describe_mesh as describe_fe_mesh
 from studyrunner.report.root.contact_faces import face_normals
 from studyrunner.report.root.surface import read_root
 from studyrunner.report.root.views import find_views

@@ -7,19 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.finite_element.joint.closest_point import closest_points
-from studies.finite_element.joint.cut_faces import CyclicAxis
-from studies.finite_element.joint.surfaces import Surface
+from studies.finite_element.closest_points import closest_points
+from studies.finite_element.cut_faces import CyclicAxis
+from studies.finite_element.surfaces import Surface
 from studies.scene_error import SceneError
 
-_TOLERANCE = 0.05  # largest distance of the nodes of a pair over the size of a facet, where none is given
-
+_TOLERANCE = 0.05  # largest distance of the nodes of a pair over the size of a facet, or the root of an area
 _OVERLAP = 0.5
 """Largest overlap of two bodies over the depth of their elements. Interference takes thousandths of it, flat facets on
 curved surfaces hundredths; between both faces of one body it is 1 or more."""
-
 _STRAIGHT = 0.7  # part of the way to the closest point that is along the normal, where the way goes through material
 
 
@@ -70,12 +69,9 @@ class ContactPairs:
     frames (n_contact, 3, 3): rows are unit vectors: normal (out of the moving body, so that motion along it closes the
         pair), first tangent, second tangent.
     present (n_contact, 3): whether a relative displacement exists; the others are held.
-    area (n_contact,): m2.
-    position (n_contact, 3): of the moving node, m.
-    distance (n_contact,): along the normal, positive where the pair is open, m.
-    gap (n_contact,): initial gap, m.
-    surface (n_contact,): number of the pair of surfaces.
-    moving_name, opposite_name: names of the surfaces, for each pair of surfaces.
+    area (n_contact,): m2. position (n_contact, 3): of the moving node, m.
+    distance (n_contact,): along the normal, positive where the pair is open, m. gap (n_contact,): initial gap, m.
+    surface (n_contact,): number of the pair of surfaces. moving_name, opposite_name: of each pair of surfaces.
     """
 
     moving: IntArray
@@ -98,8 +94,10 @@ class ContactPairs:
 
     def chosen(self, which: IntArray | BoolArray) -> ContactPairs:
         """Some of the pairs."""
-        parts = ("moving", "opposite", "sector", "frames", "present", "area", "position", "distance", "gap", "surface")
-        return replace(self, **{name: getattr(self, name)[which] for name in parts})
+        return replace(self, **{name: getattr(self, name)[which] for name in ("opposite", *_ARRAYS)})
+
+
+_ARRAYS = ("moving", "sector", "frames", "present", "area", "position", "distance", "gap", "surface")
 
 
 def build_contact_pairs(
@@ -118,36 +116,101 @@ def build_contact_pairs(
     Raises SceneError where nodes find no point of the other surface, do not face it, or find it behind their own body,
     and where nodes belong to two pairs.
     """
-    parts = [_pair(coordinates, numbers, contact, place, along, axis) for place, contact in enumerate(contacts)]
-    return join_pairs(parts, numbers)
+    parts = []
+    for place, contact in enumerate(contacts):
+        match, used = _find_match(coordinates, numbers, contact, axis)
+        frames = local_frames(match.normals, along)
+        parts.append(_pairs_of(coordinates, used, place, match.weights, match.area, frames, match.distance))
+    return _joined(parts, numbers)
 
 
-def join_pairs(parts: Sequence[ContactPairs], numbers: IntArray) -> ContactPairs:
+def match_nodes(
+    coordinates: FloatArray,
+    numbers: IntArray,
+    contacts: Sequence[ContactSurfaces],
+    given: tuple[FloatArray, FloatArray, FloatArray],
+    axis: CyclicAxis | None,
+) -> ContactPairs:
+    """Pairs of nodes that meet, of reduced matrices, which have no facets.
+
+    As `build_contact_pairs`, of the nodes of the first surface of each contact and the nearest ones of the second.
+    given: areas (n_nodes,), m2, normals (n_nodes, 3), unit vectors out of the body, and initial gaps (n_nodes,), m; NaN
+    where there is none; those of the first surface count. The first tangents are as near to the axis as possible, else
+    to z.
+
+    Raises SceneError where a node has no area or normal, or finds no node that it meets.
+    """
+    along = np.array([0.0, 0.0, 1.0]) if axis is None else axis.axis
+    area, normals, gap = given
+    parts = []
+    for place, contact in enumerate(contacts):
+        nodes, others = contact.first.nodes, contact.second.nodes
+        unknown = nodes[~((area[nodes] > 0.0) & np.isfinite(normals[nodes]).all(axis=1))]
+        if len(unknown):
+            found = f"{len(unknown)} nodes of {contact.first.name} have no area or normal, as node"
+            raise SceneError("contact", f"{found} {numbers[unknown[0]]}", "give both in the table of nodes")
+        there = coordinates if axis is None or not contact.sector else axis.turned(coordinates, contact.sector)
+        apart, nearest = cKDTree(there[others]).query(coordinates[nodes])
+        tolerance = contact.tolerance or _TOLERANCE * float(np.sqrt(area[nodes].min()))
+        far = np.flatnonzero(apart > tolerance)
+        if len(far):
+            turned = " after a turn by one sector" if contact.sector else ""
+            found = (
+                f"{len(far)} of {len(nodes)} nodes of {contact.first.name} are farther than {tolerance:.3g} m from"
+                f" those of {contact.second.name}{turned}, as node {numbers[nodes[far[0]]]}"
+            )
+            raise SceneError("contact", found, "give nodes that meet, node by node, or a larger tolerance")
+        n, opposite = len(nodes), others[nearest]
+        weights = sparse.csr_matrix((np.ones(n), (np.arange(n), opposite)), shape=(n, len(coordinates)))
+        distance = np.einsum("ij,ij->i", there[opposite] - coordinates[nodes], normals[nodes])
+        frames = local_frames(normals[nodes], along)
+        pairs = _pairs_of(coordinates, contact, place, weights, area[nodes], frames, distance)
+        parts.append(replace(pairs, gap=np.where(np.isnan(gap[nodes]), pairs.gap, gap[nodes])))
+    return _joined(parts, numbers)
+
+
+def _pairs_of(
+    coordinates: FloatArray,
+    contact: ContactSurfaces,
+    place: int,
+    weights: sparse.csr_matrix,
+    area: FloatArray,
+    frames: FloatArray,
+    distance: FloatArray,
+) -> ContactPairs:
+    """Pairs of the nodes of the first surface; place: of the contact among all."""
+    n = len(area)
+    gap = distance if contact.with_gaps else np.zeros(n)
+    return ContactPairs(
+        moving=contact.first.nodes,
+        opposite=weights,
+        sector=np.full(n, contact.sector),
+        frames=frames,
+        present=np.ones((n, 3), dtype=np.bool_),
+        area=area,
+        position=coordinates[contact.first.nodes],
+        distance=distance,
+        gap=gap if contact.clearance is None else np.full(n, contact.clearance),
+        surface=np.full(n, place),
+        moving_name=(contact.first.name,),
+        opposite_name=(contact.second.name,),
+    )
+
+
+def _joined(parts: Sequence[ContactPairs], numbers: IntArray) -> ContactPairs:
     """Pairs of several surfaces, one after the other. Raises SceneError where a node moves in two of them."""
     joined = ContactPairs(
-        moving=np.concatenate([part.moving for part in parts]),
         opposite=sparse.vstack([part.opposite for part in parts], format="csr"),
-        sector=np.concatenate([part.sector for part in parts]),
-        frames=np.concatenate([part.frames for part in parts]),
-        present=np.concatenate([part.present for part in parts]),
-        area=np.concatenate([part.area for part in parts]),
-        position=np.concatenate([part.position for part in parts]),
-        distance=np.concatenate([part.distance for part in parts]),
-        gap=np.concatenate([part.gap for part in parts]),
-        surface=np.concatenate([part.surface for part in parts]),
         moving_name=tuple(name for part in parts for name in part.moving_name),
         opposite_name=tuple(name for part in parts for name in part.opposite_name),
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS},
     )
     unique, count = np.unique(joined.moving, return_counts=True)
-    if (count > 1).any():
-        twice = unique[count > 1]
-        both = joined.surface[joined.moving == twice[0]]
-        names = " and ".join(joined.moving_name[place] for place in both)
-        raise SceneError(
-            "contact",
-            f"{len(twice)} nodes move in two pairs, in {names}, as node {numbers[twice[0]]}",
-            "take them out of one of the surfaces",
-        )
+    twice = unique[count > 1]
+    if len(twice):
+        names = " and ".join(joined.moving_name[place] for place in joined.surface[joined.moving == twice[0]])
+        found = f"{len(twice)} nodes move in two pairs, in {names}, as node {numbers[twice[0]]}"
+        raise SceneError("contact", found, "take them out of one of the surfaces")
     return joined
 
 
@@ -175,8 +238,6 @@ class _Match:
     elements below node or point, the smaller one, m.
     """
 
-    moving: Surface
-    opposite: Surface
     weights: sparse.csr_matrix
     area: FloatArray
     normals: FloatArray
@@ -186,8 +247,13 @@ class _Match:
     depth: FloatArray
 
 
-def _match(coordinates: FloatArray, moving: Surface, opposite: Surface, there: FloatArray) -> _Match:
-    """Closest points. there (n_nodes, 3): coordinates in the sector of the opposite surface, m."""
+def _match(coordinates: FloatArray, contact: ContactSurfaces, axis: CyclicAxis | None) -> _Match:
+    """The first surface, which moves, and the second one where its sector has it."""
+    moving, opposite, there = contact.first, contact.second, coordinates
+    if contact.sector:
+        if axis is None:
+            raise ValueError("a contact between sectors needs the axis of the cyclic structure")
+        there = axis.turned(coordinates, contact.sector)
     found = closest_points(coordinates[moving.nodes], opposite, there)
     area, normals = moving.areas_and_normals(coordinates)
     point, corner = np.nonzero(found.weights)
@@ -198,8 +264,6 @@ def _match(coordinates: FloatArray, moving: Surface, opposite: Surface, there: F
     depth[opposite.nodes] = opposite.depth
     offset = weights @ there - coordinates[moving.nodes]
     return _Match(
-        moving=moving,
-        opposite=opposite,
         weights=weights,
         area=area,
         normals=normals,
@@ -210,100 +274,63 @@ def _match(coordinates: FloatArray, moving: Surface, opposite: Surface, there: F
     )
 
 
-def _check_match(match: _Match, numbers: IntArray, facet: float, sector: int) -> None:
+def _check_match(match: _Match, contact: ContactSurfaces, numbers: IntArray, facet: float) -> None:
     """Raises SceneError where no tolerance makes pairs of these nodes. facet: size of the larger facets, m."""
-    turned = " after a turn by one sector" if sector else ""
-    names, n = (match.moving.name, match.opposite.name), len(match.apart)
+    turned = " after a turn by one sector" if contact.sector else ""
+    moving, opposite, n = contact.first.name, contact.second.name, len(match.apart)
     if (match.facing > 0.0).all():
-        raise SceneError("contact", f"{names[0]} and {names[1]} face the same way", "give faces that touch")
+        raise SceneError("contact", f"{moving} and {opposite} face the same way", "give faces that touch")
     inside = (match.distance < -_OVERLAP * match.depth) & (match.distance < -_STRAIGHT * match.apart)
     if inside.any():
         deepest = np.argmin(match.distance)
-        raise SceneError(
-            "contact",
-            f"between {names[0]} and {names[1]} there is material: at {inside.sum()} of {n} nodes {names[1]} is up to"
-            f" {-match.distance[deepest]:.3g} m below {names[0]}, whose elements are {match.depth[deepest]:.3g} m deep",
-            "give two surfaces that face each other in the same sector, or name them in next_sector",
+        found = (
+            f"between {moving} and {opposite} there is material: at {inside.sum()} of {n} nodes {opposite} is up to"
+            f" {-match.distance[deepest]:.3g} m below {moving}, whose elements are {match.depth[deepest]:.3g} m deep"
         )
+        remedy = "give two surfaces that face each other in the same sector, or name them in next_sector"
+        raise SceneError("contact", found, remedy)
     away = match.apart > facet
     if away.any():
-        raise SceneError(
-            "contact",
-            f"{away.sum()} of {n} nodes of {names[0]} are farther from {names[1]} than a facet ({facet:.3g} m);"
-            f" the farthest is at {match.apart.max():.3g} m{turned}",
-            f"give surfaces that touch{turned}, one of which covers the other: a larger tolerance is no remedy",
+        found = (
+            f"{away.sum()} of {n} nodes of {moving} are farther from {opposite} than a facet ({facet:.3g} m);"
+            f" the farthest is at {match.apart.max():.3g} m{turned}"
         )
+        remedy = f"give surfaces that touch{turned}, one of which covers the other: a larger tolerance is no remedy"
+        raise SceneError("contact", found, remedy)
     aside = np.flatnonzero(match.facing > 0.0)
     if len(aside):
-        node = numbers[match.moving.nodes[aside[0]]]
-        found = f"{len(aside)} of {n} nodes of {names[0]} do not face {names[1]}, as node {node}"
-        raise SceneError("contact", found, "leave them out of the surface")
+        found = f"{len(aside)} of {n} nodes of {moving} do not face {opposite}, as node"
+        remedy = "leave them out of the surface"
+        raise SceneError("contact", f"{found} {numbers[contact.first.nodes[aside[0]]]}", remedy)
 
 
-def initial_gaps(contact: ContactSurfaces, distance: FloatArray) -> FloatArray:
-    """Initial gaps (n,), m: the clearance that the model states, the distances of the mesh (n,), or none."""
-    if contact.clearance is not None:
-        return np.full_like(distance, contact.clearance)
-    return distance if contact.with_gaps else np.zeros_like(distance)
-
-
-def _matched(coordinates: FloatArray, contact: ContactSurfaces, axis: CyclicAxis | None) -> _Match:
-    """The first surface of a contact, which moves, and the second one where its sector has it."""
-    if contact.sector == 0:
-        return _match(coordinates, contact.first, contact.second, coordinates)
-    if axis is None:
-        raise ValueError("a contact between sectors needs the axis of the cyclic structure")
-    return _match(coordinates, contact.first, contact.second, axis.turned(coordinates, contact.sector))
-
-
-def _pair(
-    coordinates: FloatArray,
-    numbers: IntArray,
-    contact: ContactSurfaces,
-    place: int,
-    along: FloatArray,
-    axis: CyclicAxis | None,
-) -> ContactPairs:
+def _find_match(
+    coordinates: FloatArray, numbers: IntArray, contact: ContactSurfaces, axis: CyclicAxis | None
+) -> tuple[_Match, ContactSurfaces]:
+    """Pairs of a contact, and the contact with the surface whose nodes move first."""
     first, second = contact.first, contact.second
     shared = np.intersect1d(first.nodes, second.nodes)
     if len(shared):
-        raise SceneError(
-            "contact",
-            f"{first.name} and {second.name} share {len(shared)} nodes",
-            "give the two bodies nodes of their own where they touch",
-        )
+        found = f"{first.name} and {second.name} share {len(shared)} nodes"
+        raise SceneError("contact", found, "give the two bodies nodes of their own where they touch")
     sizes = first.facet_size(coordinates), second.facet_size(coordinates)
     if sizes[1] < (1.0 - 1e-6) * sizes[0]:
         contact = contact.turned_round
     tolerance = _TOLERANCE * max(sizes) if contact.tolerance is None else contact.tolerance
-    match = _matched(coordinates, contact, axis)
+    match = _match(coordinates, contact, axis)
     far = match.apart > tolerance
     if far.any():
         # a coarse surface may lie inside a finer one that goes on
-        other = _matched(coordinates, contact.turned_round, axis)
+        other = _match(coordinates, contact.turned_round, axis)
         if (other.apart > tolerance).any():
-            _check_match(match, numbers, max(sizes), contact.sector)
-            raise SceneError(
-                "contact",
-                f"{np.count_nonzero(far)} of {len(far)} nodes of {match.moving.name} are farther than {tolerance:g} m"
-                f" from {match.opposite.name}",
+            _check_match(match, contact, numbers, max(sizes))
+            count = f"{np.count_nonzero(far)} of {len(far)} nodes of {contact.first.name}"
+            found = f"{count} are farther than {tolerance:g} m from {contact.second.name}"
+            remedy = (
                 f"give a larger tolerance (the farthest is at {match.apart.max():.3g} m), or surfaces of which one"
-                " covers the other",
+                " covers the other"
             )
+            raise SceneError("contact", found, remedy)
         match, contact = other, contact.turned_round
-    _check_match(match, numbers, max(sizes), contact.sector)
-    nodes, n = match.moving.nodes, len(match.area)
-    return ContactPairs(
-        moving=nodes,
-        opposite=match.weights,
-        sector=np.full(n, contact.sector),
-        frames=local_frames(match.normals, along),
-        present=np.ones((n, 3), dtype=np.bool_),
-        area=match.area,
-        position=coordinates[nodes],
-        distance=match.distance,
-        gap=initial_gaps(contact, match.distance),
-        surface=np.full(n, place),
-        moving_name=(match.moving.name,),
-        opposite_name=(match.opposite.name,),
-    )
+    _check_match(match, contact, numbers, max(sizes))
+    return match, contact

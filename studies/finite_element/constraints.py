@@ -10,8 +10,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.finite_element.joint.cut_faces import CutFaces
-from studies.finite_element.joint.pairing import ContactPairs, ContactSurfaces
+from studies.finite_element.cut_faces import CutFaces
+from studies.finite_element.pairing import ContactPairs, ContactSurfaces
 from studies.scene_error import SceneError
 
 _LONGEST_CHAIN = 100  # displacements that depend on others that depend on others

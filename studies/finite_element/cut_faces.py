@@ -17,6 +17,13 @@ _ANGLE = 0.02  # of a sector, by which the cut faces may be apart more or less b
 _EXTENT = 1e-6  # the same over the extent of the mesh, where all faces are looked through
 
 
+def turn_about(axis: FloatArray, angle: float) -> FloatArray:
+    """Rotation (3, 3) about a unit vector (3,) by an angle in rad (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross))
+
+
 @dataclass(frozen=True)
 class CyclicAxis:
     """n_sectors: in the whole. point (3,): on the axis, m. axis (3,): unit vector."""
@@ -26,10 +33,8 @@ class CyclicAxis:
     axis: FloatArray
 
     def turn(self, angle: float) -> FloatArray:
-        """Rotation (3, 3) by an angle in rad (Rodrigues)."""
-        x, y, z = self.axis
-        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross))
+        """Rotation (3, 3) by an angle in rad."""
+        return turn_about(self.axis, angle)
 
     def turned(self, points: FloatArray, sectors: int) -> FloatArray:
         """Points (n, 3), m, turned by a number of sectors about the axis, against the clock as seen from its end."""
@@ -102,12 +107,9 @@ def match_cut_faces(
     apart = _mean_angle(cylinder[second]) - _mean_angle(cylinder[first])
     apart = (apart + np.pi) % (2.0 * np.pi) - np.pi
     if axis.n_sectors > 2 and abs(abs(apart) - angle) > _ANGLE * angle:
-        raise SceneError(
-            "n_sectors",
-            f"cut faces are {abs(np.degrees(apart)):.4g} degrees apart, {axis.n_sectors} sectors need"
-            f" {np.degrees(angle):.4g}",
-            "give the number of sectors and the axis of the mesh",
-        )
+        found = f"cut faces are {abs(np.degrees(apart)):.4g} degrees apart, {axis.n_sectors} sectors need"
+        remedy = "give the number of sectors and the axis of the mesh"
+        raise SceneError("n_sectors", f"{found} {np.degrees(angle):.4g}", remedy)
     left, right = (first, second) if apart > 0.0 else (second, first)
     tree = cKDTree(coordinates[left])
     spacing = tree.query(coordinates[left], k=2)[0][:, 1]
@@ -117,11 +119,8 @@ def match_cut_faces(
     for lonely, other in ((lonely_left, right), (lonely_right, left)):
         if len(lonely):
             some = ", ".join(str(number) for number in numbers[lonely[:5]]) + (", ..." if len(lonely) > 5 else "")
-            raise SceneError(
-                "cut_faces",
-                f"{len(lonely)} nodes of one cut face have no image among the {len(other)} of the other: {some}",
-                "mesh both cut faces alike, and give all their nodes",
-            )
+            found = f"{len(lonely)} nodes of one cut face have no image among the {len(other)} of the other: {some}"
+            raise SceneError("cut_faces", found, "mesh both cut faces alike, and give all their nodes")
     _no_node_on_axis(left, image, numbers)
     return CutFaces(axis, left, image)
 
@@ -140,12 +139,9 @@ def find_cut_faces(
     found = _images(coordinates, numbers, bodies, axis, elsewhere, elsewhere, _EXTENT * extent)
     left, image = elsewhere[found >= 0], found[found >= 0]
     if len(left) == 0 and len(in_contact) == 0:
-        raise SceneError(
-            "n_sectors",
-            f"no node has an image under rotation by {360.0 / axis.n_sectors:.4g} degrees, one of {axis.n_sectors}"
-            " sectors",
-            "give the number of sectors and the axis of the mesh, or the sets of both cut faces",
-        )
+        none = f"no node has an image under rotation by {360.0 / axis.n_sectors:.4g} degrees, one of"
+        remedy = "give the number of sectors and the axis of the mesh, or the sets of both cut faces"
+        raise SceneError("n_sectors", f"{none} {axis.n_sectors} sectors", remedy)
     _no_node_on_axis(left, image, numbers)
     return CutFaces(axis, left, image)
 
@@ -167,12 +163,9 @@ def _images(
         if len(candidates) > 1:
             candidates = candidates[bodies[candidates] == bodies[left[place]]]
         if len(candidates) > 1:
-            raise SceneError(
-                "cut_faces",
-                f"node {numbers[left[place]]} has {len(candidates)} images on the other cut face, as nodes"
-                f" {numbers[candidates[0]]} and {numbers[candidates[1]]}",
-                "merge nodes of one body that coincide",
-            )
+            one, other = numbers[candidates[:2]]
+            several = f"node {numbers[left[place]]} has {len(candidates)} images on the other cut face, as nodes"
+            raise SceneError("cut_faces", f"{several} {one} and {other}", "merge nodes of one body that coincide")
         if len(candidates) == 1:
             image[place] = candidates[0]
     return image
@@ -187,8 +180,5 @@ def _mean_angle(cylinder: FloatArray) -> float:
 def _no_node_on_axis(left: IntArray, right: IntArray, numbers: IntArray) -> None:
     both = np.intersect1d(left, right)
     if len(both):
-        raise SceneError(
-            "cut_faces",
-            f"{len(both)} nodes are on both cut faces, as node {numbers[both[0]]}",
-            "a sector must not reach the axis, nor be the whole ring",
-        )
+        found = f"{len(both)} nodes are on both cut faces, as node {numbers[both[0]]}"
+        raise SceneError("cut_faces", found, "a sector must not reach the axis, nor be the whole ring")

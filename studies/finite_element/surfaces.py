@@ -12,10 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from solver.model import FloatArray, IntArray
-from studies.finite_element.elements.hex_element import CORNERS
-from studies.finite_element.elements.kinds import ELEMENT_KINDS
-from studies.finite_element.elements.reference_element import HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
-from studies.finite_element.elements.solid_mesh import SolidMesh
+from studies.finite_element.elements import CORNERS, ELEMENT_KINDS, HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
+from studies.finite_element.solid_mesh import SolidMesh
 from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
 
@@ -40,26 +38,20 @@ class FaceShape:
 
     def values(self, places: FloatArray) -> FloatArray:
         """Shape functions (n, n_nodes) at places (n, 2) of the face."""
-        return self.element.values(self._points(places))[:, list(self.nodes)]
+        return self.element.values(np.column_stack([places, np.full(len(places), self.height)]))[:, list(self.nodes)]
 
     def derivatives(self, places: FloatArray) -> FloatArray:
         """Their derivatives (n, n_nodes, 2)."""
-        return self.element.derivatives(self._points(places))[:, list(self.nodes), :2]
-
-    def _points(self, places: FloatArray) -> FloatArray:
-        return np.column_stack([places, np.full(len(places), self.height)])
+        points = np.column_stack([places, np.full(len(places), self.height)])
+        return self.element.derivatives(points)[:, list(self.nodes), :2]
 
 
+_QUADRATIC = ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7))
 FACE_SHAPES = {
     3: FaceShape(TET_4, (0, 1, 2), 0.0, ((0, 1, 2),)),
     4: FaceShape(HEX_8, (0, 1, 2, 3), -1.0, ((0, 1, 2, 3),)),
     6: FaceShape(TET_10, (0, 1, 2, 4, 5, 6), 0.0, ((0, 3, 5), (1, 4, 3), (2, 5, 4), (3, 4, 5))),
-    8: FaceShape(
-        HEX_20,
-        (0, 1, 2, 3, 8, 9, 10, 11),
-        -1.0,
-        ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6, 7)),
-    ),
+    8: FaceShape(HEX_20, (0, 1, 2, 3, 8, 9, 10, 11), -1.0, _QUADRATIC),
 }
 """Element faces by their number of nodes."""
 
@@ -67,11 +59,10 @@ _QUAD_POINTS = CORNERS[:4, :2] / np.sqrt(3.0)
 _GAUSS = np.polynomial.legendre.leggauss(3)
 _QUAD_RULE = np.stack(np.meshgrid(_GAUSS[0], _GAUSS[0]), axis=-1).reshape(-1, 2), np.outer(_GAUSS[1], _GAUSS[1]).ravel()
 # of the square, its side eta = 1 drawn together to a corner: exact to the fourth degree
+_XI, _ETA = _QUAD_RULE[0].T
 _TRIANGLE_RULE = (
-    np.stack(
-        [(1.0 + _QUAD_RULE[0][:, 0]) * (1.0 - _QUAD_RULE[0][:, 1]) / 4.0, (1.0 + _QUAD_RULE[0][:, 1]) / 2.0], axis=1
-    ),
-    _QUAD_RULE[1] * (1.0 - _QUAD_RULE[0][:, 1]) / 8.0,
+    np.stack([(1.0 + _XI) * (1.0 - _ETA) / 4.0, (1.0 + _ETA) / 2.0], axis=1),
+    _QUAD_RULE[1] * (1.0 - _ETA) / 8.0,
 )
 _THIRDS = np.full(3, 1.0 / 3.0)
 
@@ -127,28 +118,14 @@ class Surface:
         np.add.at(area, self.quads, np.linalg.norm(vectors, axis=2) @ values)
         sizes = np.linalg.norm(normal[self.nodes], axis=1)
         if not (sizes > 1e-6 * area[self.nodes]).all():
-            raise SceneError(
-                "contact", f"surface {self.name} folds back on itself", "give a smooth surface of one body"
-            )
+            found = f"surface {self.name} folds back on itself"
+            raise SceneError("contact", found, "give a smooth surface of one body")
         return area[self.nodes], normal[self.nodes] / sizes[:, None]
 
     def facet_size(self, coordinates: FloatArray) -> float:
         """Typical size of a facet, m: root of the mean area."""
         area, _ = self.areas_and_normals(coordinates)
         return float(np.sqrt(area.sum() / (len(self.triangles) + len(self.quads))))
-
-
-@dataclass(frozen=True)
-class OuterFaces:
-    """Faces of a mesh that belong to one element only.
-
-    loops: nodes of each face, corners anticlockwise from outside, then mid-side nodes. elements: all nodes of its
-    element. parts: label of its body.
-    """
-
-    loops: tuple[IntArray, ...]
-    elements: tuple[IntArray, ...]
-    parts: tuple[str, ...]
 
 
 def surface_of_faces(mesh: SolidMesh, name: str, elements: IntArray, faces: IntArray) -> Surface:
@@ -177,16 +154,12 @@ def loops_of_faces(
         left &= ~own
         for chosen in np.flatnonzero(own):
             if not 1 <= faces[chosen] <= len(table):
-                raise SceneError(
-                    "contact",
-                    f"surface {name} names face S{faces[chosen]} of element {elements[chosen]} ({group.kind})",
-                    f"give faces S1 to S{len(table)}",
-                )
+                found = f"surface {name} names face S{faces[chosen]} of element {elements[chosen]} ({group.kind})"
+                raise SceneError("contact", found, f"give faces S1 to S{len(table)}")
             behind.append(group.nodes[order[place[chosen]]])
             loops.append(behind[-1][list(table[faces[chosen] - 1])])
     if left.any():
-        number = elements[left][0]
-        raise SceneError("contact", f"surface {name} names element {number}", "there is no such element")
+        raise SceneError("contact", f"surface {name} names element {elements[left][0]}", "there is no such element")
     return loops, behind
 
 
@@ -209,19 +182,15 @@ def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
     """
     inside = np.zeros(mesh.n_nodes, dtype=np.bool_)
     inside[nodes] = True
-    outer = outer_faces(mesh)
-    chosen = [place for place, loop in enumerate(outer.loops) if inside[loop].all()]
-    surface = _surface(
-        mesh, name, [outer.loops[place] for place in chosen], [outer.elements[place] for place in chosen]
-    )
+    chosen = [(loop, element) for loop, element, _ in outer_faces(mesh) if inside[loop].all()]
+    surface = _surface(mesh, name, [loop for loop, _ in chosen], [element for _, element in chosen])
     lonely = np.setdiff1d(nodes, surface.nodes)
     if len(lonely):
-        raise SceneError(
-            "contact",
-            f"{len(lonely)} of {len(nodes)} nodes of {name} belong to no face whose nodes are all in the set,"
-            f" as node {mesh.numbers[lonely[0]]}",
-            "give a surface of element faces, or a set of the nodes of whole faces",
+        found = (
+            f"{len(lonely)} of {len(nodes)} nodes of {name} belong to no face whose nodes are all in the set, as node"
         )
+        remedy = "give a surface of element faces, or a set of the nodes of whole faces"
+        raise SceneError("contact", f"{found} {mesh.numbers[lonely[0]]}", remedy)
     return surface
 
 
@@ -232,33 +201,29 @@ def surface_of_points(name: str, nodes: IntArray) -> Surface:
     return Surface(name, np.tile(nodes[:, None], 3), none, np.full((n, 8), -1), np.zeros((n, 4, 2)), np.zeros(n))
 
 
-def outer_faces(mesh: SolidMesh) -> OuterFaces:
-    """All outer faces of a mesh."""
-    loops: list[IntArray] = []
-    elements: list[IntArray] = []
+def outer_faces(mesh: SolidMesh) -> list[tuple[IntArray, IntArray, str]]:
+    """Faces of one element only: nodes, corners anticlockwise from outside; all nodes of the element; its part."""
+    faces: list[tuple[IntArray, IntArray, str]] = []
     keys: list[IntArray] = []
-    parts: list[str] = []
     for group in mesh.groups:
         for face in ELEMENT_KINDS[group.kind].faces:
             nodes = group.nodes[:, list(face)]
             n_corners = 3 if len(face) in (3, 6) else 4
             key = np.full((len(nodes), 4), -1)
             key[:, :n_corners] = nodes[:, :n_corners]
-            loops += list(nodes)
-            elements += list(group.nodes)
+            faces += [(loop, element, group.part) for loop, element in zip(nodes, group.nodes, strict=True)]
             keys.append(np.sort(key, axis=1))
-            parts += [group.part] * len(nodes)
     _, first, count = np.unique(np.concatenate(keys), axis=0, return_index=True, return_counts=True)
-    outer = np.sort(first[count == 1])
-    return OuterFaces(*(tuple(each[place] for place in outer) for each in (loops, elements, parts)))
+    return [faces[place] for place in np.sort(first[count == 1])]
 
 
 def describe_mesh(mesh: SolidMesh) -> SurfaceMesh:
     """Outer faces of a mesh by their corners, for pictures; triangles repeat their last corner."""
     outer = outer_faces(mesh)
-    corners = np.array([loop[[0, 1, 2, 2] if len(loop) in (3, 6) else [0, 1, 2, 3]] for loop in outer.loops])
+    corners = np.array([loop[[0, 1, 2, 2] if len(loop) in (3, 6) else [0, 1, 2, 3]] for loop, _, _ in outer])
     used, quads = np.unique(corners, return_inverse=True)
-    return SurfaceMesh(nodes=mesh.coordinates[used], quads=quads.reshape(corners.shape), parts=outer.parts)
+    parts = tuple(part for _, _, part in outer)
+    return SurfaceMesh(nodes=mesh.coordinates[used], quads=quads.reshape(corners.shape), parts=parts)
 
 
 def _surface(mesh: SolidMesh, name: str, loops: list[IntArray], behind: list[IntArray]) -> Surface:

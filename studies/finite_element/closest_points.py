@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.model import FloatArray, IntArray
-from studies.finite_element.joint.surfaces import FACE_SHAPES, Surface, quad_derivatives, quad_values
+from studies.finite_element.surfaces import FACE_SHAPES, Surface, quad_derivatives, quad_values
 
 _CHUNK = 2_000_000  # distances from nodes to facets looked at together
 _NEWTON_STEPS = 8
@@ -17,10 +17,9 @@ _FACE_STEPS = 6
 
 @dataclass(frozen=True)
 class ClosestPoints:
-    """Of some points on a surface.
+    """nodes, weights (n_points, 8): of the element face and the values of its shape functions, -1 and 0 after the last.
 
-    nodes, weights (n_points, 8): of the element face and the values of its shape functions, which sum to 1; -1 and 0
-    after the last. distance (n_points,): to the linear facets, m.
+    distance (n_points,): to the linear facets, m.
     """
 
     nodes: IntArray

@@ -1,1 +1,0 @@
-"""Static condensation of sparse structures: nested dissection, elimination in dense blocks, projection, modes."""

@@ -1,1 +1,0 @@
-"""Solid elements of CalculiX and Abaqus: shape functions, faces, matrices, all elements of a kind at once."""

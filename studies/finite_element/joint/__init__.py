@@ -1,1 +1,0 @@
-"""From an unstructured mesh to a reduced model: surfaces, contact pairs, cut faces, reduction."""

@@ -1,0 +1,158 @@
+"""Craig-Bampton reduction of a structure to relative displacements of its pairs and modes with the pairs glued.
+
+The static shapes of the relative displacements, and the lowest modes of the glued structure, are the coordinates: the
+stiffness couples no mode with a shape. One factorisation of the glued stiffness at a nodal diameter gives both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import eigh, qr
+
+from solver.model import FloatArray, Matrix
+from studies.finite_element.elimination import Factor, factorise
+from studies.finite_element.structure import Coordinates, Structure
+
+_COLUMNS = 64  # vectors solved for at a time
+_BLOCK = 8  # modes are looked for with so many vectors at a time
+_SMALL = 400  # displacements of a structure whose modes are found by dense matrices
+_STIFF = 1e-11  # flexibility of a mode that is round-off of the largest one, as of a singular mass
+_DEPENDENT = 1e-12  # of a block: what is left of it where it depends on those before
+_SAME, _ROUND_OFF = 1e-11, 1e-14  # change of a flexibility that is none, over itself and over the largest one
+
+
+@dataclass(frozen=True)
+class ReducedStructure:
+    """A structure in the coordinates [relative displacements | stuck modes], `n` of them, at one nodal diameter.
+
+    frequencies (n_modes,): of the glued structure, rad/s, ascending; modes have unit modal mass. forms: Hermitian
+    matrices (n, n) by name, with "stiffness" and "mass". vectors (n, n_vectors): generalised forces.
+    """
+
+    frequencies: FloatArray
+    forms: Mapping[str, Matrix]
+    vectors: Matrix
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """Forms of a structure that can be reduced at any nodal diameter in 0..n_sectors // 2.
+
+    forms: matrices (3 n_nodes, 3 n_nodes), symmetric and unconstrained, by name, with "stiffness" and "mass".
+    positions (n_nodes, n_directions): of the nodes, for the order of elimination.
+
+    All methods raise NotPositiveDefiniteError where the glued structure is not held, or unstable.
+    """
+
+    structure: Structure
+    forms: Mapping[str, sparse.csr_matrix]
+    positions: FloatArray
+
+    def solve_static(self, load: FloatArray) -> FloatArray:
+        """Displacements (3 n_nodes,), m, of the glued structure at nodal diameter 0 under a load (3 n_nodes,), N."""
+        coordinates = self.structure.coordinates(0)
+        _, factor = self._factorise(coordinates)
+        glued = coordinates.glued
+        return np.asarray(glued @ factor.solve((glued.T @ load)[:, None])[:, 0])
+
+    def frequencies(self, nodal_diameter: int, n_modes: int) -> FloatArray:
+        """Lowest natural frequencies (n_modes,) of the glued structure, rad/s, ascending."""
+        coordinates = self.structure.coordinates(nodal_diameter)
+        stiffness, factor = self._factorise(coordinates)
+        return _lowest_modes(stiffness, _on(coordinates.glued, self.forms["mass"]), factor, n_modes)[0]
+
+    def _factorise(self, coordinates: Coordinates) -> tuple[sparse.csr_matrix, Factor]:
+        """Stiffness with the pairs glued, and its factors."""
+        stiffness = _on(coordinates.glued, self.forms["stiffness"])
+        return stiffness, factorise(stiffness, coordinates.node, self.positions)
+
+    def reduce(self, nodal_diameter: int, n_modes: int, vectors: FloatArray) -> ReducedStructure:
+        """The structure at a nodal diameter.
+
+        n_modes: stuck modes, at least 1; there are fewer where the structure has fewer. vectors (3 n_nodes, n_vectors):
+        nodal forces.
+        """
+        coordinates = self.structure.coordinates(nodal_diameter)
+        glued, relative = coordinates.glued, coordinates.relative
+        stiffness, factor = self._factorise(coordinates)
+        shapes = _static_shapes(coordinates, self.forms["stiffness"], factor)
+        frequencies, modes = _lowest_modes(stiffness, _on(glued, self.forms["mass"]), factor, n_modes)
+        moved = glued @ modes
+        forms = {}
+        for name, form in self.forms.items():
+            if name == "stiffness":
+                own = relative.conj().T @ np.concatenate([form @ shapes[:, part] for part in _parts(shapes)], axis=1)
+                coupling, modal = np.zeros((len(own), len(frequencies))), np.diag(frequencies**2)
+            else:
+                inertia, adjoint = form @ moved, shapes.conj().T
+                own = np.concatenate([adjoint @ (form @ shapes[:, part]) for part in _parts(shapes)], axis=1)
+                coupling = adjoint @ inertia
+                modal = np.eye(len(frequencies)) if name == "mass" else moved.conj().T @ inertia
+            whole = np.block([[own, coupling], [coupling.conj().T, modal]])
+            forms[name] = np.asarray(0.5 * (whole + whole.conj().T))
+        generalised = np.concatenate([shapes.conj().T @ vectors, moved.conj().T @ vectors])
+        return ReducedStructure(frequencies, forms, generalised)
+
+
+def _on(coordinates: sparse.csr_matrix, form: sparse.csr_matrix) -> sparse.csr_matrix:
+    return (coordinates.conj().T @ form @ coordinates).tocsr()
+
+
+def _parts(columns: Matrix) -> Iterator[slice]:
+    for first in range(0, columns.shape[1], _COLUMNS):
+        yield slice(first, first + _COLUMNS)
+
+
+def _static_shapes(coordinates: Coordinates, stiffness: sparse.csr_matrix, factor: Factor) -> Matrix:
+    """Displacements (3 n_nodes, n_relative) under unit relative displacements, with no force elsewhere."""
+    glued, relative = coordinates.glued, coordinates.relative
+    forces = (glued.conj().T @ stiffness @ relative).tocsc()
+    shapes = np.empty(relative.shape, dtype=forces.dtype)
+    for part in _parts(shapes):
+        shapes[:, part] = relative[:, part].toarray() - glued @ factor.solve(forces[:, part].toarray())
+    return shapes
+
+
+def _lowest_modes(
+    stiffness: sparse.csr_matrix, mass: sparse.csr_matrix, factor: Factor, n_modes: int
+) -> tuple[FloatArray, Matrix]:
+    """Frequencies (n_modes,), rad/s, ascending, and modes (n, n_modes) of unit modal mass; fewer where there are fewer.
+
+    Of `M x = K x / omega^2`, as the mass may be singular, in a growing space of vectors `(K^-1 M)^j x`, x random
+    (block Lanczos). A random vector sees each mode as real and positive.
+    """
+    n, random = stiffness.shape[0], np.random.default_rng(0)
+    small = n <= max(_SMALL, 4 * n_modes)
+    block = np.eye(n) if small else random.standard_normal((n, _BLOCK)).astype(stiffness.dtype)
+    basis = np.zeros((n, 0), dtype=stiffness.dtype)
+    known = np.zeros(0)
+    while True:
+        if not small:
+            block = _orthonormal(factor.solve(mass @ block), basis)
+        basis = np.concatenate([basis, block], axis=1)
+        values, vectors = eigh(basis.conj().T @ (mass @ basis), basis.conj().T @ (stiffness @ basis))
+        found = np.flatnonzero(values > _STIFF * values[-1])[::-1][:n_modes]
+        if small or block.shape[1] == 0 or (len(known) == len(found) and _agree(values[found], known)):
+            break
+        known = values[found]
+    modes = (basis @ vectors[:, found]) / np.sqrt(values[found])
+    seen = random.standard_normal(n) @ modes
+    return 1.0 / np.sqrt(values[found]), modes * (seen.conj() / np.abs(seen))
+
+
+def _agree(values: FloatArray, known: FloatArray) -> bool:
+    return bool((np.abs(values - known) <= _SAME * known + _ROUND_OFF * known[0]).all())
+
+
+def _orthonormal(block: Matrix, basis: Matrix) -> Matrix:
+    """What is new in vectors (n, n_columns) beside an orthonormal basis: twice, for round-off, which is left out."""
+    scale = float(np.linalg.norm(block))
+    for _ in range(2):
+        block = block - basis @ (basis.conj().T @ block)
+        block, sizes, _ = qr(block, mode="economic", pivoting=True, check_finite=False)
+        block, scale = block[:, np.abs(np.diag(sizes)) > _DEPENDENT * scale], 1.0
+    return block
