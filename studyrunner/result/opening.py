@@ -46,6 +46,7 @@ _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
 _INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", *CERTIFICATE)
 """Ends of the names of variables that may be infinite: errors that are not known, what comes after any cycle."""
+_ATTRIBUTES = ("units", "long_name", "flag_meanings", "sentences", "flag_values")  # of variables, for the report
 _LONGEST_NAME, _LONGEST_SENTENCE = 120, 400
 _REMEDY = "give a result file of run-study that is whole"
 
@@ -171,7 +172,7 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
         raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
     checked.attrs = _cleaned(checked.attrs)
     for variable in checked.variables.values():
-        variable.attrs = _cleaned(variable.attrs)
+        variable.attrs = _cleaned({name: variable.attrs[name] for name in _ATTRIBUTES if name in variable.attrs})
     checked.set_close(dataset.close)
     study_tables(checked.attrs, source)
     return checked
