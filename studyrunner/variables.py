@@ -102,7 +102,6 @@ ASKED = {
     ),
     "harmonics_used": Variable(_CYCLE, "1", "harmonics above the static one in the state", "int32"),
     "samples_used": Variable(_CYCLE, "1", "time samples in a period of the state", "int32"),
-    "stable": Variable(_CYCLE, "1", "whether the periodic state is stable", "int8", ("unstable", "stable")),
 }
 """Those that `outputs.variables` asks for, in the order of the file."""
 

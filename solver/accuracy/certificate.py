@@ -59,7 +59,6 @@ class Certificate:
     energy_error: over the largest work in a period.
     periodicity_error: change of the tangential state over the largest friction limit.
     response_error, wear_rate_error: estimated relative truncation errors, NaN where not estimated.
-    stable: whether small disturbances die out.
     """
 
     residual: float
@@ -70,7 +69,6 @@ class Certificate:
     periodicity_error: float
     response_error: float = float("nan")
     wear_rate_error: float = float("nan")
-    stable: bool = True
 
     def failures(self, tolerance: float) -> dict[str, tuple[float, float]]:
         """Value and limit of each violation above its limit; NaN counts as such. tolerance: of the scaled residual."""

@@ -31,7 +31,7 @@ SHORTEST_ARC = CORNER_ARC / 10.0
 
 ARC_WANDER = 2.0
 """Distance of a corrector from its start over the length of the step, above which the corrector is given up. Without it
-the branch of `tests/solver/test_natural.py` is left for another one."""
+the branch of `tests/solver/test_whole_response.py` is left for another one."""
 
 
 FOLD_HALVINGS = 10

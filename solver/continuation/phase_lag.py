@@ -7,8 +7,6 @@ grows with the motion, and the further equation is
 
     sin(arg(F^H x) + lag) = 0.
 
-The wear depth is eliminated in the Jacobian, so that its change with the frequency is part of the step.
-
 At the largest amplitude of the first response, in its first harmonic, the rise of the amplitude with the lag is zero; a
 secant finds this lag. For a linear oscillator of one degree of freedom with the damping ratio zeta the frequency is
 then omega_0 sqrt(1 - 2 zeta^2), in phase resonance omega_0.
@@ -62,8 +60,8 @@ def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
 class AtLag:
     """The problem: a balance, with fixed or with growing wear depths, whose frequency follows from its lag.
 
-    case: of the joint of the balance. balance: at some frequency. lag: rad, between 0 and pi. `Bordered.reduced` is the
-    change of the lag with the frequency along the states, s/rad.
+    balance: at some frequency. lag: rad, between 0 and pi. `Bordered.reduced`: change of the lag with the frequency
+    along the states, s/rad.
     """
 
     case: Case

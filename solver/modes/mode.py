@@ -18,11 +18,10 @@ import numpy as np
 from solver.accuracy.error_estimate import NOTHING, Estimate
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, predicted_at_rest, relieved_history, solve_static_state
-from solver.continuation.natural import NEAR_ITERATIONS
+from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import Failure, State, final_history, history_at_rest, transfer
 from solver.loading_history.path import FREE_STEP, Step, choose_resolution, largest_change
-from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
 from solver.newton.run import Bordered, Run

@@ -18,11 +18,11 @@ from solver.accuracy.harmonic_levels import shifted
 from solver.accuracy.refinement import refine
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
+from solver.continuation.natural import LARGEST_STEP_RATIO
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import Path, Step
 from solver.loading_history.sweep import Sweep
-from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.mode import TOP_BASE, ModeState, NonlinearMode, Rest, find_rest
 from solver.newton.run import Budget, OutOfTimeError, Run

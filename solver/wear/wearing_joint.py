@@ -180,10 +180,7 @@ class WearingJoint:
         return cycles * self.wear_coefficient / self.area
 
     def begin(self, step_limit: float = math.nan, *, of_reference: bool = False) -> WearState:
-        """The unworn state, or that of the reference sweep where there is one. It is evaluated, not solved again.
-
-        step_limit: largest stable explicit step, cycles; NaN if unknown.
-        """
+        """The unworn state, or that of the reference sweep where there is one, evaluated and not solved again."""
         start = self.start
         state = start.reference if of_reference and start.reference is not None else start.state
         assert state is not None
@@ -274,8 +271,8 @@ class WearingJoint:
     def frequency_error(self, state: WearState) -> float:
         """Error of a followed frequency, Hz, by the relative error of the response; 0 for a given one.
 
-        The phase of the vibration, and so the phase lag, is wrong by as much as the amplitude. The amplitude is flat at
-        its maximum: every amplitude that is less than the largest one by its error may be the largest one.
+        The phase lag is wrong by as much as the amplitude. Every amplitude that is less than the largest one by its
+        error may be the largest one.
         """
         if self.follow is None:
             return 0.0
