@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from studies.scenes import scene_with_room
-from studies.scenes.half_space.room_for_wear import ExpectedWear
+from studies.scenes.half_space import ExpectedWear
 from studyrunner.study.study import Study
 
 _FAR = 3.1
