@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from solver.compliant_contact import with_contact_stiffness as with_contact_stiffness
     from solver.forced_response import FrequencyResponse as FrequencyResponse
     from solver.forced_response import frequency_response as frequency_response
-    from solver.mission_history import integrate_mission as integrate_mission
+    from solver.histories import integrate_mission as integrate_mission
+    from solver.histories import march_wear as march_wear
     from solver.missions.mission import Block as Block
     from solver.missions.mission import MissionHistory as MissionHistory
     from solver.missions.mission import Passage as Passage
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from solver.settings import SolverSettings as SolverSettings
     from solver.single_mode_theory import ModalResponse as ModalResponse
     from solver.single_mode_theory import modal_response as modal_response
-    from solver.wear_history import march_wear as march_wear
     from solver.whole_response import ResponseCurve as ResponseCurve
     from solver.whole_response import response_curve as response_curve
 
@@ -67,8 +67,8 @@ _PLACES = {
     "balance_of": "balance_functions",
     "build_model": "model_from_matrices",
     "frequency_response": "forced_response",
-    "integrate_mission": "mission_history",
-    "march_wear": "wear_history",
+    "integrate_mission": "histories",
+    "march_wear": "histories",
     "modal_response": "single_mode_theory",
     "response_curve": "whole_response",
     "with_contact_stiffness": "compliant_contact",

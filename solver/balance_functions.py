@@ -24,12 +24,9 @@ class HarmonicBalance:
     """The equations `residual(z) = 0` of the periodic states of a joint at one frequency and excitation amplitude.
 
     The unknown z (size,), N, has the predicted forces of the relative displacements (Eq. (10) in `solver/PHYSICS.md`),
-    each with its harmonics 0, cos 1, sin 1, cos 2, ... The tangential history of the pairs is held, so that the
-    functions are those of one problem.
+    each with its harmonics 0, cos 1, sin 1, cos 2, ... The tangential history of the pairs is fixed.
 
-    - frequency, excitation_amplitude: Hz, N.
-    - orders: harmonics above the static one.
-    - n_samples: samples of a period at which the contact law is applied.
+    - frequency, excitation_amplitude: Hz, N. orders: harmonics above the static one. n_samples: samples of a period.
     - state (size,): the solution to which the sweep comes, N; NaN where none was found.
     - outcome, message: how the search for this solution ended.
     """
@@ -49,16 +46,13 @@ class HarmonicBalance:
         return self.state.size
 
     def residual(self, z: ArrayLike) -> FloatArray:
-        """Residual (size,), N, of Eq. (8): forces of structure and contact less the loads.
-
-        Raises ValueError where z has another shape, or where a number is not finite.
-        """
+        """Residual (size,), N, of Eq. (8). Raises ValueError where z has another shape, or is not finite."""
         return self._evaluate(z).residual.ravel()
 
     def jacobian(self, z: ArrayLike) -> FloatArray:
-        """Exact derivative (size, size) of the residual, dimensionless, Eq. (16); errors as in `residual`.
+        """Derivative (size, size) of the residual, dimensionless, Eq. (16); errors as in `residual`.
 
-        Exact wherever the residual has a derivative: away from states in which a sample just changes its status.
+        Exact away from states in which a sample just changes its status.
         """
         pairs = np.arange(self._balance.joint.contact.n_contact)
         return self._balance.linearise(self._evaluate(z)).dense(pairs)
@@ -84,35 +78,20 @@ def balance_of(
     settings: SolverSettings | None = None,
     wear_depth: ArrayLike | None = None,
 ) -> HarmonicBalance:
-    """The harmonic balance of a joint at one frequency, with its residual and exact Jacobian as functions.
+    """The harmonic balance of a joint at one frequency, Hz, with its residual and exact Jacobian as functions.
 
-    A sweep as in `frequency_response` gives the harmonics where the settings leave them open, the tangential history
-    and a solution. Where the sweep finds no solution, the functions are there all the same, without history.
+    A sweep gives the harmonics where the settings leave them open, the tangential history and a solution. Where the
+    sweep finds no solution, the functions are there all the same, without history.
 
-    Parameters
-    ----------
-    model, excitation_amplitude, friction_coefficient, sweep, settings, wear_depth
-        As in `frequency_response`.
-    frequency
-        Hz.
-
-    Raises
-    ------
-    ValueError
-        As in `frequency_response`.
+    All other parameters and errors as in `frequency_response`.
     """
     settings = SolverSettings() if settings is None else settings
     wanted = check_number("frequency", frequency, above=0.0)
     load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     start, case = start_of(worn_model(model, wear_depth), friction, load, wanted, sweep, settings)
-    joint = case.joint(2.0 * np.pi * wanted, load)
     balance, at = balance_at_start(case, start, 2.0 * np.pi * wanted, load)
-    return functions_of(
-        balance,
-        np.full((joint.component_index.size, len(joint.basis.synthesis)), np.nan) if at is None else at.predicted_h,
-        start.outcome,
-        start.message,
-    )
+    unknown = np.full((balance.joint.component_index.size, len(balance.joint.basis.synthesis)), np.nan)
+    return functions_of(balance, unknown if at is None else at.predicted_h, start.outcome, start.message)
 
 
 def functions_of(balance: Balance, predicted_h: FloatArray, outcome: Outcome, message: str) -> HarmonicBalance:
@@ -148,8 +127,7 @@ def balance_at_start(
     case: Case, start: StartState, omega: float, excitation_amplitude: float
 ) -> tuple[Balance, Evaluation | None]:
     """The balance at a start state, and its evaluation; where there is no state, None and a balance without history."""
-    n_contact, state = case.model.contact.n_contact, start.state
-    joint = case.joint(omega, excitation_amplitude)
-    if state is None:
+    joint, n_contact = case.joint(omega, excitation_amplitude), case.model.contact.n_contact
+    if start.state is None:
         return Balance(joint, np.zeros((n_contact, 2)), np.zeros(n_contact)), None
-    return evaluated(joint, state)
+    return evaluated(joint, start.state)

@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.harmonic_balance.response_peak import largest_responses
+from solver.harmonic_balance.state import largest_responses
 from solver.loading_history.start_states import follow_branch
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Outcome, known_to

@@ -1,7 +1,4 @@
-"""The model of a joint: a reduced linear structure and the contact pairs on the structure.
-
-A scene gives these frozen dataclasses to the solver and nothing else. All values are in SI units.
-"""
+"""The model of a joint: a reduced linear structure and the contact pairs on it. All values are in SI units."""
 
 from __future__ import annotations
 
@@ -109,12 +106,9 @@ class ReducedModel:
     nodal_diameter: int = 0
 
     def harmonic_structure(self, harmonic: int) -> LinearModel:
-        """Linear model in which a harmonic moves.
+        """Linear model in which a harmonic moves: that of nodal diameter `n d` modulo N, conjugate above N/2.
 
-        Harmonic n of a travelling wave of nodal diameter d has the interblade phase `2 pi n d / N`. The wave moves in
-        nodal diameter `n d` modulo N; above N/2 this is the conjugate of nodal diameter N - n d.
-
-        Raises KeyError where the scene does not hold that nodal diameter.
+        Raises KeyError where the scene does not have that nodal diameter.
         """
         if self.n_sectors == 0 or self.nodal_diameter == 0:
             return self.linear[0]

@@ -41,33 +41,21 @@ def build_model(
     diameter k a pair with the next sector has the relative displacement `u - exp(2 pi i k / N) R u_that`, where R turns
     by one sector; the indices of all pairs are the same at each k.
 
-    Parameters
-    ----------
-    mass, damping, stiffness
-        (n, n), kg, N s/m, N/m; symmetric, or Hermitian at nodal diameters above 0. damping: None for none.
-    contact_dofs
-        (n_contact, 3) int: index in x of the closing, the first and the second tangential relative displacement of each
-        pair; -1 where the pair has no such displacement.
-    area
-        (n_contact,) or one number for all, m2: the weight alpha of Eq. (7).
-    load_harmonic, load_static
-        (n,), N. The harmonic load is complex and per unit excitation amplitude: load(t) = Re(F exp(i omega t)). The
-        static load is 0 if not given. They act at the nodal diameters d and 0.
-    response
-        Reported responses: indices (n_response,) of x, or a matrix (n_response, n). All of x if not given.
-    gap, normal_load
-        (n_contact,) or one number. Initial gap, m; constant normal force of pairs without a closing displacement, N,
-        compression positive.
-    position, surface, response_names
-        Position (n_contact, 3), m, and label of each pair; name of each response. They do not change the results.
-    n_sectors, nodal_diameter
-        Of the cyclic structure and of the wave, 0 to n_sectors - 1; 0 for a structure that is no sector.
+    - mass, damping, stiffness (n, n): kg, N s/m, N/m; symmetric, or Hermitian at nodal diameters above 0. damping: None
+      for none.
+    - contact_dofs (n_contact, 3) int: index in x of the closing, the first and the second tangential relative
+      displacement of each pair; -1 where the pair has no such displacement.
+    - area (n_contact,) or one number for all, m2: the weight alpha of Eq. (7).
+    - load_harmonic (n,): complex, N per unit excitation amplitude, load(t) = Re(F exp(i omega t)), at nodal diameter d.
+    - load_static (n,): N, at nodal diameter 0; none if not given.
+    - response: indices (n_response,) of x, or a matrix (n_response, n). All of x if not given.
+    - gap, normal_load (n_contact,) or one number: initial gap, m; constant normal force of pairs without a closing
+      displacement, N, compression positive.
+    - position (n_contact, 3), m, surface, response_names: labels that do not change the results.
+    - n_sectors, nodal_diameter: of the cyclic structure and of the wave, 0 to n_sectors - 1; 0 for no sector.
 
-    Raises
-    ------
-    ValueError
-        Shapes do not fit, a number is not finite, a nodal diameter is missing, a matrix is not symmetric or Hermitian,
-        an area is not positive, an index is out of range or used twice, or nothing presses a pair.
+    Raises ValueError where shapes do not fit, a number is not finite, a nodal diameter is missing, a matrix is not
+    symmetric or Hermitian, an area is not positive, an index is out of range or used twice, or nothing presses a pair.
     """
     waves = stiffness if isinstance(stiffness, Mapping) else {0: stiffness}
     _check("nodal_diameter", 0 <= nodal_diameter < max(n_sectors, 1), "give 0 to n_sectors - 1")

@@ -22,16 +22,13 @@ class Backbone(PresentedMode):
 
     - amplitude (n_amplitude,): modal amplitude `sqrt(x_1^H M x_1)`, m sqrt(kg), as given; x_1: first harmonic of all
       displacements.
-    - frequency (n_amplitude,): natural frequency, Hz.
-    - damping_ratio (n_amplitude,): zeta, dimensionless; positive where the vibration decays.
+    - frequency, damping_ratio (n_amplitude,): natural frequency, Hz, and zeta, positive where the vibration decays.
     - frequency_error, damping_error (n_amplitude,): estimated absolute errors, Hz and dimensionless; inf where unknown.
-    - response (n_amplitude, n_response): complex first harmonic, m; the response is Re(value exp(i omega t)). The phase
-      is such that the vibration is in phase with the linear mode.
+    - response (n_amplitude, n_response): complex first harmonic, m, in phase with the linear mode.
     - shape (n_amplitude, n): complex x_1, m. Divided by the amplitude, the mass-normalised shape of the mode.
     - slip_fraction, open_fraction (n_amplitude, n_contact): fraction of the period in which a pair slips, or is open.
     - harmonics_used, samples_used (n_amplitude,): highest harmonic and samples; 0 where there is no state.
-    - outcome: how the computation of each point ended.
-    - message: details of each outcome.
+    - outcome, message: how the computation of each point ended.
 
     Values are NaN where no state was found.
     """
@@ -63,16 +60,15 @@ def backbone(
 ) -> Backbone:
     """Natural frequency and damping ratio of a joint over the amplitude: the backbone curve of a nonlinear mode.
 
-    By the extended periodic motion concept (`solver.modes.modal_model`). Where a point fails, its `outcome` and
-    `message` say why; the other points are computed all the same.
+    By the extended periodic motion concept (`solver.modes.modal_model`). A point that fails spoils no other one.
 
     Parameters
     ----------
     model
-        The model, from `build_model`, `studies.build_scene` or `studies.read_scene`. Its harmonic load is not used.
+        From `build_model`, `studies.build_scene` or `studies.read_scene`. Its harmonic load is not used.
     amplitude
-        (n_amplitude,) or one number, m sqrt(kg), in any order: modal amplitude `sqrt(x_1^H M x_1)`, with the first
-        harmonic x_1 of all displacements. The mode at an amplitude does not depend on the other amplitudes.
+        (n_amplitude,) or one number, m sqrt(kg), in any order: modal amplitude, as in `Backbone`. The mode at an
+        amplitude does not depend on the other amplitudes.
     friction_coefficient
         One number for all pairs, or (n_contact,) for each pair. None for a model with its own, e.g. from a scene file.
     mode

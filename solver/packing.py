@@ -1,8 +1,7 @@
 """Values of the solver as text and plain arrays for a file: the state of a history or of a sweep, a reduced model.
 
 `unpack(pack(value))` is equal to `value` to the last bit, and its arrays are stored by rows (C order). The memory order
-of an array determines the order of sums over the array, and so their last bits. A computation that is to be continued
-to the last bit therefore continues from the unpacked value itself.
+of an array determines the last bits of sums over it: a computation that may be resumed goes on from the unpacked value.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ class ModalResponse:
 
 
 def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: float, points: int = 50) -> ModalResponse:
-    """Response to a harmonic load from a nonlinear mode alone, other modes left out.
+    """Response to a harmonic load from a nonlinear mode alone.
 
     With the natural frequency omega, the damping ratio zeta and the mass-normalised shape phi at the modal amplitude a,
 
@@ -40,25 +40,16 @@ def modal_response(model: ReducedModel, mode: Backbone, excitation_amplitude: fl
 
     is solved for the excitation frequency Omega, as a gives all others: two frequencies below the resonance, none
     above. Krack, Computers and Structures 154 (2015) 59-71; Schwarz and Krack, Journal of Vibration and Acoustics 142
-    (2020). It holds near the resonance, where one mode vibrates. Friction forces do not grow with the
-    frequency as the damping term does: at a distance from the resonance the error of the damping is as large.
+    (2020). Other modes are left out, and friction forces do not grow with the frequency as the damping term does: the
+    response holds near the resonance alone.
 
-    Parameters
-    ----------
-    model
-        The model of the mode, with its harmonic load.
-    mode
-        From `solver.backbone`, at two amplitudes or more that have a state. The load is limited to its amplitudes.
-    excitation_amplitude
-        N, above 0; multiplies the harmonic load of the model.
-    points
-        Points of a side between two amplitudes of the mode; between these values are interpolated over log(amplitude).
+    model: of the mode, with its harmonic load.
+    mode: from `solver.backbone`, at two amplitudes or more that have a state. The load is limited to its amplitudes.
+    excitation_amplitude: N, above 0; multiplies the harmonic load of the model.
+    points: of a side between two amplitudes of the mode; values are interpolated over log(amplitude).
 
-    Raises
-    ------
-    ValueError
-        The mode has fewer than two amplitudes with a state, the excitation is not above 0, or mode and model do not
-        belong together.
+    Raises ValueError where the mode has fewer than two amplitudes with a state, where the excitation is not above 0, or
+    where mode and model do not belong together.
     """
     linear = model.harmonic_structure(1)
     if not 0.0 < excitation_amplitude < np.inf:

@@ -14,15 +14,13 @@ from solver.continuation.arc_length import Arc
 from solver.continuation.natural import SMOOTH_CHANGE
 from solver.forced_response import check_case, check_number, check_numbers, worn_model
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import BalanceAt, State
+from solver.harmonic_balance.state import BalanceAt, State, largest_responses
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.presentation import NOT_IN_DATASETS, PresentedCurve
 from solver.settings import Direction, SolverSettings
-from solver.stability.floquet import Multipliers, Stability, find_multipliers
-from solver.stability.hill import is_stable
+from solver.stability.floquet import Multipliers, Stability, find_multipliers, is_stable
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case
 

@@ -12,7 +12,7 @@ The rooms, in the way of a study: `study` (its file, checked), `scene` (its redu
 their tasks, and how these are computed), `plan` (`--plan`), `mpi` (ranks, and which of them does which task),
 `checkpoint` (the file of what is finished), `summary` (the last lines of a run), `result` (the result file), `report`
 (figures and page from result files), `system` (files, signals, streams, progress). On top: `api`, `cli`, `run`,
-`task_runs`, `task_progress`, `accessor`. On the ground: `variables`, `user_error`.
+`task_runs`, `accessor`. On the ground: `variables`, `user_error`.
 """
 
 from __future__ import annotations

@@ -10,14 +10,13 @@ from threadpoolctl import threadpool_limits
 
 import studyrunner.accessor  # noqa: F401 - every Dataset gets `fretwear`
 from studyrunner.mpi.ranks import Ranks, launcher_size
-from studyrunner.result.creation_date import check_date
-from studyrunner.result.existing_result import Target, check_result
 from studyrunner.result.opening import open_result
-from studyrunner.result.paths import check_output
-from studyrunner.run import Interrupted, RunOptions, compute_study
+from studyrunner.result.provenance import check_date
+from studyrunner.result.target import check_result
+from studyrunner.run import RunOptions, compute_study
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import read_study
-from studyrunner.system.progress import ProgressDisplay, SilentProgress
+from studyrunner.system.progress import ProgressDisplay
 from studyrunner.user_error import StorageError, UserError
 
 __all__ = ["StorageError", "Study", "UserError", "open_result", "read_study", "run_study"]
@@ -36,11 +35,9 @@ def run_study(
 ) -> xr.Dataset:
     """Run a study in this process, as the command `run-study` does, and open its result.
 
-    What is computed and where it goes is the same as with the command: a run that was ended early, in whatever way,
-    goes on where it was when it is called again, from here or by the command; what it needs for that is in the file
-    `<output>.progress`. This process computes alone, one point after the other and with one thread of the linear
-    algebra, so that the numbers are those of the command to the last bit. For several processes give
-    `mpiexec -n 8 run-study study.toml -o output.nc` and read its result by `open_result`.
+    What is computed is the same as with the command, to the last bit, and a run that was ended early goes on when it is
+    called again, from here or by the command: see `<output>.progress`. This process computes alone, with one thread of
+    the linear algebra; for several processes give `mpiexec -n 8 run-study study.toml -o output.nc`.
 
     Parameters
     ----------
@@ -69,9 +66,8 @@ def run_study(
     Raises
     ------
     UserError
-        Where something in the study or the scene is wrong, the output cannot be written, is that of another study or
-        of something else, another run is at work there, or a launcher has started several processes: each would compute
-        all of it. Nothing is computed then.
+        Where study, scene or output are wrong, another run is at work there, or a launcher has started several
+        processes, each of which would compute all of it. Nothing is computed then.
     StorageError
         Where something cannot be written on the way. What was computed is kept, and the same call goes on from it.
     KeyboardInterrupt
@@ -86,21 +82,12 @@ def run_study(
         raise UserError("run_study", "overrides", None, "give them to read_study: this study is read already")
     checked = None if date is None else check_date(date, "run_study", "date")
     path = Path(f"{study.study.name}.nc" if output is None else output)
-    target = _check_output(path, study, overwrite=overwrite)
-    given = RunOptions(fresh=fresh, retry_failed=retry_failed, date=checked)
-    shown = ProgressDisplay() if progress else SilentProgress()
     try:
-        # the scene as well: with two threads its matrices differ in the last bits, and start states with them
-        with threadpool_limits(1):
-            compute_study(Ranks(), study, target, given, shown, shown.say)
-    except Interrupted as ended:
-        raise KeyboardInterrupt(ended.summary.describe_end(target.path, "the same call")) from None
-    return open_result(target.path)
-
-
-def _check_output(path: Path, study: Study, *, overwrite: bool) -> Target:
-    try:
-        found = check_output("output", path, study.files)
-        return check_result("output", found, study, overwrite=overwrite, how="overwrite=True")
+        target = check_result("output", path, study, overwrite=overwrite, how="overwrite=True")
     except UserError as error:
         raise UserError("run_study", error.key, error.value, error.remedy) from None
+    shown = ProgressDisplay(quiet=not progress)
+    # the scene as well: with two threads its matrices differ in the last bits, and start states with them
+    with threadpool_limits(1):
+        compute_study(Ranks(), study, target, RunOptions(fresh, retry_failed, checked), shown, shown.say)
+    return open_result(target.path)

@@ -9,7 +9,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import NoReturn
 
-from studyrunner.result.creation_date import NOW, check_date
 from studyrunner.user_error import UserError
 
 _DESCRIPTION = """\
@@ -103,7 +102,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--date",
         nargs="?",
-        const=NOW,
+        const="now",
         metavar="ISO",
         help="date_created of the result: a date, or now; without it equal runs have equal files",
     )
@@ -127,6 +126,8 @@ def parse_options(arguments: Sequence[str]) -> Options:
         print(_scene_help(scene) if new is None else _new_study(new, deck), flush=True)
         parser.exit()
     if found["date"] is not None:
+        from studyrunner.result.provenance import check_date  # where it is used: it takes a second to load
+
         found["date"] = check_date(found["date"], "command line", "--date")
     return Options(**found)
 

@@ -3,63 +3,33 @@
 from __future__ import annotations
 
 import contextlib
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from solver.outcome import COMPLETE, Outcome
-from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.checkpoint.records import record_type
+from studyrunner.checkpoint.completion_index import CompletionIndex, record_type
 from studyrunner.checkpoint.store import Store, StoreInUseError
-from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
-from studyrunner.kinds.kind import build_tasks
+from studyrunner.kinds.kind import build_tasks, kind_of
 from studyrunner.kinds.task import Identity, digest
 from studyrunner.mpi.ranks import Ranks
+from studyrunner.mpi.schedule import serve_tasks
 from studyrunner.plan import doubts_of_study
-from studyrunner.result.arrays import SmallArray, coordinates, scene_arrays
-from studyrunner.result.creation_date import describe_date
-from studyrunner.result.existing_result import Label, Target
-from studyrunner.result.paths import older_folder, progress_file, remove_leftovers
-from studyrunner.result.provenance import compare_with_archived, describe_run
-from studyrunner.result.sample_coordinates import sample_coordinates, worn_coordinate
-from studyrunner.result.software import describe_software
+from studyrunner.result.arrays import small_arrays
+from studyrunner.result.provenance import compare_with_archived, describe_run, describe_time_and_commit
+from studyrunner.result.target import Target, identity_of
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.pairs import contact_changes
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import frequencies_of_ratios, merge_facts, pair_arrays, stuck_frequencies_of
+from studyrunner.scene.scene_set import merge_facts
 from studyrunner.scene_building import Scenes, build_scenes
 from studyrunner.study.study import Study
-from studyrunner.system.endings import begin_ending, is_ending
+from studyrunner.system.files import remove_leftovers
+from studyrunner.system.process import begin_ending, is_ending
 from studyrunner.system.progress import ProgressDisplay, count
-from studyrunner.task_runs import StudyRun, run_tasks
+from studyrunner.task_runs import StudyRun, evaluator
 from studyrunner.user_error import UserError, Verbatim, show_text
-
-
-class Interrupted(KeyboardInterrupt):
-    """A run was ended from outside; the result file holds the points computed so far. summary: state of the run."""
-
-    def __init__(self, summary: RunSummary) -> None:
-        super().__init__(summary)
-        self.summary = summary
-
-
-@dataclass(frozen=True)
-class RunSummary:
-    """Summary of a run.
-
-    n_points: of the study. n_complete: computed to the end. n_left: not computed yet. written: whether the file was
-    written; else a finished result was kept.
-    """
-
-    n_points: int
-    n_complete: int
-    n_left: int
-    written: bool
-
-    def describe_end(self, path: object, again: str) -> str:
-        """What an end from outside leaves. path: of the result. again: what goes on from there, in words."""
-        done = f"{self.n_points - self.n_left} of {self.n_points} points"
-        left = f"{path} holds {done}" if self.written else f"{done} are kept, {path} is the finished result that it was"
-        return f"interrupted: {left}, {again} goes on"
 
 
 @dataclass(frozen=True)
@@ -84,19 +54,17 @@ def compute_study(
     display: ProgressDisplay,
     say: Callable[[str], None],
     notes: Sequence[str] = (),
-) -> RunSummary:
+) -> Counter[int]:
     """Rank 0: computes a study together with the other ranks and writes the file `target.path`.
 
     A finished result at this path is replaced by a result without missing points only.
 
     Parameters
     ----------
-    ranks, study
-        The ranks, and the study that they compute.
+    ranks, study, options
+        The ranks, the study that they compute, and what is done with earlier results.
     target
         The result file, as `check_result` gives it.
-    options
-        What is done with earlier results.
     display
         What the user sees while the tasks are done.
     say
@@ -104,76 +72,88 @@ def compute_study(
     notes
         Lines for the user.
 
+    Returns
+    -------
+    Counter
+        Number of points of each outcome.
+
     Raises
     ------
     UserError
         Where a scene is wrong, or another run uses the file of the progress.
     StorageError
         Where something cannot be written.
-    Interrupted
-        Where the run is ended from outside; finished points have been written.
+    KeyboardInterrupt
+        Where the run is ended from outside, with what is left in words; finished points have been written.
     """
     with _open_progress(target) as store:
         scenes = build_scenes(ranks, study, store, say)
         facts = merge_facts(scenes.facts)
-        completion = _completion_of(study, scenes, store, facts)
+        # the software is described when the run begins: a checkout may have changed at the end of the run
+        attributes = {**describe_run(study, facts), **({} if scenes.kept is None else scenes.kept.origin)}
+        attributes |= describe_time_and_commit(options.date)
+        completion = _open_completion(study, scenes, store, facts, options)
         with display:
-            for note in (
+            for line in (
                 *notes,
-                *(f"{show_text(study.source)}: {line}" for line in compare_with_archived(study, facts.digest)),
+                *(f"{show_text(study.source)}: {text}" for text in compare_with_archived(study, facts.digest)),
                 *store.notes,
-                *_older(target),
+                *_older(target.older_folder),
                 *scenes.notes,
                 *doubts_of_study(study, facts),
                 *(f"{label}: {text}" for label, text in remarks_of_study(study)),
             ):
-                display.note(note)
-            return _serve(ranks, study, scenes, completion, target, options, display)
+                display.say(line)
+            if n_found := completion.n_points_finished:
+                display.say(f"{n_found} of {count(completion.plan.n_points, 'point')} are there from an earlier run")
+
+            def write() -> Counter[int]:
+                # netCDF4 takes a moment to load: after the other ranks have got their last task
+                from studyrunner.result.write import write_result
+
+                store.flush()
+                arrays = small_arrays(study, scenes.scenes, scenes.facts, scenes.variables)
+                return write_result(study, facts, completion, target, arrays, attributes, scenes.kept)
+
+            return _compute(ranks, study, StudyRun(completion, scenes.models, display), completion, target, write)
 
 
-def _serve(
+def _compute(
     ranks: Ranks,
     study: Study,
-    scenes: Scenes,
+    run: StudyRun,
     completion: CompletionIndex,
     target: Target,
-    options: RunOptions,
-    display: ProgressDisplay,
-) -> RunSummary:
-    # the software is described when the run begins: a checkout may have changed at the end of the run
-    origin = {**describe_software(), **describe_date(options.date)}
-
-    def write() -> RunSummary:
-        return _write(study, scenes, completion, target, origin)
-
-    label = Label.of(study)
-    completion.store.note_study(label.name, label.model)
-    if options.fresh:
-        completion.forget_all()
-    if options.retry_failed:
-        completion.forget_failed(COMPLETE)
-    completion.give_up_crashed()
-    completion.store.flush()
-    if n_found := completion.n_points_finished:
-        display.say(f"{n_found} of {count(completion.plan.n_points, 'point')} are there from an earlier run")
+    write: Callable[[], Counter[int]],
+) -> Counter[int]:
+    """Has the tasks done that are left and writes the result, also where the run is ended from outside."""
     try:
-        run_tasks(ranks, study, StudyRun(completion, scenes, display), display)
-        display.say("writing the result")
-        summary = write()
+        if run.tasks:
+            run.display.say(f"computing {kind_of(study).describe_tasks(run.tasks)}")
+        serve_tasks(ranks, run, evaluator(), run.costs)
+        run.display.say("writing the result")
+        # a signal that comes now finds a result that is about to be whole
+        begin_ending()
+        outcomes = write()
     except BaseException as error:
         if not is_ending(error):
             raise
         begin_ending()
-        raise Interrupted(write()) from None
-    if summary.n_left == 0:
-        completion.prune()
-    return summary
+        outcomes = write()
+        if n_left := outcomes[Outcome.NOT_COMPUTED]:
+            n_points, name = completion.plan.n_points, target.path.name
+            done = f"{n_points - n_left} of {count(n_points, 'point')}"
+            kept = f"{done} are kept, {name} is the finished result that it was" if target.finished else ""
+            raise KeyboardInterrupt(
+                f"interrupted: {kept or f'{name} holds {done}'}, the same command goes on"
+            ) from None
+    return outcomes
 
 
 @contextlib.contextmanager
 def _open_progress(target: Target) -> Iterator[Store]:
     """The file of the progress beside a result, open for a run: before the scene is built, which may be in the file."""
-    path = progress_file(target.path)
+    path = target.progress
     try:
         store = Store(path)
     except StoreInUseError as error:
@@ -190,49 +170,27 @@ def _open_progress(target: Target) -> Iterator[Store]:
                 remove_leftovers(path)
 
 
-def _completion_of(study: Study, scenes: Scenes, store: Store, facts: SceneFacts) -> CompletionIndex:
-    """The tasks of a study, and what of them is finished. facts: of all scenes."""
+def _open_completion(
+    study: Study, scenes: Scenes, store: Store, facts: SceneFacts, options: RunOptions
+) -> CompletionIndex:
+    """The tasks of a study, and what of them is finished and wanted. facts: of all scenes."""
     contacts = contact_changes(study, scenes.scenes, scenes.facts)
     plan = build_tasks(study, [each.n_displacements for each in scenes.facts], contacts, scenes.scenes)
     kind = record_type(study, facts)
     identity = Identity(tuple(each.digest for each in scenes.facts), digest(repr(kind.descr)))
-    return CompletionIndex(plan, identity, store, kind)
+    completion = CompletionIndex(plan, identity, store, kind)
+    store.note_study(identity_of(study))
+    if options.fresh:
+        completion.forget_all()
+    if options.retry_failed:
+        completion.forget_failed(COMPLETE)
+    completion.give_up_crashed()
+    store.flush()
+    return completion
 
 
-def _write(
-    study: Study, scenes: Scenes, completion: CompletionIndex, target: Target, origin: dict[str, str]
-) -> RunSummary:
-    """Writes the result file from the finished points. origin: attributes on program and date."""
-    # netCDF4 takes a moment to load: on rank 0 only, and after the other ranks have got their last task.
-    from studyrunner.result.write import write_result
-
-    completion.store.flush()
-    facts, kept, finished = merge_facts(scenes.facts), scenes.kept, target.finished
-    attributes = {**describe_run(study, facts), **({} if kept is None else kept.origin), **origin}
-    arrays = _arrays(study, scenes, facts)
-    outcomes = write_result(study, facts, completion, target.path, arrays, attributes, kept, keep_finished=finished)
-    left = outcomes[Outcome.NOT_COMPUTED]
-    n_complete = sum(outcomes[number] for number in COMPLETE)
-    return RunSummary(completion.plan.n_points, n_complete, left, written=not (finished and left))
-
-
-def _arrays(study: Study, scenes: Scenes, facts: SceneFacts) -> list[SmallArray]:
-    """Coordinates of the file, and its variables that no task computes. facts: of all scenes."""
-    stuck = stuck_frequencies_of(study, scenes.facts, scenes.scenes)
-    hertz = frequencies_of_ratios(study, scenes.facts, scenes.scenes)
-    return [
-        *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
-        *coordinates(study, facts, pair_arrays(study, scenes.facts, scenes.scenes)),
-        SmallArray("stuck_frequency", *stuck, STUCK_FREQUENCY),
-        *worn_coordinate(study, scenes.facts),
-        *sample_coordinates(study, scenes.facts, scenes.scenes),
-        *scene_arrays(study, scenes.variables),
-    ]
-
-
-def _older(target: Target) -> list[str]:
+def _older(folder: Path) -> list[str]:
     """A sentence where a folder of an earlier version stands beside a result."""
-    folder = older_folder(target.path)
     if not folder.is_dir():
         return []
     return [f"{folder.name} is of version 0.4.0 or before: it is neither used nor changed, and may be removed"]

@@ -187,7 +187,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Callable[[str], 
     return Scenes(at_ratios(scenes, facts), facts, (*variables, *exact_answers(study)), kept, notes, models)
 
 
-class _Building(Office[SceneTask, SceneBuilt]):
+class _Building(Office):
     """Rank 0 while the scenes are built. found: those that are, by number."""
 
     def __init__(self, scenes: SceneSet, store: Store, say: Callable[[str], None]) -> None:

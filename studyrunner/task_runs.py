@@ -1,30 +1,40 @@
-"""The tasks of a run are done: by any rank its own, and by rank 0 the hand-out of all."""
+"""The tasks of a study while they are done: by any rank its own, and on rank 0 the state of all of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from solver.clock import n_compiled
 from solver.outcome import Outcome, describe_error
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.kinds.kind import kind_of
-from studyrunner.kinds.task import Keep, Result, Task
+from studyrunner.kinds.task import Keep, Result, StartResult, Task
+from studyrunner.mpi.cost_model import CostModel
 from studyrunner.mpi.mapped_file import MappedFile, open_mapped
-from studyrunner.mpi.ranks import Ranks
-from studyrunner.mpi.schedule import Run, serve_tasks
-from studyrunner.scene_building import ModelCache, SceneBuilt, Scenes, SceneTask, build_scene_task
-from studyrunner.study.study import Study
-from studyrunner.system.endings import raise_ending
-from studyrunner.system.machine_faults import MachineFaultError, is_fault_of_machine
-from studyrunner.system.progress import ProgressDisplay
-from studyrunner.task_progress import TaskProgress
+from studyrunner.mpi.schedule import Office, Run
+from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task
+from studyrunner.system.machine import MachineFaultError, is_fault_of_machine
+from studyrunner.system.process import raise_ending
+from studyrunner.system.progress import ProgressDisplay, Standing
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel
 
 Models = Mapping[int, "ReducedModel"]
+
+_TRIES_AGAIN = 1
+"""Number of tries again of a task that a fault of the machine has ended."""
+
+_LATE = 0.3
+"""Expected further time of a task that takes longer than estimated, over the time that it is late. For an estimate with
+an uncertainty factor of two the mean further time is this fraction."""
+
+_FAR = 2.0
+"""Times the estimate, from which on a task is expected to take about as long again as it has taken: it is at a fold,
+which takes up to five times as long as other points, or more."""
 
 
 def compute_task(task: Task, models: Models, keep: Keep) -> Iterator[Result]:
@@ -32,7 +42,7 @@ def compute_task(task: Task, models: Models, keep: Keep) -> Iterator[Result]:
     return task.compute(models, keep)
 
 
-def evaluator() -> Run[Any, Any]:
+def evaluator() -> Run:
     """The function that does tasks on a rank, and builds scenes.
 
     A task that breaks off gives failed results; the other tasks go on. A fault of the machine is no result.
@@ -68,43 +78,159 @@ def evaluator() -> Run[Any, Any]:
     return evaluate
 
 
+class TaskProgress(Office):
+    """State of the tasks of a study, and the tasks that results make possible. Results go to `completion`.
+
+    A wear history becomes possible with its start state, while the sweep goes on. Results of a task do not depend on
+    the order. tasks: those that are left, whether they are possible or not. n_points: that are finished.
+    """
+
+    def __init__(self, completion: CompletionIndex) -> None:
+        self.costs = CostModel()
+        self.n_points = completion.n_points_finished
+        self._completion = completion
+        self._sweeps = completion.sweeps_left()
+        self.tasks = [*self._sweeps, *(task for task in completion.plan.results if not completion.is_finished(task))]
+        self._n_faults: Counter[str] = Counter()
+        self._n_given: Counter[str] = Counter()
+        self._shares: dict[str, tuple[float, float]] = {}  # what of a task is done, and when it said so, s
+        self._suspects: list[Task] = []  # they wait for the one that is under way
+        self._tried = ""
+        self._left: dict[str, float] = defaultdict(float)  # estimated seconds, by group
+        for task in self.tasks:
+            self._left[task.group] += task.cost
+
+    def begin(self) -> Iterator[Task]:
+        """Tasks that are possible at the beginning."""
+        yield from self._without_suspects(self._sweeps)
+        for sweep, result in self._completion.known_starts():
+            yield from self._without_suspects(self._start(sweep, result))
+        yield from self._without_suspects(self._completion.waiting_for(None))
+
+    def take(self, task: Task, result: Result) -> Sequence[Task]:
+        """Takes a result; returns tasks that the result makes possible, or that have to be done again."""
+        self._n_given[task.key] += 1
+        is_first, is_last = self._n_given[task.key] == 1, self._n_given[task.key] == task.n_results
+        if is_last:
+            del self._n_given[task.key]
+        self._left[task.group] -= task.cost_of(first=is_first)
+        self._shares.pop(task.key, None)
+        new: Sequence[Task] = ()
+        if not result.fault:
+            self._completion.add(task, result)
+            self.n_points += len(task.points(result.place))
+            new = self._start(task, result) if isinstance(result, StartResult) else ()
+        elif is_last:
+            new = self._try_again(task)
+        if task.key == self._tried and is_last and task.key not in {each.key for each in new}:
+            self._tried = ""
+            new, self._suspects = [*new, *self._suspects], []
+        return self._without_suspects(new)
+
+    def keep(self, task: Task, progress: object) -> None:
+        """Takes the progress of a task as `Keep` does."""
+        if isinstance(progress, float):
+            self._shares[task.key] = progress, time.monotonic()
+        else:
+            self._completion.keep(task, progress)
+
+    def look(self, running: Sequence[tuple[Task, int, float]]) -> Standing:
+        """State of the tasks. running: as `Dispatcher.running`."""
+        factors = {group: self.costs.correction(((group,),)) for group in self._left}
+        left = sum(max(0.0, seconds) * factors[group] for group, seconds in self._left.items())
+        done = sum(map(self.costs.measured, factors))
+        longest = 0.0
+        for task, n_left, elapsed in running:
+            expected = task.cost_of(first=n_left == task.n_results) * factors[task.group]
+            still = self._still(task, expected, elapsed)
+            left += still - expected
+            done += elapsed
+            longest = max(longest, still)
+        return Standing(
+            n_done=self.n_points,
+            n_points=self._completion.plan.n_points,
+            share=done / max(done + left, 1e-9),
+            seconds_left=max(longest, left / max(1, len(running))),
+            running=tuple(self._describe(task, n_left) for task, n_left, _ in running),
+        )
+
+    def _still(self, task: Task, expected: float, elapsed: float) -> float:
+        """Time left, s, of a running task: by its expected time at first, then more and more by the share that is done.
+
+        What a task takes that is late already, or stands still, is a guess.
+        """
+        planned = max(expected - elapsed, _LATE * elapsed, elapsed - _FAR * expected)
+        share, came = self._shares.get(task.key, (0.0, 0.0))
+        if share == 0.0:
+            return planned
+        since = min(time.monotonic() - came, elapsed)
+        by_share = max((elapsed - since) * (1.0 - share) / share - since, _LATE * since)
+        weight = min(1.0, 2.0 * share)
+        return (1.0 - weight) * planned + weight * by_share
+
+    def _without_suspects(self, tasks: Iterable[Task]) -> list[Task]:
+        """The tasks, but of those with which runs have crashed one at a time: the others wait for its end."""
+        now = []
+        for task in tasks:
+            if not self._completion.is_suspect(task) or self._tried in ("", task.key):
+                self._tried = task.key if self._completion.is_suspect(task) else self._tried
+                now.append(task)
+            else:
+                self._suspects.append(task)
+        return now
+
+    def _try_again(self, task: Task) -> Sequence[Task]:
+        """What is left of a task that a fault of the machine has ended, once; later it is left to another run."""
+        self._n_faults[task.key] += 1
+        again = self._completion.left(task) if self._n_faults[task.key] <= _TRIES_AGAIN else None
+        if again is None:
+            return ()
+        self._left[again.group] += again.cost
+        return [again]
+
+    def _start(self, sweep: Task, result: StartResult) -> Sequence[Task]:
+        """The tasks that begin from a start state, whose cost is known better now."""
+        planned = self._completion.waiting_for((sweep.number, result.place))
+        new = [task.from_start(result) for task in planned]
+        for sign, tasks in ((-1.0, planned), (1.0, new)):
+            for task in tasks:
+                self._left[task.group] += sign * task.cost
+        return new
+
+    def _describe(self, task: Task, n_left: int) -> str:
+        """A running task in words."""
+        what = task.describe(task.places[task.n_results - n_left])
+        return f"{what} ({100.0 * self._shares[task.key][0]:.0f} %)" if task.key in self._shares else what
+
+
 class StudyRun(TaskProgress):
     """Rank 0 while the tasks of a study are done: results are saved, and the user sees how far they are."""
 
-    def __init__(self, completion: CompletionIndex, scenes: Scenes, display: ProgressDisplay) -> None:
+    def __init__(self, completion: CompletionIndex, models: SceneModels, display: ProgressDisplay) -> None:
         super().__init__(completion)
         self._store = completion.store
-        self._scenes = scenes
-        self._display = display
+        self._models = models
+        self.display = display
         self._said: set[tuple[int, str]] = set()
         self._n_compiled: int | None = n_compiled()
 
     def prepare(self, rank: int, task: Task) -> Task:
         """The task with the models that the rank does not have."""
         self._store.note_begin(task.key)
-        return self._scenes.models.with_model(rank, task)
+        return self._models.with_model(rank, task)
 
     def is_sick(self, rank: int, result: Result) -> bool:
         """Whether the result is a fault of the machine."""
         if result.fault and (rank, result.fault) not in self._said:
             self._said.add((rank, result.fault))
-            self._display.note(
-                f"rank {rank}: {result.fault}: a fault of the machine; the task is tried once more, by another rank"
-                " where there is one"
-            )
+            again = "the task is tried once more, by another rank where there is one"
+            self.display.say(f"rank {rank}: {result.fault}: a fault of the machine; {again}")
         return bool(result.fault)
 
     def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
         """Writes and shows what is due."""
         if self._n_compiled is not None and n_compiled() > self._n_compiled:
             self._n_compiled = None
-            self._display.note("the solver is compiled for this machine, once after an installation")
+            self.display.say("the solver is compiled for this machine, once after an installation")
         self._store.tick()
-        self._display.tick(lambda: self.look(running()))
-
-
-def run_tasks(ranks: Ranks, study: Study, run: StudyRun, display: ProgressDisplay) -> None:
-    """Rank 0: has the remaining tasks done and their results saved."""
-    if run.tasks:
-        display.say(f"computing {kind_of(study).describe_tasks(run.tasks)}")
-    serve_tasks(ranks, run, evaluator(), run.costs)
+        self.display.tick(lambda: self.look(running()))

@@ -6,11 +6,14 @@ By hand: `rich` takes five control characters out of a text, and leaves those th
 from __future__ import annotations
 
 import errno
+import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
 _LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_KEY, _LONGEST_REMEDY = 80, 240, 120, 600
 _MOST_LINES = 20
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 _REMEDIES = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "make room there"),
@@ -95,21 +98,26 @@ def show_value(value: object) -> str:
     if isinstance(value, Verbatim):
         return _cut(show_text(" ".join(value.split())), _LONGEST_VERBATIM)
     try:
-        text = _as_toml(value)
+        text = toml_value(value)
     except (ValueError, RecursionError):
         # whole numbers of more digits than Python writes
         text = "too long to be shown"
     return _cut(show_text(" ".join(text.split())), _LONGEST_VALUE)
 
 
-def _as_toml(value: object) -> str:
+def toml_value(value: object) -> str:
+    """A value on one line, as TOML, without keys that are None."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key} = {_as_toml(each)}" for key, each in value.items()) + "}"
+        items = (f"{toml_key(str(key))} = {toml_value(item)}" for key, item in value.items() if item is not None)
+        return "{" + ", ".join(items) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_as_toml, value)) + "]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f'"{value}"' if isinstance(value, str) else repr(value)
+        return "[" + ", ".join(map(toml_value, value)) + "]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, bool | str) else repr(value)
+
+
+def toml_key(key: str) -> str:
+    """A key, in quotes where it is no bare one: labels of surfaces are any text."""
+    return key if _BARE_KEY.fullmatch(key) else json.dumps(key, ensure_ascii=False)
 
 
 def show_text(text: str) -> str:

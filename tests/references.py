@@ -21,18 +21,6 @@ from tests.event_driven import (
     solve_orbit,
 )
 
-__all__ = [
-    "NoPeriodicMotionError",
-    "Orbit",
-    "StopsOccurError",
-    "coulomb_orbit",
-    "den_hartog_amplitude",
-    "slider_amplitude",
-    "slider_orbit",
-    "slider_wear_depth",
-    "vibro_impact_orbit",
-]
-
 
 class StopsOccurError(ValueError):
     """Den Hartog's closed form does not hold: the mass stops, or its amplitude has no bound."""

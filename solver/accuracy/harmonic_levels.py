@@ -1,50 +1,31 @@
-"""The numbers of harmonics between which automatic settings choose, and how many more an error estimate needs.
+"""What decides about harmonics and samples: levels of harmonics, and the events in the period of a state.
 
 "One level up" means the next entry of `HARMONIC_LEVELS`. Two effects hide an error from a comparison with only a few
 more harmonics:
 
 - a contact that is shorter than the period of the highest harmonic: its force is nearly equal in all harmonics;
-- a structure that answers the higher harmonics otherwise than the penalty does. With the penalty E and the compliance
-  G of a pair, the harmonics of the predicted force that are left out are `(1 - E_n G_n) lambda_n`
-  (`solver.structure.penalty`). They need not decrease over the next few harmonics: the modal mass of a slider on a beam
-  falls from mode to mode, and a slider behind a stiff spring acts as a mass only up to the resonance of both.
+- a structure that answers the higher harmonics otherwise than the penalty E does. With the compliance G of a pair, the
+  harmonics of the predicted force that are left out are `(1 - E_n G_n) lambda_n` (`solver.structure.penalty`). They
+  need not decrease: the modal mass of a slider on a beam falls from mode to mode.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from solver.model import ReducedModel
-from solver.settings import Resolution, SolverSettings, all_orders, samples_for
+from solver.contact.coulomb import SEPARATED, STICK
+from solver.harmonic_balance.dlft import Evaluation
+from solver.model import FloatArray, IntArray, ReducedModel
+from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, SolverSettings, all_orders, samples_for
 from solver.structure.condensation import relative_indices
 from solver.structure.penalty import build_penalty, compliance_at
 
 HARMONIC_LEVELS = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
-"""Highest harmonics between which "auto" chooses. The last two serve for comparison only. 7 is left out: on the
-dovetail, states with five and seven harmonics agree by chance (212 Hz: errors of the worn volume of 1.9, 1.2 and 0.1 %
-with 5, 7 and 9)."""
-
-DISPLACEMENTS_OF_LIMITS = 144
-"""Relative displacements of the dovetail with 48 pairs, to which the limits of unknowns belong."""
+"""Highest harmonics between which "auto" chooses. The last two serve for comparison only. Without 7: on the dovetail at
+212 Hz the errors of the worn volume with 5, 7 and 9 are 1.9, 1.2 and 0.1 %, so that 5 and 7 agree by chance."""
 
 STIFFNESS_MISMATCH = 0.25
 """Largest |1 - E G|: above, structure and penalty answer differently, and more harmonics are needed."""
-
-MOST_UNKNOWNS = 8000
-"""Most unknowns of a balance in a history with "auto"; of a balance that is solved for comparison half as many more."""
-
-
-def n_unknowns(resolution: Resolution, n_rel: int) -> int:
-    """Number of unknowns of a balance with `n_rel` relative displacements."""
-    return n_rel * (2 * len(resolution.orders) + 1)
-
-
-def room_for(unknowns: float, n_rel: int) -> float:
-    """Limit of the unknowns of a joint with `n_rel` relative displacements; `unknowns`: the limit with 48 pairs.
-
-    The limit of a larger joint grows in proportion: it limits the harmonics and not the pairs.
-    """
-    return unknowns * max(1.0, n_rel / DISPLACEMENTS_OF_LIMITS)
 
 
 def shifted(resolution: Resolution, levels: int) -> Resolution:
@@ -92,3 +73,63 @@ def reach(model: ReducedModel, omega: float, highest: int) -> int:
         if all(np.abs(each).max(initial=0.0) <= STIFFNESS_MISMATCH for each in apart):
             return level
     return HARMONIC_LEVELS[-1]
+
+
+# --- events ---
+
+
+def nothing_happens(evaluation: Evaluation) -> bool:
+    """Whether every pair sticks or is open throughout the period, so that the joint is linear.
+
+    A pair that reaches its friction limit without slip counts as stuck.
+    """
+    separated, state_t = evaluation.status_t == SEPARATED, evaluation.state_t
+    rests = np.ptp(state_t, axis=2) <= ROUND_OFF * np.abs(state_t).max(axis=2)
+    still = rests.all(axis=1) & ~separated.any(axis=1)
+    sticks = (evaluation.status_t == STICK).all(axis=1)
+    return bool((sticks | still | separated.all(axis=1)).all())
+
+
+def lacks_even(orders: tuple[int, ...], evaluation: Evaluation) -> bool:
+    """Whether a state has odd harmonics only although its contact forces have even ones: its symmetry is lost."""
+    return all(order % 2 for order in orders) and not half_wave_symmetric(evaluation, NEGLIGIBLE)
+
+
+def half_wave_symmetric(evaluation: Evaluation, fraction: float) -> bool:
+    """Whether all even harmonics of the contact force but the static one are below a fraction of its largest value."""
+    half = evaluation.force_t.shape[2] // 2
+    if evaluation.force_t.shape[2] % 2:
+        return False
+    total = evaluation.force_t[:, :, :half] + evaluation.force_t[:, :, half:]
+    size = np.abs(evaluation.force_t).max(initial=0.0)
+    return bool(np.ptp(total, axis=2).max(initial=0.0) <= fraction * size)
+
+
+def shortest_contact(status_t: IntArray, normal_force_t: FloatArray, felt: float) -> float:
+    """Duration of the shortest contact of all pairs that open, as a fraction of the period; 1 where no pair opens.
+
+    status_t, normal_force_t (n_contact, N): states of the pairs at the samples, and N. felt: fraction of the largest
+    normal force; pairs whose force is lower all period long are left out.
+    """
+    n_samples = status_t.shape[1]
+    shortest = n_samples
+    pressed = normal_force_t.max(axis=1, initial=0.0)
+    for closed in status_t[pressed >= felt * pressed.max(initial=0.0)] != SEPARATED:
+        begins = np.flatnonzero(closed & ~np.roll(closed, 1))
+        ends = np.flatnonzero(~closed & np.roll(closed, 1))
+        if begins.size:
+            # where the period begins in contact, the first end belongs to the last beginning
+            lasted = (ends - begins if ends[0] > begins[0] else np.roll(ends, -1) - begins) % n_samples
+            shortest = min(shortest, int(lasted.min()))
+    return float(shortest / n_samples)
+
+
+def left_out(orders: tuple[int, ...], evaluation: Evaluation) -> float:
+    """Fraction of the vibrating contact force in harmonics other than `orders`, which only its samples hold.
+
+    The fraction grows and falls with the error of the state, and needs no further solve.
+    """
+    force_h = np.fft.rfft(evaluation.force_t, axis=2)[:, :, 1:]
+    size = np.linalg.norm(force_h)
+    beyond = np.delete(force_h, np.array(orders, int) - 1, axis=2)
+    return float(np.linalg.norm(beyond) / size) if size > 0.0 else 0.0

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.model import ComplexArray, FloatArray
+from solver.model import BoolArray, ComplexArray, FloatArray
 from solver.settings import WearTarget
 
 HISTORY_SAFETY = 1.5
@@ -48,9 +48,8 @@ class HistoryError:
 class Both:
     """Values of a history and of its reference solution at equal counts.
 
-    counts (n,): ascending.
-    fine, reference: values by name as from `solver.wear.course.Course.read`; the reference has NaN beyond its end, and
-        nothing where there is none.
+    counts (n,): ascending. fine, reference: values by name as from `solver.wear.course.Course.read`; the reference has
+        NaN beyond its end, and nothing where there is none.
     follows: whether the frequency of the excitation follows the structure.
     """
 
@@ -67,52 +66,32 @@ class Both:
 def history_error(outputs: Both, steps: Both, area: FloatArray) -> HistoryError:
     """Errors of an adaptive history, from its difference to the reference solution.
 
-    Parameters
-    ----------
-    outputs
-        Both solutions at the counts to report, the first 0.
-    steps
-        Both solutions at the ends of the steps: depths, responses and wear rates.
-    area
-        (n_contact,), m2.
+    outputs, steps: both solutions at the counts to report, the first 0, and at the ends of the steps.
+    area (n_contact,): m2.
     """
-    counts, fine, safety = outputs.counts, outputs.fine, HISTORY_SAFETY
+    fine, safety = outputs.fine, HISTORY_SAFETY
 
     def crossing(differences: FloatArray) -> FloatArray:
-        return safety * largest_before(steps.counts, differences, counts)
+        return safety * largest_before(steps.counts, differences, outputs.counts)
 
     depth, volume = fine["wear_depth"], fine["wear_depth"] @ area
     difference, apart = safety * _depth_change(outputs), _depth_change(steps)
     error = np.fmax(difference @ area, crossing(apart @ area))
     # the error of the start state remains, even where later states agree by chance
     at_start = np.fmax(_start_error(outputs, area), fine["wear_rate_error"][0])
-    from_start = np.where(volume > 0.0, at_start, 0.0) * volume
     # start state and steps have nothing to do with each other: the worst case is their sum
-    error = np.fmax(error, from_start + fine["local"])
-    reached = np.isfinite(volume)
-    unknown = reached & ~np.isfinite(difference).all(axis=1)
-    relative = _over(error, volume)
-    relative[unknown & (volume > 0.0)] = np.inf
-    relative[~reached] = np.nan
+    error = np.fmax(error, np.where(volume > 0.0, at_start, 0.0) * volume + fine["local"])
     # no pair is known better than the volume: one that agrees with the reference solution does so by chance. Without
     # this 5 and 7 of 24 deep pairs of the dovetail at 211.25 and 211.375 Hz are outside of their errors, by seven times
-    of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(_pairs_that_count(depth * area))) * relative
+    of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(_pairs_that_count(depth * area))) * _over(error, volume)
     with np.errstate(invalid="ignore"):
         of_pairs = np.fmax(np.fmax(difference, crossing(apart)), np.where(depth > 0.0, of_pair[:, None] * depth, 0.0))
-    of_pairs[unknown] = np.where(depth[unknown] > 0.0, np.inf, 0.0)
-    of_pairs[~reached] = np.nan
-
-    def of_state(name: str, of_outputs: FloatArray, of_steps: FloatArray) -> FloatArray:
-        larger = np.where(unknown, np.inf, np.fmax(fine[name], np.fmax(safety * of_outputs, crossing(of_steps))))
-        # an unworn state has errors of its own, from states with more harmonics
-        return np.where((counts == 0.0) | (volume <= 0.0), fine[name], larger)
-
-    response = of_state("response_error", _response_change(outputs), _response_change(steps))
+    unknown = np.asarray(~np.isfinite(difference).all(axis=1))
+    response = np.fmax(safety * _response_change(outputs), crossing(_response_change(steps)))
     response = np.fmax(response, _change_within(volume, error, steps, area))
-    rate = of_state("wear_rate_error", _rate_change(outputs), _rate_change(steps))
-    # beyond the end of the history nothing is known, not even an error
-    response, rate = (np.where(reached, each, np.nan) for each in (response, rate))
-    return HistoryError(relative, of_pairs, response, rate, _frequency_error(outputs, safety, 0.0))
+    rate = np.fmax(safety * _rate_change(outputs), crossing(_rate_change(steps)))
+    frequency = _frequency_error(outputs, safety, 0.0)
+    return _known(outputs, HistoryError(error, of_pairs, response, rate, frequency), unknown, area)
 
 
 def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray) -> HistoryError:
@@ -121,38 +100,51 @@ def error_of_given_steps(outputs: Both, adaptive: HistoryError, area: FloatArray
     outputs: the history, and the adaptive one in place of the reference solution, at the counts to report.
     adaptive: errors of the adaptive history at these counts. area (n_contact,): m2.
     """
+    apart, other = _depth_change(outputs), outputs.other("wear_depth") @ area
+    found = HistoryError(
+        apart @ area + adaptive.worn_volume * other,
+        apart + adaptive.wear_depth,
+        # both relative errors of the adaptive history are nearly those of this one: their values are as large
+        _response_change(outputs) + adaptive.response,
+        _rate_change(outputs) + adaptive.wear_rate,
+        _frequency_error(outputs, 1.0, adaptive.frequency),
+    )
+    return _known(outputs, found, ~np.isfinite(found.worn_volume), area)
+
+
+def _known(outputs: Both, found: HistoryError, unknown: BoolArray, area: FloatArray) -> HistoryError:
+    """Errors whose worn volume, m3, becomes relative: inf where unknown (n,), NaN beyond the end of the history.
+
+    An unworn state has errors of its own, from states with more harmonics.
+    """
     fine, depth = outputs.fine, outputs.fine["wear_depth"]
-    apart, volume, other = _depth_change(outputs), depth @ area, outputs.other("wear_depth") @ area
-    error = apart @ area + adaptive.worn_volume * other
-    reached = np.isfinite(volume)
-    unknown = reached & ~np.isfinite(error)
-    relative = _over(error, volume)
-    relative[unknown & (volume > 0.0)] = np.inf
-    of_pairs = np.where(unknown[:, None], np.where(depth > 0.0, np.inf, 0.0), apart + adaptive.wear_depth)
-    relative[~reached], of_pairs[~reached] = np.nan, np.nan
-    unworn = (outputs.counts == 0.0) | (volume <= 0.0)
+    volume = depth @ area
+    reached, unworn = np.isfinite(volume), (outputs.counts == 0.0) | (volume <= 0.0)
 
-    def of_state(name: str, change: FloatArray, known: FloatArray) -> FloatArray:
-        found = np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], change + known)))
-        return np.where(reached, found, np.nan)
+    def of_state(name: str, error: FloatArray) -> FloatArray:
+        larger = np.where(unworn, fine[name], np.where(unknown, np.inf, np.fmax(fine[name], error)))
+        return np.where(reached, larger, np.nan)
 
-    # both relative errors of the adaptive history are nearly those of this one: their values are as large
-    response = of_state("response_error", _response_change(outputs), adaptive.response)
-    rate = of_state("wear_rate_error", _rate_change(outputs), adaptive.wear_rate)
-    return HistoryError(relative, of_pairs, response, rate, _frequency_error(outputs, 1.0, adaptive.frequency))
+    relative = np.where(unknown & (volume > 0.0), np.inf, _over(found.worn_volume, volume))
+    of_pairs = np.where(unknown[:, None], np.where(depth > 0.0, np.inf, 0.0), found.wear_depth)
+    return HistoryError(
+        np.where(reached, relative, np.nan),
+        np.where(reached[:, None], of_pairs, np.nan),
+        of_state("response_error", found.response),
+        of_state("wear_rate_error", found.wear_rate),
+        found.frequency,
+    )
 
 
 def error_of_target(
     target: WearTarget, at: float, other: float, depth: FloatArray, error: HistoryError, rate: float, area: FloatArray
 ) -> float:
-    """Estimated error of a life: of the count at which a history reaches its target, in the unit of the counts.
-
-    The larger one of the difference to the other solution and of the time that the error of the wear takes.
+    """Estimated error of the count at which a history reaches its target: its difference to the other solution, or the
+    time that the error of the wear takes, if that is longer.
 
     at, other: counts at which both solutions reach the target; inf or NaN where the other one does not.
-    depth (n_contact,): at the target, m; error: of the history at two counts, of which the target is the second.
-    rate: growth per count of the largest depth, m, or of the worn volume, m3, of which a resonance is a function.
-    area (n_contact,): m2.
+    depth (n_contact,): at the target, m. error: of the history at two counts, of which the target is the second.
+    rate: growth per count of the largest depth, m, or of the worn volume, m3. area (n_contact,): m2.
     """
     if target.quantity == "wear_depth":
         # any pair may have the largest depth within its error
@@ -177,9 +169,7 @@ def _frequency_error(both: Both, safety: float, known: FloatArray | float) -> Fl
 def largest_before(cycles: FloatArray, differences: FloatArray, counts: FloatArray) -> FloatArray:
     """Largest difference (n_output, ...) from `CROSSING_WINDOW` times each count up to this count; 0 if none.
 
-    cycles (n,): ascending counts at which both were compared.
-    differences (n, ...): of any quantity; NaN beyond the end of the reference solution.
-    counts (n_output,): at which the error is asked for.
+    cycles (n,): ascending counts of the differences (n, ...), which are NaN beyond the end of the reference solution.
     """
     known = np.isfinite(differences).all(axis=tuple(range(1, differences.ndim)))
     at, differences = cycles[known], differences[known]

@@ -7,8 +7,7 @@ error is below `rtol`:
 - A state without even harmonics goes on without them.
 - A state in which nothing slips or opens keeps the first harmonic only, which is then exact.
 - Masses that ratchet are brought to rest first (`solver.continuation.natural`).
-- Where Newton's method diverges from a state with fewer harmonics, the others start from its force samples, as far as
-  the number of unknowns allows.
+- Where Newton's method diverges from a state with fewer harmonics, new ones begin as those of the force samples.
 """
 
 from __future__ import annotations
@@ -20,14 +19,13 @@ import numpy as np
 from solver.accuracy.error_estimate import NOTHING, UNKNOWN, Estimate
 from solver.accuracy.harmonic_levels import (
     HARMONIC_LEVELS,
-    MOST_UNKNOWNS,
     fewer,
     levels_to,
+    nothing_happens,
     reach,
-    room_for,
     shifted,
+    shortest_contact,
 )
-from solver.accuracy.period_events import nothing_happens, shortest_contact
 from solver.accuracy.resolved_state import FAINT_SHARE, ResolvedState
 from solver.harmonic_balance.state import State
 from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, FORCING, SMALL_JOINT
@@ -47,7 +45,7 @@ TRIPLE_SAMPLES_SAFETY = 2.0
 
 KEPT_FRACTION = 0.5
 """Fraction of rtol: error up to which harmonics are removed, so that the next state does not add them at once. A state
-with less than this fraction of the kept error is tried with fewer harmonics and samples."""
+with less than this fraction of that error is tried with fewer harmonics and samples."""
 
 VIBRATION_RECHECK = 0.3
 """Relative change of the vibration after which errors are estimated and harmonics chosen again. Error of the motion of
@@ -57,8 +55,11 @@ MOST_MIXED_HARMONICS = 79
 """Highest harmonic of "auto" with even harmonics: motions with impacts gain nothing from more."""
 
 NODE_UNKNOWNS = 1600
-"""Most unknowns of a node of a sweep: about those of the dovetail of 48 pairs with five harmonics (1584). Most unknowns
-of a small joint, too: impacts couple all harmonics, and no preconditioner helps."""
+"""Most unknowns of a node of a sweep, about those of the dovetail of 48 pairs with five harmonics. Also of a small
+joint: impacts couple all harmonics, and no preconditioner helps."""
+
+MOST_UNKNOWNS = 8000
+"""Most unknowns of a balance of 48 pairs in a history with "auto"."""
 
 COMPARED_UNKNOWNS = 3 * MOST_UNKNOWNS // 2
 """Most unknowns of a balance that is solved to estimate an error."""
@@ -71,8 +72,7 @@ MOST_SAMPLES = 8192
 
 SAMPLES_OF_UNKNOWNS = 512
 """Most samples of a period at the largest number of unknowns; more with fewer unknowns. Nine pairs of a blade that lift
-off at 2000 N: without this limit 27 harmonics take 8192 samples, 0.2 s an iteration, and the wear rate at the edge of
-the contact is no more accurate than with 2048."""
+off at 2000 N: 27 harmonics would take 8192 samples, and the wear rate is no more accurate than with 2048."""
 
 REFINEMENT_WORK = 1.2e6
 """Most Newton iterations of one refinement, times the unknowns two levels up. Failed solves take most of them. A joint
@@ -83,8 +83,7 @@ of 48 pairs with nine harmonics may take 200."""
 class Refined:
     """A state with the harmonics and samples that it needs, or with the most that are allowed.
 
-    case: the case, with the resolution of the state.
-    point: the state, with the parameter of the state that was given.
+    case, point: the case with the resolution of the state, and the state, with the parameter of the given one.
     estimate: estimated errors of the state.
     accurate: whether the estimate is below rtol; only its response where slip shows with more samples than given.
         Always true for fixed settings.
@@ -97,19 +96,14 @@ class Refined:
 
 
 def refine(
-    case: Case,
-    omega: float,
-    excitation_amplitude: float,
-    point: State,
-    run: Run,
-    most: float = MOST_UNKNOWNS,
+    case: Case, omega: float, excitation_amplitude: float, point: State, run: Run, most: float = MOST_UNKNOWNS
 ) -> Refined:
     """Estimate the error of a state at fixed wear depth; refine the state to an error below rtol in automatic settings.
 
     The result is the last state found, with its error, where none is accurate.
 
     case, point: the state and the case with its harmonics and samples. omega, excitation_amplitude: rad/s, N.
-    most: most unknowns of a joint of 48 pairs with more harmonics (`room_for`).
+    most: most unknowns of a joint of 48 pairs with more harmonics.
     """
     given = ResolvedState(case, case.joint(omega, excitation_amplitude), point)
     return _Search(run, run.budget.iterations, most).refined(given.at_rest(run))
@@ -122,10 +116,7 @@ def state_difference(case: Case, joint: Joint, one: State, other: State) -> Esti
 
 @dataclass(frozen=True)
 class _Search:
-    """The search for the harmonics and samples that a state needs.
-
-    run: tolerance and limits. begun: Newton iterations at the start of the search. most: as in `refine`.
-    """
+    """The search for a resolution. begun: Newton iterations at its start. run, most: as in `refine`."""
 
     run: Run
     begun: int
@@ -151,8 +142,15 @@ class _Search:
             holds = here.holds()
             if holds and estimate.largest <= settings.rtol:
                 return self._relaxed(here, estimate)
-            wanted = _wanted(here, by_samples.largest, by_harmonics.largest, holds=holds)
-            following = self._next(here, wanted, finer, richer)
+            # samples and harmonics whose error alone is more than half of rtol are refined
+            orders, samples = here.case.resolution.orders, here.case.resolution.samples
+            if settings.harmonics == "auto" and (not holds or by_harmonics.largest > 0.5 * settings.rtol):
+                above = shifted(here.case.resolution, 1)
+                orders = above.orders
+                samples = above.samples if settings.samples == "auto" else samples
+            if settings.samples == "auto" and by_samples.largest > 0.5 * settings.rtol:
+                samples = 2 * here.case.resolution.samples
+            following = self._next(here, Resolution(orders, samples), finer, richer)
             if following is None:
                 # slip that only many samples show is no reason to reject an accurate motion
                 judged = estimate.response if faint else estimate.largest
@@ -169,11 +167,11 @@ class _Search:
         finest = here.solve_at(Resolution(orders, max(FINE_SAMPLES, 2 * samples)), self.run)
         if finest is None or nothing_happens(finest.point.evaluation):
             return Refined(here.case, here.point, NOTHING, True)
-        while settings.samples == "auto" and (samples := 2 * samples) < finest.case.resolution.samples:
-            level = here.solve_at(Resolution(orders, samples), self.run)
-            if level is not None and not nothing_happens(level.point.evaluation):
-                return level
         if settings.samples == "auto":
+            while (samples := 2 * samples) < finest.case.resolution.samples:
+                level = here.solve_at(Resolution(orders, samples), self.run)
+                if level is not None and not nothing_happens(level.point.evaluation):
+                    return level
             return finest
         missing = here.difference(finest).times(TWO_LEVELS_SAFETY)
         return Refined(here.case, here.point, missing, not settings.automatic or missing.largest <= settings.rtol)
@@ -181,61 +179,42 @@ class _Search:
     def _samples_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error by missing samples, and the state with more samples that gave it.
 
-        The error depends on the position of an event (slip, stick, lift) between two of the N samples.
-
-        - Twice as many samples contain the sample next to an event, which may still be the next one. Then both states
-          have the same error. So the other state has 3 N + 2 samples, which share only the phases 0 and pi with the N.
-        - Many unknowns mean many events. Then 2 N samples suffice, with which the refinement can go on.
+        The error depends on the position of an event (slip, stick, lift) between two of the N samples. With 2 N samples
+        an event may stay next to the same one, and both states have one error. So the other state has 3 N + 2 samples,
+        which share only the phases 0 and pi with the N. Many unknowns mean many events: then 2 N samples suffice.
         """
         orders, samples = here.case.resolution.orders, here.case.resolution.samples
         few = here.unknowns(here.case.resolution) <= EXPENSIVE_UNKNOWNS
         finer = self._compared(here, Resolution(orders, 3 * samples + 2 if few else 2 * samples))
         if finer is None:
             return UNKNOWN, None
-        safety = TRIPLE_SAMPLES_SAFETY if few else TWO_LEVELS_SAFETY
-        return here.difference(finer).times(safety), finer
+        return here.difference(finer).times(TRIPLE_SAMPLES_SAFETY if few else TWO_LEVELS_SAFETY), finer
 
     def _harmonics_error(self, here: ResolvedState) -> tuple[Estimate, ResolvedState | None]:
         """Estimated error by missing harmonics, and the state with more harmonics that gave it.
 
-        The error is the difference to a state with more harmonics (`_levels_to_compare`), or with as many as are found;
-        else to one with fewer, which is larger. The error is unknown where the state with more harmonics does not
-        resolve the shortest contact.
+        The error is the difference to a state with more harmonics (`_levels_to_compare`), else to one with fewer, which
+        is larger. The error is unknown where the state with more harmonics does not resolve the shortest contact.
         """
-        resolution = here.case.resolution
+        resolution, limit = here.case.resolution, here.limit(COMPARED_UNKNOWNS)
         seeing, levels = _levels_to_compare(here)
-        richer, found = self._levels_up(here, levels)
-        above = shifted(resolution, 1)
-        cheap = here.unknowns(above) <= EXPENSIVE_UNKNOWNS and self._allowed(here, above)
-        if richer is None and here.case.settings.harmonics == "auto" and cheap:
+        higher = [shifted(resolution, level) for level in range(1, levels + 1)]
+        higher = [each for each in higher if here.case.model.holds(each.highest) and here.unknowns(each) <= limit]
+        richer, found = self._compared(here, higher[-1]) if higher else None, len(higher)
+        above, below = shifted(resolution, 1), shifted(resolution, -1)
+        seen = 2 * above.highest < resolution.samples and self._allowed(here, above)
+        if richer is None and here.case.settings.harmonics == "auto" and seen:
             # impacts: Newton's method diverges from a warm start with more harmonics, although the state exists
-            richer, found = here.with_impacts(above, self.run), 1
+            richer, found = here.solve_at(above, self.run, with_tail=True), 1
         if seeing > 2 and (richer is None or found < seeing):
             return UNKNOWN, richer
-        below = shifted(resolution, -1)
         other = richer
         if other is None and below.highest < resolution.highest:
             other = self._compared(here, below)
         if other is None:
             return UNKNOWN, None
         single = richer is not None and found == 1
-        safety = ONE_LEVEL_SAFETY if single else TWO_LEVELS_SAFETY
-        return here.difference(other).times(safety), richer
-
-    def _levels_up(self, here: ResolvedState, levels: int) -> tuple[ResolvedState | None, int]:
-        """The state so many levels up, at once or level by level, or as many as are found; and their number."""
-        above = [shifted(here.case.resolution, level) for level in range(1, levels + 1)]
-        room = room_for(COMPARED_UNKNOWNS, here.joint.component_index.size)
-        above = [each for each in above if here.case.model.holds(each.highest) and here.unknowns(each) <= room]
-        found = self._compared(here, above[-1]) if above else None
-        if found is not None or len(above) < 2:
-            return found, len(above)
-        for number, resolution in enumerate(above):
-            level = self._compared(found or here, resolution)
-            if level is None:
-                return found, number
-            found = level
-        return found, len(above)
+        return here.difference(other).times(ONE_LEVEL_SAFETY if single else TWO_LEVELS_SAFETY), richer
 
     def _compared(self, here: ResolvedState, resolution: Resolution) -> ResolvedState | None:
         """The state with other harmonics and samples, as accurately as a comparison needs; None where not found."""
@@ -251,24 +230,20 @@ class _Search:
         limit = self.begun + REFINEMENT_WORK / here.unknowns(shifted(here.case.resolution, 2))
         if wanted == here.case.resolution or not self._allowed(here, wanted) or self.run.budget.iterations >= limit:
             return None
-        known = [state for state in (finer, richer) if state is not None]
-        exact = [state for state in known if state.case.resolution == wanted]
-        above = [state for state in known if state.case.resolution.highest > wanted.highest]
-        for start in exact or (here, *above):
-            if (found := start.solve_at(wanted, self.run)) is not None:
-                return found
+        exact = next((each for each in (finer, richer) if each and each.case.resolution == wanted), None)
+        found = (exact or here).solve_at(wanted, self.run)
         both = here.case.settings.harmonics == here.case.settings.samples == "auto"
-        usable = richer is not None and not exact and both and self._allowed(here, richer.case.resolution)
-        return richer if usable else None
+        if found is None and richer and not exact and both and self._allowed(here, richer.case.resolution):
+            return richer
+        return found
 
     def _allowed(self, here: ResolvedState, resolution: Resolution) -> bool:
         """Whether "auto" may take these harmonics and samples."""
-        n_rel, unknowns = here.joint.component_index.size, here.unknowns(resolution)
-        most = room_for(self.most, n_rel)
+        unknowns, most = here.unknowns(resolution), here.limit(self.most)
         # the contact law costs unknowns times samples
         if unknowns * resolution.samples > SAMPLES_OF_UNKNOWNS * most:
             return False
-        if n_rel <= SMALL_JOINT:
+        if here.joint.component_index.size <= SMALL_JOINT:
             most = min(most, NODE_UNKNOWNS)
         if resolution.highest > MOST_MIXED_HARMONICS:
             # more harmonics for friction without impacts only, whose harmonics are odd
@@ -278,10 +253,7 @@ class _Search:
         return in_levels and resolution.samples <= MOST_SAMPLES and unknowns <= most
 
     def _relaxed(self, here: ResolvedState, estimate: Estimate) -> Refined:
-        """An accurate state with as few harmonics and samples as it needs.
-
-        The error is kept below a fraction of rtol, so that the next state does not need more harmonics at once.
-        """
+        """An accurate state with as few harmonics and samples as it needs for a fraction of rtol."""
         enough = KEPT_FRACTION * here.case.settings.rtol
         while estimate.largest <= KEPT_FRACTION * enough:
             lower = fewer(here.case.resolution, here.case.settings)
@@ -310,15 +282,3 @@ def _levels_to_compare(here: ResolvedState) -> tuple[int, int]:
     highest = reach(model, here.joint.omega, resolution.highest)
     seeing, far, reaching = (levels_to(resolution, wanted) for wanted in (0.5 / contact, 1.0 / contact, highest))
     return min(seeing, cheap), min(max(far, reaching), cheap)
-
-
-def _wanted(here: ResolvedState, by_samples: float, by_harmonics: float, *, holds: bool) -> Resolution:
-    """The next resolution: samples and harmonics whose error alone is more than half of rtol are refined."""
-    resolution, settings = here.case.resolution, here.case.settings
-    wanted, half = resolution, 0.5 * settings.rtol
-    if settings.harmonics == "auto" and (not holds or by_harmonics > half):
-        above = shifted(resolution, 1)
-        wanted = above if settings.samples == "auto" else Resolution(above.orders, resolution.samples)
-    if settings.samples == "auto" and by_samples > half:
-        wanted = Resolution(wanted.orders, 2 * resolution.samples)
-    return wanted

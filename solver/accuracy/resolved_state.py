@@ -9,17 +9,13 @@ import numpy as np
 
 from solver.accuracy.certificate import SMALL_WORK, certify
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.harmonic_levels import n_unknowns
-from solver.accuracy.period_events import half_wave_symmetric, lacks_even
+from solver.accuracy.harmonic_levels import half_wave_symmetric, lacks_even
 from solver.continuation.natural import ratchets, shake_down
-from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.prolongation import carried_history, transfer
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import State, largest_responses, transfer
 from solver.model import ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, all_orders
-from solver.structure.fourier import build_basis, change_orders, to_complex
+from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
 
 FAINT_SHARE = 0.1
@@ -38,29 +34,14 @@ class ResolvedState:
     joint: Joint
     point: State
 
-    def solve_at(self, resolution: Resolution, run: Run, *, from_samples: bool = False) -> ResolvedState | None:
-        """The state with other harmonics and samples; None where it is not found.
-
-        from_samples: new harmonics start from those of the force samples, and not from zero.
-        """
-        if from_samples and 2 * resolution.highest >= self.case.resolution.samples:
-            return None
-        case, known = self.case.at(resolution), self.point.evaluation
+    def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> ResolvedState | None:
+        """The state with other harmonics and samples; None where it is not found. with_tail: as in `transfer`."""
+        case = self.case.at(resolution)
         joint = case.joint(self.joint.omega, self.joint.excitation_amplitude)
-        balance, start = (_from_samples if from_samples else transfer)(self.case, joint, known)
+        balance, start = transfer(self.case, joint, self.point.evaluation, with_tail=with_tail)
         point = run.fresh().state(balance, start, self.point.parameter)
         # the mean position of a mass depends a little on the harmonics
         return None if point is None else replace(self, case=case, joint=joint, point=point).at_rest(run)
-
-    def with_impacts(self, resolution: Resolution, run: Run) -> ResolvedState | None:
-        """The state with more harmonics, which start from the force samples, at once or half of them first."""
-        found = self.solve_at(resolution, run, from_samples=True)
-        middle = (self.case.resolution.highest + resolution.highest) // 2
-        orders = tuple(order for order in resolution.orders if order <= middle)
-        if found is not None or orders in (self.case.resolution.orders, resolution.orders):
-            return found
-        half = self.solve_at(Resolution(orders, resolution.samples), run, from_samples=True)
-        return half and (half.solve_at(resolution, run) or half.solve_at(resolution, run, from_samples=True))
 
     def at_rest(self, run: Run) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
@@ -82,7 +63,11 @@ class ResolvedState:
 
     def unknowns(self, resolution: Resolution) -> int:
         """Number of unknowns of the balance with other harmonics."""
-        return n_unknowns(resolution, self.joint.component_index.size)
+        return self.joint.component_index.size * (2 * len(resolution.orders) + 1)
+
+    def limit(self, unknowns: float) -> float:
+        """A limit of the unknowns with 48 pairs for this joint: of a larger joint it limits the harmonics only."""
+        return unknowns * max(1.0, self.joint.component_index.size / 144)
 
     def holds(self) -> bool:
         """Whether all violations of the certificate are below their limits."""
@@ -101,13 +86,11 @@ class ResolvedState:
     def difference(self, better: ResolvedState) -> Estimate:
         """Relative differences of response and wear rate to a better state."""
         mine, its = self.response(), better.response()
-        least = better._least_response()
+        least, work = better._least_response(), max(self._least_work(), better._least_work())
         first = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), least)
-        mine_peak, its_peak = self.peaks, better.peaks
-        size = np.maximum(its_peak, max(SMALL_PEAK * float(its_peak.max(initial=0.0)), least))
-        response = max(first, float((np.abs(mine_peak - its_peak) / size).max(initial=0.0)))
+        size = np.maximum(better.peaks, max(SMALL_PEAK * float(better.peaks.max(initial=0.0)), least))
+        response = max(first, float((np.abs(self.peaks - better.peaks) / size).max(initial=0.0)))
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
-        work = max(self._least_work(), better._least_work())
         if max(its_slip, mine_slip) <= SMALL_WORK * work:
             return Estimate(response, 0.0)
         # the wear rate cannot be more accurate than the motion that causes it
@@ -115,9 +98,8 @@ class ResolvedState:
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))
 
     def _least_response(self) -> float:
-        """Response, m, below which a relative error has no meaning, as for a mass that friction holds.
-
-        It is a small fraction of the response that the excitation would cause on the stiffness of the joint alone.
+        """Response, m, below which a relative error has no meaning, as for a mass that friction holds: a small fraction
+        of the response that the excitation would cause on the stiffness of the joint alone.
         """
         structure = self.joint.structure
         moved = structure.harmonic_force / self.joint.relative_penalty
@@ -128,24 +110,3 @@ class ResolvedState:
         """Slip work, N m, below which its error has less weight: a fraction of the work of the excitation."""
         motion = self.joint.to_relative(self.point.evaluation.displacement_h)
         return SMALL_WORK * abs(self.joint.structure.input_work(motion))
-
-
-def _from_samples(old: Case, joint: Joint, evaluation: Evaluation) -> tuple[Balance, FloatArray]:
-    """As `transfer`; the new harmonics of the force are those of its samples, and move the structure.
-
-    Zeros would remove the impacts that the samples contain.
-    """
-    balance = Balance(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
-    orders, known = joint.basis.orders, old.resolution.orders
-    force = joint.to_relative(evaluation.force_t @ build_basis(orders, evaluation.force_t.shape[2]).analysis)
-    motion_h, force_h = (
-        change_orders(joint.to_relative(part), known, orders)
-        for part in (evaluation.displacement_h, evaluation.force_h)
-    )
-    for place in np.flatnonzero(~np.isin(orders, known)):
-        both = slice(2 * place + 1, 2 * place + 3)
-        force_h[:, both] = force[:, both]
-        amplitude = force[:, 2 * place + 1] - 1j * force[:, 2 * place + 2]
-        moved = -np.linalg.solve(joint.structure.moving.matrix(int(place)), amplitude)
-        motion_h[:, 2 * place + 1], motion_h[:, 2 * place + 2] = moved.real, -moved.imag
-    return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))

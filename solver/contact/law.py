@@ -31,17 +31,16 @@ if TYPE_CHECKING:
 class Marched:
     """Contact forces and states of the pairs under a predicted force, at N samples.
 
-    - predicted_t (n_contact, 3, N): predicted force, N; tangential ones of inertial pairs as means over the steps.
-    - force_t (n_contact, 3, N): contact force, N, compression positive; means for inertial pairs as in predicted_t.
-    - force_h (n_contact, 3, m): its harmonics, N.
-    - state_t (n_contact, 2, N+1): tangential state, N, from the start of the period on; of inertial pairs displacement,
-      m.
-    - start (n_contact, 2): tangential state at the start of the first period, N; for inertial pairs the velocity at the
+    - predicted_t, force_t (n_contact, 3, N): predicted and contact force, N, compression positive; tangential ones of
+      inertial pairs as means over the steps.
+    - force_h (n_contact, 3, m): harmonics of the contact force, N.
+    - state_t (n_contact, 2, N+1): tangential state from the start of the last period on.
+    - start (n_contact, 2): tangential state at the start of the first period, N; of inertial pairs the velocity at the
       start of the last period, m/s.
     - status_t (n_contact, N): SEPARATED, STICK or SLIP.
     - periods (n_contact,): number of periods that were marched.
     - periodicity_error: change of the tangential state over the last period, N.
-    - slip_work (n_contact,): integral of normal force times slip distance over a period, J (`solver.contact.wear_law`).
+    - slip_work (n_contact,): integral of normal force times slip distance over a period, J.
     """
 
     predicted_t: FloatArray
@@ -56,10 +55,8 @@ class Marched:
 
     @property
     def stuck(self) -> BoolArray:
-        """Pairs (n_contact,) that stick during the whole period and so transmit the predicted force.
-
-        The start of a period that was marched more than once may depend on the force.
-        """
+        """Pairs (n_contact,) that stick during the whole period and so transmit the predicted force."""
+        # the start of a period that was marched more than once may depend on the force
         return np.asarray((self.status_t == STICK).all(axis=1) & (self.periods == 1))
 
 
@@ -164,10 +161,7 @@ class ContactLaw:
     # --- motion ---
 
     def motion(self, correction: FloatArray) -> FloatArray:
-        """Motion (n_contact, 3, m, ...), m, from predicted less contact force, N, of equal shape.
-
-        A linear map: Eq. (12) divided by the penalty; Newton's law for inertial pairs. Means are relative to `origin`.
-        """
+        """Motion (n_contact, 3, m, ...), m, relative to `origin`, from predicted less contact force, N, Eq. (12)."""
         return _scaled(correction, self.compliance)
 
     def force(self, motion: FloatArray) -> FloatArray:
@@ -222,18 +216,14 @@ class ContactLaw:
 
         pairs (n_contact,): pairs that are marched; inertial ones keep their history. first, last (n_contact, 3, N), N.
         """
-        moving, found = pairs & ~self.penalty.inertial, history.copy()
-        if moving.any():
-            first, last = first[moving], last[moving]
-            friction, stiffness = self.friction_coefficient[moving], self.penalty.tangential[moving, None]
-            periodicity = ROUND_OFF * float(friction_limit(friction, last[:, 0].max(axis=1)).max())
-            state = history[moving] * stiffness
-            for part in parts:
-                period = new_period(first + part * (last - first), friction, state)
-                march_period(np.arange(len(state)), period, periodicity, MOST_PERIODS)
-                state = period.state_t[:, :, -1]
-            found[moving] = state / stiffness
-        return found
+        moving, stiffness = pairs & ~self.penalty.inertial, self.state_stiffness[:, None]
+        limit = friction_limit(self.friction_coefficient, last[:, 0].max(axis=1))[moving].max(initial=0.0)
+        state = history * stiffness
+        for part in parts:
+            period = new_period(first + part * (last - first), self.friction_coefficient, state)
+            march_period(np.flatnonzero(moving), period, ROUND_OFF * float(limit), MOST_PERIODS)
+            state[moving] = period.state_t[moving, :, -1]
+        return np.where(moving[:, None], state / stiffness, history)
 
     def history_from(self, other: Penalty, history: FloatArray, mean: FloatArray, last: FloatArray) -> FloatArray:
         """The history of a state with another penalty.
@@ -262,26 +252,20 @@ class ContactLaw:
         return float(np.abs(at.predicted_t[self.penalty.inertial, 1:]).max(initial=0.0))
 
     def tail(self, at: Marched, basis: FourierBasis) -> FloatArray:
-        """Friction on masses in other harmonics (n_contact, 3, 2k+1), N, from its samples; 0 for elastic pairs.
-
-        The friction force jumps where a mass turns, so that its harmonics fall slowly.
-        """
+        """Friction on masses in other harmonics (n_contact, 3, 2k+1), N, which fall slowly; 0 for elastic pairs."""
         inertial = self.penalty.inertial
         force_h = np.zeros((inertial.size, 3, basis.analysis.shape[1]))
         force_h[inertial, 1:] = at.force_t[inertial, 1:] @ basis.analysis / basis.step_mean
         return force_h
 
-    def beyond_series(self, at: Marched, displacement_h: FloatArray) -> FloatArray:
-        """Tangential motion (n_contact, 2, N), m, that the march adds to the series, half a step before each sample.
+    def beyond_series(self, at: Marched, pairs: list[int], series_t: FloatArray) -> FloatArray:
+        """Tangential motion (n, 2, N), m, that the march adds to the series of some pairs, half a step before samples.
 
-        A mass moves with all harmonics, of which the series `displacement_h` (n_contact, 3, m), m, has the lowest; 0
-        for elastic pairs. The march begins at an arbitrary position, so that the mean comes from the series.
+        A mass moves with all harmonics, of which the series (n, 2, N), m, has the lowest and the mean; 0 for elastic
+        pairs.
         """
-        n_samples, inertial = self.basis.n_samples, self.penalty.inertial
-        ends = self.basis.at(2.0 * np.pi * (np.arange(n_samples) - 0.5) / n_samples)
-        beyond = np.zeros((inertial.size, 2, n_samples))
-        beyond[inertial] = at.state_t[inertial, :, :-1] - displacement_h[inertial, 1:] @ ends
-        return np.asarray(beyond - beyond.mean(axis=2, keepdims=True))
+        added = np.where(self.penalty.inertial[pairs, None, None], at.state_t[pairs, :, :-1] - series_t, 0.0)
+        return np.asarray(added - added.mean(axis=2, keepdims=True))
 
 
 def _scaled(values_h: FloatArray, factor: ComplexArray) -> FloatArray:

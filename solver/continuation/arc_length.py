@@ -1,6 +1,6 @@
 """Pseudo-arc-length continuation of a branch through its folds.
 
-The parameter is the further unknown of a bordered system (`solver.newton.bordering`), and the further equation says
+The parameter is the further unknown of a bordered system (`solver.newton.run`), and the further equation says
 that the point lies in a plane across the tangent of the branch.
 """
 
@@ -15,8 +15,7 @@ from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Evaluation, Linearisation
 from solver.harmonic_balance.state import BalanceAt, State
 from solver.model import FloatArray
-from solver.newton.bordering import Bordered
-from solver.newton.run import Run
+from solver.newton.run import Bordered, Run
 from solver.settings import DIFFERENCE
 
 FIRST_ARC = SMOOTH_CHANGE / 10.0
@@ -32,7 +31,7 @@ SHORTEST_ARC = CORNER_ARC / 10.0
 
 ARC_WANDER = 2.0
 """Distance of a corrector from its start over the length of the step, above which the corrector is given up. Without it
-the branch of `tests/solver/test_natural.py` is left for another one."""
+the branch of `tests/solver/test_whole_response.py` is left for another one."""
 
 
 FOLD_HALVINGS = 10

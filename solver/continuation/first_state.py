@@ -1,16 +1,15 @@
 """The static state of a joint, and its first periodic state from there.
 
-The static state depends on the history of the load. So the load is raised in equal steps, and each step starts from the
-tangential state of the step before. Newton's method finds most steps at once. Where it cycles among sets of pairs that
-slip and open, the step is made in time, as a joint with viscous pairs makes it:
+The static state depends on the history of the load. So the load is raised in equal steps, each from the tangential
+state of the step before. Newton's method finds most of them. Where it cycles among sets of pairs that slip and open,
+the step is made in time, as a joint with viscous pairs makes it, by implicit Euler:
 
     c (u - u_before) + Z_r u + lambda = F_r
 
-in steps of implicit Euler, with c in proportion to the penalty of each pair. A large c binds each pair to its last
-position, and the state is unique for any friction. From step to step c falls, until Newton's method finds the state
-with c = 0: its slip is that since the last viscous step. Also a joint that has to jump moves on (a snap under much
-friction, a body that falls through a gap), and a joint without any static state moves without end, in a direction that
-shows why.
+A large c, in proportion to the penalty of each pair, binds the pair to its last position, and the state is unique for
+any friction. From step to step c falls, until Newton's method finds the state with c = 0. Also a joint that has to jump
+moves on (a snap under much friction, a body that falls through a gap), and a joint without any static state moves
+without end, in a direction that shows why.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from solver.model import FloatArray
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import NEGLIGIBLE
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.fourier import change_orders
 from solver.structure.joint import Case, Joint, static_joint, viscous_joint
 
@@ -36,11 +35,10 @@ LOAD_STEPS = 20
 
 VISCOSITY_CUT, VISCOSITY_RISE = 0.2, 10.0
 """Factors on the viscosity after a step in time, and after a step that was not found. With a cut of 0.05 and 0.1 as
-many random decks (`tests/random_decks.py`) have a static state, for 6 % fewer to 30 % more iterations."""
+many random decks (`tests/random_decks.py`) have a static state."""
 
 VISCOUS_STEPS = 300
-"""Most steps in time. Of 300 random decks one needs more than 60: a block that rocks through a gap with little
-friction."""
+"""Most steps in time. Of 300 random decks one needs more than 60."""
 
 RELIEF = (0.1, 0.4)
 """Fractions of the static friction forces that are removed where the excitation cannot be raised with the full forces.
@@ -57,8 +55,7 @@ def solve_first_state(
        their friction limit slip under the smallest vibration, in states far from the static one, and shake down.
     3. The vibration builds up in time under the whole excitation (`transient`).
 
-    omega, excitation_amplitude: rad/s, N. wear_depth (n_contact,): m, constant.
-
+    omega, excitation_amplitude: rad/s, N. wear_depth (n_contact,): m.
     Returns the state, or START_FAILED, UNSTABLE, UNSETTLED, ADRIFT or an outcome of `solve_static_state`.
     """
     quiet = case.joint(omega, 0.0)
@@ -83,7 +80,7 @@ def solve_first_state(
             return raised
         unstable |= arrived
     whole = case.joint(omega, excitation_amplitude)
-    settled = relax_to_periodic(case, whole, wear_depth, rest.evaluation, quiet, rest.history, run)
+    settled = relax_to_periodic(case, whole, wear_depth, rest, quiet, run)
     return Outcome.UNSTABLE if unstable and isinstance(settled, Outcome) else settled
 
 
@@ -107,11 +104,9 @@ def predicted_at_rest(case: Case, quiet: Joint, static: State, wear_depth: Float
 def solve_static_state(joint: Joint, wear_depth: FloatArray, run: Run) -> State | Outcome:
     """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
 
-    Without gaps, wear and given normal forces all states of a rising load are proportional, and one step is enough. In
-    the first evaluation of the first step all pairs stick.
+    Without gaps, wear and given normal forces all states of a rising load are proportional, and one step is enough.
 
     joint: its excitation is left out. wear_depth (n_contact,): m.
-
     Returns the state; STATIC_SLIDING or STATIC_OPEN where there is no static state, STATIC_FAILED where none is found.
     """
     run, contact = run.fresh(), joint.contact

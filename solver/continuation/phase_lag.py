@@ -2,12 +2,10 @@
 
 With the first harmonics x of all displacements and F of the excitation, `F^H x = |F^H x| exp(-i lag)`. The lag rises
 from 0 below a resonance to pi above; the excitation does most work in phase resonance, at the lag pi/2. The frequency
-is the further unknown of a bordered balance (`solver.newton.bordering`), in an implicit step with the wear depth that
+is the further unknown of a bordered balance (`solver.newton.run`), in an implicit step with the wear depth that
 grows with the motion, and the further equation is
 
     sin(arg(F^H x) + lag) = 0.
-
-The wear depth is eliminated in the Jacobian, so that its change with the frequency is part of the step.
 
 At the largest amplitude of the first response, in its first harmonic, the rise of the amplitude with the lag is zero; a
 secant finds this lag. For a linear oscillator of one degree of freedom with the damping ratio zeta the frequency is
@@ -25,9 +23,8 @@ import numpy as np
 from solver.continuation.natural import ATTEMPTS
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.model import ComplexArray, FloatArray
-from solver.newton.bordering import Bordered
 from solver.newton.linear_solver import FORCING
-from solver.newton.run import Run
+from solver.newton.run import Bordered, Run
 from solver.settings import DIFFERENCE, NEGLIGIBLE, ROUND_OFF
 from solver.structure.condensation import FrequencySlope, frequency_slope
 from solver.structure.fourier import to_complex
@@ -63,8 +60,8 @@ def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
 class AtLag:
     """The problem: a balance, with fixed or with growing wear depths, whose frequency follows from its lag.
 
-    case: of the joint of the balance. balance: at some frequency. lag: rad, between 0 and pi. `Bordered.reduced` is the
-    change of the lag with the frequency along the states, s/rad.
+    balance: at some frequency. lag: rad, between 0 and pi. `Bordered.reduced`: change of the lag with the frequency
+    along the states, s/rad.
     """
 
     case: Case

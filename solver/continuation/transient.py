@@ -29,11 +29,10 @@ from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, final_history
 from solver.model import ComplexArray, FloatArray, LinearModel, Matrix
-from solver.newton.iteration import SHORTEST_STEP
-from solver.newton.run import Run
+from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.condensation import CondensedStructure, condense, relative_indices, whole_motion
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -130,20 +129,12 @@ class Transient:
 
 
 def relax_to_periodic(
-    case: Case,
-    joint: Joint,
-    wear_depth: FloatArray,
-    start: Evaluation,
-    start_joint: Joint,
-    history: FloatArray,
-    run: Run,
+    case: Case, joint: Joint, wear_depth: FloatArray, start: State, start_joint: Joint, run: Run
 ) -> State | Outcome:
     """Stable periodic state of `joint` to which the structure relaxes in time from a state of `start_joint`.
 
     case: model and settings of both joints, which have equal pairs and harmonics; frequency and load may differ.
-    wear_depth (n_contact,): m, constant. start, history (n_contact, 2): first state and tangential history, m; one
-    without excitation leads to the state that builds up from rest.
-
+    wear_depth (n_contact,): m, constant. A start without excitation leads to the state that builds up from rest.
     Returns the state; ADRIFT where the mean positions run away, as all pairs slip and only friction holds the parts;
     UNSTABLE where the motion does not leave an unstable periodic state; UNSETTLED where it does not settle within
     `SEARCH_ITERATIONS`.
@@ -151,13 +142,13 @@ def relax_to_periodic(
     budget = run.budget
     budget.report(f"at {joint.omega / (2.0 * np.pi):.6g} Hz, where the vibration is left to settle in time")
     transient = Transient(case, joint)
-    begun = Transient(case, start_joint).periodic(start).displacement
+    begun, history = Transient(case, start_joint).periodic(start.evaluation).displacement, start.history
     # amplitudes of a periodic motion that are constant at the frequency of this joint
     motion = Motion(begun, transient.rates[:, None] * begun)
-    predicted, period = start.predicted_h, 2.0 * np.pi / joint.omega
+    predicted, period = start.evaluation.predicted_h, 2.0 * np.pi / joint.omega
     # the longest step, in periods, is practically infinite: the step is the harmonic balance itself
     length, longest, tried = 1.0, 1.0 / ROUND_OFF, np.inf
-    size = float(np.abs(start.displacement_h).max())
+    size = float(np.abs(start.evaluation.displacement_h).max())
     left = SEARCH_ITERATIONS
     # whether an unstable state has been found, which the motion leaves
     grows = False

@@ -6,10 +6,9 @@ with the corrected motion `X`), so that
 
     R(p) = Z_r u(p) + lambda(p) - F_r                                                                      (8)
 
-is the only coupled equation. For a given wear depth, a linear change of variable turns this residual into the residual
-in u of the paper. So the Newton iterations are equal. With the implicit scheme `W = W_k + h g(p)`, Eqs. (24), (26) (the
-print of (26b) lacks h). The wear rate of a pair depends on p of this pair alone. So W is eliminated pair by pair, and
-the Jacobian changes by a block of rank one for each pair:
+is the only coupled equation; a linear change of variable gives the residual in u of the paper, with equal Newton
+iterations. With the implicit scheme `W = W_k + h g(p)`, Eqs. (24), (26) (the print of (26b) lacks h). The wear rate of
+a pair depends on p of this pair alone, so that W is eliminated by a block of rank one for each pair:
 
     dR/dp = Z_r [(I - dlambda/dp) / eps + d W/dp] + dlambda/dp
 """
@@ -34,7 +33,6 @@ from solver.structure.joint import Joint
 class Balance:
     """A periodic problem: a joint, the tangential history of its pairs, and the wear.
 
-    - joint: the joint.
     - history (n_contact, 2): corrected slip X_T at the start of the period, m.
     - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6).
     - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given.
@@ -55,9 +53,8 @@ class Balance:
         return self.joint.to_relative(force_h + self.joint.law.force(motion))
 
     def evaluate(self, predicted_h: FloatArray) -> Evaluation:
-        """Residual, Eq. (8), and all intermediate results, for a predicted force (n_rel, 2H+1), N.
-
-        Eqs. (11)-(15) give the contact force, Eq. (12) the motion, Eq. (24) the wear depth in an implicit step.
+        """Residual, Eq. (8), contact force, Eqs. (11)-(15), motion, Eq. (12), and wear depth, Eq. (24), for a predicted
+        force (n_rel, 2H+1), N.
         """
         joint = self.joint
         pairs = joint.to_pairs(predicted_h)
@@ -139,14 +136,12 @@ def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tup
 class Linearisation:
     """`dR/dp = Z_r motion_tangent + force_tangent`, both (n_contact, 3m, 3m) blocks of the pairs, m = 2H+1.
 
-    - joint: the joint.
     - at: contact forces and states of the pairs at the point of linearisation.
     - force_tangent (n_contact, 3m, 3m): derivative of the contact force, dimensionless.
     - growth_tangent (n_contact, 3m): derivative of the wear depth, m/N, which is a part of the static normal motion.
 
-    The motion of a pair that sticks during the whole period does not depend on p. The columns of its unknowns in the
-    Jacobian are columns of the identity. These unknowns are left out of the coupled system and computed from its
-    solution (`active`).
+    The motion of a pair that sticks during the whole period does not depend on p: the columns of its unknowns are those
+    of the identity. They are left out of the coupled system of the `active` pairs and computed from its solution.
     """
 
     joint: Joint
@@ -180,29 +175,28 @@ class Linearisation:
 
     def transmit(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Changes of motion, m, and contact force, N, both (n_contact, 3, m), for a step (n_rel, m), N."""
-        held, motion = self._held_back(step)
-        return self.joint.to_pairs(motion), self.joint.to_pairs(step - held)
+        rest, motion = self._untransmitted(step)
+        return self.joint.to_pairs(motion), self.joint.to_pairs(step - rest)
 
     def apply(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step (n_rel, m), N."""
-        held, motion = self._held_back(step)
-        return self.joint.structure.apply(motion) + step - held
+        rest, motion = self._untransmitted(step)
+        return self.joint.structure.apply(motion) + step - rest
 
     def apply_roughly(self, step: FloatArray) -> FloatArray:
         """Jacobian times a step to at least three digits in less time, for directions of Newton's method."""
-        held, motion = self._held_back(step)
-        return self.joint.structure.apply_roughly(motion) + step - held
+        rest, motion = self._untransmitted(step)
+        return self.joint.structure.apply_roughly(motion) + step - rest
 
-    def _held_back(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _untransmitted(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Part of a step (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m."""
         joint = self.joint
         blocks = self.force_tangent, joint.law.compliance, self.growth_tangent
-        return hold_back(np.ascontiguousarray(step), joint.pair_rows, self.active, *blocks)
+        return untransmitted(np.ascontiguousarray(step), joint.pair_rows, self.active, *blocks)
 
     def dense(self, pairs: IntArray, kept: int | None = None) -> FloatArray:
-        """Rows and columns of the Jacobian for some pairs, in the order (relative displacement, harmonic).
-
-        kept: number of harmonics, 2H'+1; by default all.
+        """Rows and columns of the Jacobian for some pairs and the first `kept` harmonics, 2H'+1, by default all; in the
+        order (relative displacement, harmonic).
         """
         motion, matrix = self.matrices(pairs, kept)
         rows, k, structure = self.joint.rows_of(pairs), motion.shape[1], self.joint.structure
@@ -231,7 +225,7 @@ class Linearisation:
 
 
 @njit(cache=True)
-def hold_back(
+def untransmitted(
     step: FloatArray,
     rows: IntArray,
     active: IntArray,
@@ -241,14 +235,11 @@ def hold_back(
 ) -> tuple[FloatArray, FloatArray]:
     """Part of a predicted force (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m.
 
-    - step (n_rel, m): predicted force, N.
-    - rows (n_contact, 3): row of each component, -1 for none.
-    - active (n,): pairs that do not transmit everything.
-    - force_tangent (n_contact, 3m, 3m), growth (n_contact, 3m): as in `Linearisation`.
-    - compliance (n_contact, 3, H+1): displacement per force in each harmonic, m/N.
+    rows (n_contact, 3): row of each component, -1 for none. compliance (n_contact, 3, H+1): displacement per force in
+    each harmonic, m/N. The others as in `Linearisation`.
     """
     m = step.shape[1]
-    held, motion, own = np.zeros_like(step), np.zeros_like(step), np.zeros(3 * m)
+    rest, motion, own = np.zeros_like(step), np.zeros_like(step), np.zeros(3 * m)
     for pair in active:
         own[:] = 0.0
         for i in range(3):
@@ -260,13 +251,13 @@ def hold_back(
             if row < 0:
                 continue
             for k in range(m):
-                held[row, k] = own[i * m + k] - passed[i * m + k]
-            motion[row, 0] = compliance[pair, i, 0].real * held[row, 0]
+                rest[row, k] = own[i * m + k] - passed[i * m + k]
+            motion[row, 0] = compliance[pair, i, 0].real * rest[row, 0]
             for n in range(1, m // 2 + 1):
-                cosine, sine, of = held[row, 2 * n - 1], held[row, 2 * n], compliance[pair, i, n]
+                cosine, sine, of = rest[row, 2 * n - 1], rest[row, 2 * n], compliance[pair, i, n]
                 # a complex amplitude is cosine - i sine
                 motion[row, 2 * n - 1] = of.real * cosine + of.imag * sine
                 motion[row, 2 * n] = of.real * sine - of.imag * cosine
             if i == 0:
                 motion[row, 0] += np.dot(growth[pair], own)
-    return held, motion
+    return rest, motion

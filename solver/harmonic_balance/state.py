@@ -1,4 +1,4 @@
-"""A converged state with the tangential history that it leaves to the next state, or the reason why there is none."""
+"""A converged state: the history that it leaves, the state with other harmonics, its largest response; or a failure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import FloatArray
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.structure.joint import Joint
+from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC
+from solver.structure.condensation import build_structure
+from solver.structure.fourier import build_basis, change_orders, from_complex, synthesis, to_complex
+from solver.structure.joint import Case, Joint
 
 BalanceAt = Callable[[float, FloatArray], Balance]
 """The balance at a value of a parameter for a tangential history (n_contact, 2), m."""
@@ -43,9 +46,8 @@ class Failure:
 
 
 def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
-    """Tangential history (n_contact, 2), m, for the next state.
-
-    Elastic pairs: the corrected slip X_T at the end of the period. Inertial pairs: the mean position.
+    """Tangential history (n_contact, 2), m, for the next state: the slip X_T at the end of the period, or the mean
+    position of an inertial pair.
     """
     return balance.joint.law.final_history(evaluation, evaluation.displacement_h)
 
@@ -53,10 +55,9 @@ def final_history(balance: Balance, evaluation: Evaluation) -> FloatArray:
 def history_at_rest(joint: Joint, state: State) -> FloatArray:
     """Tangential history (n_contact, 2), m, for a next state in which pairs that slip now may stick.
 
-    When the range of slip of a pair shrinks to zero, the pair comes to stick in the middle of the range. So the history
-    of a slipping pair is the middle of its slip in the closed samples. A pair that goes on slipping does not remember
-    its history. Behind the resonance of the dovetail the motion after a sweep is 0.5 % wrong with the middle, and 2.3 %
-    with `final_history`, for an equal number of states.
+    A pair whose range of slip shrinks to zero comes to stick in the middle of the range: the middle of its slip in the
+    closed samples. Behind the resonance of the dovetail the motion after a sweep is 0.5 % wrong with the middle, and
+    2.3 % with `final_history`, for an equal number of states.
     """
     return joint.law.middle_history(state.evaluation, state.history)
 
@@ -69,3 +70,81 @@ def vibration_change(before: Evaluation, after: Evaluation) -> float:
 def vibration_size(evaluation: Evaluation) -> float:
     """Norm of the vibrating part of the predicted force, N, above zero."""
     return max(float(np.linalg.norm(evaluation.predicted_h[:, 1:])), 1e-300)
+
+
+# --- other harmonics: another penalty, with which a pair may be inertial instead of elastic ---
+
+
+def transfer(old: Case, joint: Joint, evaluation: Evaluation, *, with_tail: bool = False) -> tuple[Balance, FloatArray]:
+    """Balance of `joint`, and a predicted force (n_rel, m), N, to start from, for a state of the case `old`.
+
+    with_tail: new harmonics of the force are those of its samples, and those of the motion follow from the structure.
+    Zeros would remove the impacts that the samples contain.
+    """
+    balance = Balance(joint, carried_history(old, joint, evaluation), evaluation.wear_depth)
+    orders, known = joint.basis.orders, old.resolution.orders
+    motion_h, force_h = (
+        change_orders(joint.to_relative(part), known, orders)
+        for part in (evaluation.displacement_h, evaluation.force_h)
+    )
+    if with_tail:
+        force = joint.to_relative(evaluation.force_t @ build_basis(orders, evaluation.force_t.shape[2]).analysis)
+        for place in np.flatnonzero(~np.isin(orders, known)):
+            both = slice(2 * place + 1, 2 * place + 3)
+            force_h[:, both] = force[:, both]
+            amplitude = to_complex(force)[:, place]
+            moved = -np.linalg.solve(joint.structure.moving.matrix(int(place)), amplitude)
+            motion_h[:, both] = np.stack([moved.real, -moved.imag], axis=1)
+    return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))
+
+
+def carried_history(old: Case, joint: Joint, evaluation: Evaluation) -> FloatArray:
+    """Tangential history (n_contact, 2), m, of a state of the case `old`, converted for the law of `joint`."""
+    tangential = evaluation.displacement_h[:, 1:]
+    end = np.array([-2.0 * np.pi / evaluation.force_t.shape[2]])
+    last = (tangential @ synthesis(old.resolution.orders, end))[:, :, 0]
+    return joint.law.history_from(old.penalty, evaluation.history, tangential[:, :, 0], last)
+
+
+# --- the largest response ---
+
+
+def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:
+    """Largest magnitudes over a period of the responses (n_response,), m, the static ones included.
+
+    With the tail of friction on rigid ground: at the turn of the mass the harmonics above the highest one of the
+    balance have one sign, and without them the error of the peak falls only with the square of the highest harmonic.
+    """
+    response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
+    response_t = response_h @ build_basis(joint.basis.orders, FINE_SAMPLES).synthesis
+    orders = tail_orders(joint)
+    if orders:
+        response_t = response_t + _tail_h(joint, evaluation, orders) @ build_basis(orders, FINE_SAMPLES).synthesis
+    return np.asarray(np.abs(response_t).max(axis=1))
+
+
+def tail_orders(joint: Joint) -> tuple[int, ...]:
+    """Harmonics of the tail, odd ones where the balance has only odd ones; none where no mass sits on rigid ground."""
+    orders = joint.basis.orders
+    if not orders or not joint.law.rate_dependent:
+        return ()
+    stride = 2 if orders[-1] > 1 and all(order % 2 for order in orders) else 1
+    # three times the highest harmonic: what the usual samples of a harmonic still resolve
+    resolved = (SAMPLES_PER_HARMONIC // 2 - 1) * orders[-1]
+    last = min(resolved, joint.basis.n_samples // 2 - orders[-1], FINE_SAMPLES // 4)
+    return tuple(order for order in range(orders[-1] + stride, last + 1, stride) if joint.model.holds(order))
+
+
+def _tail_h(joint: Joint, evaluation: Evaluation, orders: tuple[int, ...]) -> FloatArray:
+    """Responses (n_response, 2k+1), m, to the friction on masses in k harmonics: `u_n = -lambda_n / Z_n`."""
+    still = np.zeros(joint.structure.static_response.shape[0])
+    try:
+        # the load acts in the first harmonic alone
+        structure = build_structure(joint.model, joint.omega, 0.0, orders)
+    except np.linalg.LinAlgError:
+        # the structure with its joint held is singular at one of these harmonics
+        return np.zeros((still.size, 2 * len(orders) + 1))
+    force_h = joint.law.tail(evaluation, build_basis(orders, joint.basis.n_samples))
+    force = to_complex(joint.to_relative(force_h)).T[:, :, None]
+    moved = -np.linalg.solve(structure.dynamic_stiffness, force)
+    return from_complex(still, np.matmul(structure.dynamic_response, moved)[:, :, 0].T)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -34,11 +34,11 @@ from solver.structure.condensation import build_structure
 from solver.structure.joint import Case, build_case
 
 FIRST_ITERATIONS = SWEEP_ITERATIONS // 8
-"""Most Newton iterations of all attempts to begin a sweep, or to find a state where the sweep is lost. Tens to hundreds
-suffice where some pairs stick; a joint that slips everywhere takes all of them in vain."""
+"""Most Newton iterations to begin a sweep, or to find a state where the sweep is lost; tens to hundreds suffice where
+some pairs stick."""
 
 OTHER_START = Resolution((1,), 64)
-"""Harmonics and samples of a further attempt to find a first state. Of 54 random scenes four need it, and none more."""
+"""Harmonics and samples of a further attempt to find a first state: four of 54 random scenes need it."""
 
 BEGIN_AWAY = 0.3
 """Least distance from the start of a sweep to the point, as a fraction of the frequency of the point. With 0.22 and
@@ -65,6 +65,7 @@ class FrequencySweepState:
     nodes: SweepState
 
 
+@dataclass(eq=False)
 class FrequencySweep:
     """The sweep over frequencies: one `Sweep` for all points of a cell, or one for each point (ramp).
 
@@ -75,22 +76,20 @@ class FrequencySweep:
         is not estimated, and there is no reference sweep.
     """
 
-    def __init__(
-        self,
-        model: ReducedModel,
-        friction_coefficient: float | FloatArray | None,
-        excitation_amplitude: float,
-        sweep: Direction,
-        settings: SolverSettings,
-    ) -> None:
-        self.model, self.friction_coefficient = model, friction_coefficient
-        self.excitation_amplitude, self.sweep, self.settings = excitation_amplitude, sweep, settings
-        self.every = True
-        self.known: tuple[tuple[float, Resolution], ...] = ()
-        self.save: Callable[[], None] = lambda: None
-        self.run = Run(settings.tolerance)
-        self.nodes: Sweep[State] | None = None
-        self.cell = 0
+    model: ReducedModel
+    friction_coefficient: float | FloatArray | None
+    excitation_amplitude: float
+    sweep: Direction
+    settings: SolverSettings
+    every: bool = True
+    known: tuple[tuple[float, Resolution], ...] = ()
+    save: Callable[[], None] = lambda: None
+    nodes: Sweep[State] | None = None
+    cell: int = 0
+    run: Run = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.run = Run(self.settings.tolerance)
 
     @property
     def n_iterations(self) -> int:
@@ -139,7 +138,8 @@ class FrequencySweep:
                 run.budget.limit = run.budget.iterations + FIRST_ITERATIONS
                 first = self._first(path, target, run)
                 if isinstance(first, Outcome):
-                    return self.without_state(why_lost(nodes, first), _where_lost(nodes))
+                    lost = "" if nodes.last is None else f"stable states end {path.describe(nodes.last)}"
+                    return self.without_state(why_lost(nodes, first), lost)
                 path, reached = first[0], Step(first[1])
             at = path.case, omega, self.excitation_amplitude, reached.state, run
             refined = self._at_known(*at) or refine(*at)
@@ -233,7 +233,7 @@ class FrequencySweep:
         if not certify(joint, point.evaluation).holds(self.settings.tolerance):
             return self.without_state(Outcome.CERTIFICATE_FAILED, "", case.resolution, estimate)
         if unstable := find_instability(case, joint, point.evaluation, self.run, self.every):
-            return self.without_state(unstable.outcome, unstable.sentence, case.resolution, estimate)
+            return self.without_state(unstable.outcome, unstable.message, case.resolution, estimate)
         reference = self._reference(nodes, case, point)
         if reference is not None:
             estimate = estimate + state_difference(case, joint, point, reference)
@@ -263,15 +263,6 @@ def path_of(sweep: Sweep[State]) -> LoadingPath:
 def why_lost(nodes: Sweep[State], failure: Outcome) -> Outcome:
     """The reason why a sweep has no state; failure: of the last search."""
     return failure if nodes.last is None or failure in _REASONS else Outcome.BRANCH_LOST
-
-
-def _where_lost(nodes: Sweep[State]) -> str:
-    """Sentence with the last parameter of a lost sweep; empty for a sweep that never began."""
-    if nodes.last is None or nodes.here is not None:
-        return ""
-    if path_of(nodes).omega is not None:
-        return f"the vibration repeats up to {100.0 * nodes.last.parameter:.3g} % of the excitation"
-    return f"the sweep goes on in stable states as far as {nodes.last.parameter / (2.0 * np.pi):.6g} Hz"
 
 
 def cell_of(frequency: float) -> int:

@@ -1,4 +1,4 @@
-"""The unworn joint along its frequency or its excitation: from a stable state to a stable state.
+"""What a sweep goes along, and the unworn joint along its frequency or its excitation.
 
 `LoadingPath.solve` solves one balance, which starts on the parabola through the last three states. Where Newton's
 method fails or the state is unstable, `LoadingPath.rescue` goes on by smaller natural steps to the end of the branch.
@@ -13,20 +13,19 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.period_events import left_out, nothing_happens
+from solver.accuracy.harmonic_levels import left_out, nothing_happens
 from solver.accuracy.refinement import KEPT_FRACTION, NODE_UNKNOWNS, Refined, refine
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.natural import LINEAR_CHANGE, NEAR_ITERATIONS, SMOOTH_CHANGE, follow_naturally
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.prolongation import carried_history
-from solver.harmonic_balance.state import State, history_at_rest, vibration_change, vibration_size
+from solver.harmonic_balance.state import State, carried_history, history_at_rest, vibration_change, vibration_size
 from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, first_resolution
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Joint
 
 FREE_STEP = 1e-3
@@ -43,16 +42,16 @@ SHORTEST_STEP = 2e-5
 resonance in such steps."""
 
 CHANGE_PER_RTOL = 20.0
-"""Largest relative change of the vibration in a step, over rtol. Dovetail of 48 pairs, compared with steps twenty times
-as short, 211 to 212.5 Hz: errors of the motion up to 0.8 % with a largest change of 0.2, up to 0.1 % with 0.05."""
+"""Largest relative change of the vibration in a step, over rtol."""
 
 CHANGE_LIMITS = (0.05, 0.2)
-"""Limits of the largest change, see above. Blade root of the deck `blade_root`, rtol 5e-2: the wear rates with 0.2 and
-0.03 differ by 0.04 %, for 620 and 1680 iterations."""
+"""Limits of this change. Dovetail of 48 pairs, 211 to 212.5 Hz, compared with steps twenty times as short: errors of
+the motion up to 0.8 % with a largest change of 0.2, up to 0.1 % with 0.05. Blade root of the deck `blade_root`: the
+wear rates with 0.2 and 0.03 differ by 0.04 %, for 620 and 1680 iterations."""
 
 SMALL_VIBRATION = 0.3
-"""Fraction of the friction limits: changes of a smaller vibration are relative to this fraction. With 1 the error of
-the motion at 211 Hz is three times as large, with 0 there are a few nodes more."""
+"""Fraction of the friction limits to which changes of a smaller vibration are relative. With 1 the error of the motion
+of the dovetail at 211 Hz is three times as large, with 0 there are a few nodes more."""
 
 LEAST_SLIP = 1e-3
 """Slip of a pair over its motion above which it forgets its history."""
@@ -190,7 +189,7 @@ class LoadingPath:
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
             joint, before = (self.joint_at(at) for at in (beyond, end.parameter))
-            settled = relax_to_periodic(self.case, joint, balance.wear_depth, end.evaluation, before, end.history, run)
+            settled = relax_to_periodic(self.case, joint, balance.wear_depth, end, before, run)
             if isinstance(settled, Outcome):
                 return settled
             # a fold with a smaller change is a corner of the branch

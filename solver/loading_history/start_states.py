@@ -33,7 +33,7 @@ from solver.outcome import Outcome, describe_error
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
 from solver.settings import Direction, FollowedFrequency, SolverSettings
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 
 
 def follow_branch(
@@ -160,6 +160,9 @@ def _resonance_between(
     start = before + part * (ahead.evaluation.predicted_h - before)
     found = solve_at_lag(case, balance, start, 0.5 * math.pi, run)
     omega = math.nan if found is None else float(found.values[0])
+    if not abs(omega - joint.omega) <= 2.0 * abs(ahead.parameter - here.parameter):
+        # none, or another resonance
+        found = None
     for fold in step.folds:
         before_fold = (fold - omega) * nodes.direction > FREE_STEP * fold
         if found is None or not before_fold or not is_stable(found.balance, found.at, run):

@@ -1,9 +1,8 @@
 """A slow sweep along a path: states with steps of their own, which leave the joint as the machine would.
 
-Friction gives a joint a family of periodic states. The tangential displacements at which the pairs stick select one of
-them, and these displacements depend on all vibration before. So a sweep has nodes of its own, whose distance depends
-only on the change of the vibration. A state between two nodes is solved from the node before and leaves the sweep
-unchanged: the state of a point does not depend on the other points of the study.
+Friction gives a joint a family of periodic states. The tangential displacements at which the pairs stick select one,
+and these depend on all vibration before. So a sweep has nodes of its own, whose distance depends only on the change of
+the vibration. A state between two nodes is solved from the node before and leaves the sweep unchanged.
 
 The error of a sweep comes from its steps: a pair that sticks from some value on keeps the history of the last node with
 slip, up to one step too early. A reference sweep has a node in the middle of every third step, and harmonics one level
@@ -25,9 +24,9 @@ import numpy as np
 from solver.accuracy.error_estimate import NOTHING
 from solver.accuracy.harmonic_levels import fewer
 from solver.accuracy.refinement import VIBRATION_RECHECK
+from solver.continuation.natural import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import Path, S, Step
-from solver.march.steps import LARGEST_STEP_RATIO, Lengths, take_step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
 from solver.packing import in_rows, packable
@@ -41,7 +40,7 @@ AIMED_CHANGE = 0.75
 """Expected change of the vibration in the next step over the largest change. Few steps are refused."""
 
 SWEEP_ITERATIONS = 8000
-"""Most Newton iterations of a sweep: more in jumps and searches are in vain (the dovetail takes 300)."""
+"""Most Newton iterations of a sweep (the dovetail takes 300)."""
 
 NODE_ITERATIONS = 5 * SWEEP_ITERATIONS // 16
 """Most Newton iterations from one node to the next, and from a node to a point: three transients of 800."""
@@ -159,11 +158,11 @@ class Sweep(Generic[S]):
         return True
 
     def has_passed(self, parameter: float) -> bool:
-        """Whether a value of the parameter lies before the current node, or before the end of a lost sweep."""
+        """Whether a value of the parameter lies before the last node."""
         return self.last is not None and (parameter - self.last.parameter) * self.direction < 0.0
 
     def advance_to(self, parameter: float) -> None:
-        """Go on until the next node lies at or beyond a value of the parameter, or until the branch is lost."""
+        """Go on until the next node lies at or beyond a value of the parameter, or the sweep is lost."""
         try:
             while (here := self.here) is not None:
                 if self.ahead is None:
@@ -263,7 +262,8 @@ class Sweep(Generic[S]):
         if self.state.reference is None:
             if self.path.rests(step.state):
                 return
-            self._begin_reference(self.path, before)
+            begun = self._reference_at(self.path, before) or Nodes(self.path.case.resolution, (before,))
+            self.state = replace(self.state, reference=begun)
         skipped = self.state.skipped
         if len(skipped) < STEPS_OF_REFERENCE - 1:
             self.state = replace(self.state, skipped=(*skipped, step.state.parameter))
@@ -282,18 +282,13 @@ class Sweep(Generic[S]):
                 nodes = None if found is None else nodes.then(found)
         return nodes
 
-    def _begin_reference(self, path: Path[S], node: S) -> bool:
-        """Begin the reference sweep at a state of a path, with harmonics one level lower than those of the sweep, or
-        with its own and False where it is not found with these.
-        """
-        wanted = self.path.at(fewer(self.state.nodes.resolution, self.path.case.settings))
-        moved: S | None = node
-        if wanted.case.resolution != path.case.resolution:
-            moved = path.move(node, wanted, self.run)
-        resolution = (path if moved is None else wanted).case.resolution
-        reference = Nodes(resolution, (node if moved is None else moved,))
-        self.state, self._reference_run = replace(self.state, reference=reference), self.run.fresh()
-        return moved is not None
+    def _reference_at(self, path: Path[S], node: S) -> Nodes | None:
+        """The reference sweep at a state of a path, with one level of harmonics fewer; None where it is not found."""
+        wanted = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
+        same = wanted.case.resolution == path.case.resolution
+        moved = node if same else path.move(node, wanted, self.run)
+        self._reference_run = self.run.fresh()
+        return None if moved is None else Nodes(wanted.case.resolution, (moved,))
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
@@ -312,9 +307,13 @@ class Sweep(Generic[S]):
         """Take the current node with other harmonics and samples; those of the reference sweep follow."""
         before, self.path, self.run = self.reference, path, self.run.fresh()
         self.state = replace(self.state, nodes=Nodes(path.case.resolution, (state,)))
-        if before is not None and not self._begin_reference(before[0], before[1][-1]):
-            self._begin_reference(path, state)
+        if before is None:
+            return
+        reference = self._reference_at(before[0], before[1][-1])
+        if reference is None:
+            reference = self._reference_at(path, state) or self.state.nodes
             self.state = replace(self.state, skipped=())
+        self.state = replace(self.state, reference=reference)
 
     def _save(self) -> None:
         """Save the current node, and drop all that a resumed sweep would not have."""

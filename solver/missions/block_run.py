@@ -29,7 +29,7 @@ from solver.results.verdict import first_cut_off
 from solver.settings import Direction, Resolution, SolverSettings
 from solver.stability.floquet import find_instability
 from solver.structure.joint import build_case
-from solver.wear.integrate import Ended, Integration, Like, SlowTime
+from solver.wear.integrate import Integrations, Like, SlowTime
 from solver.wear.rate_slope import rate_slope
 from solver.wear.step import Adaptive
 from solver.wear.wearing_joint import WearingJoint, WearState
@@ -141,6 +141,11 @@ class BlockCase:
         """The settings, with the time that is left."""
         return replace(self.mission.settings, time_limit=self.deadline - computing_time())
 
+    @property
+    def run(self) -> Run:
+        """A computation until the deadline."""
+        return Run(self.mission.settings.tolerance, Budget(deadline=self.deadline))
+
     def line(self, sweep: Direction, amplitude: float | None = None) -> FrequencySweep:
         """A sweep at the depth before the block. amplitude: N; that of the block if not given."""
         load = self.block.excitation_amplitude if amplitude is None else amplitude
@@ -166,8 +171,9 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     (work, _), cycles = case.begin(start), case.block.steady[1]
     counts = np.array([0.0, cycles])
     asked = SlowTime(work.wear_coefficient, Adaptive(work.case.settings.rtol), counts, law=work.law, ends_at_last=True)
-    integration = Integration(work.case, start, asked)
-    ended = integration.history(stable_end=case.every) if case.like is None else integration.follow(case.like, counts)
+    solve = Integrations(work.case, start)
+    like, every = case.like, case.every
+    ended = solve.history(asked, stable_end=every) if like is None else solve.reference(asked, like, counts)
     state = ended.state
     if state is None or ended.failure.outcome is not Outcome.CONVERGED:
         return ended.failure
@@ -191,8 +197,8 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
         inaccurate=state.worst.largest if state.inaccurate_from <= cycles else 0.0,
         held=state.held_from <= cycles,
         cut_off=not math.isnan(first_cut_off(case.model.contact, counts, values["mean_pressure"], depth)),
-        like=Like(ended.course.resolutions, state.step_limit, ended.iterations),
-        last=_last(ended, start) if case.is_continued else None,
+        like=Like(ended.course.resolutions, state.step_limit),
+        last=_last(state, start) if case.is_continued else None,
         begun=begun,
         iterations=start.newton_iterations + ended.iterations,
     )
@@ -200,21 +206,16 @@ def run_block(case: BlockCase) -> BlockRun | Failure:
     return in_rows(found)
 
 
-def _last(ended: Ended, start: StartState) -> StartState:
+def _last(state: WearState, start: StartState) -> StartState:
     """The last state of a block, with the tangential history for the next one."""
-    assert ended.state is not None
+    at, choice = state.point.evaluation, state.choice
     assert start.state is not None
-    point, choice = ended.state.point, ended.state.choice
+    here = replace(start.state, displacement_h=at.displacement_h, contact_force_h=at.force_h)
     return replace(
         start,
         outcome=Outcome.CONVERGED if choice.accurate else Outcome.INACCURATE,
-        state=replace(
-            start.state,
-            displacement_h=point.evaluation.displacement_h,
-            contact_force_h=point.evaluation.force_h,
-            start_history=point.history,
-        ),
-        resolution=ended.state.resolution,
+        state=replace(here, start_history=state.point.history),
+        resolution=state.resolution,
         response_error=choice.estimate.response,
         wear_rate_error=choice.estimate.wear_rate,
         message="",
@@ -239,14 +240,13 @@ def find_start(case: BlockCase) -> tuple[StartState, Begun | None]:
 
 
 def _again(case: BlockCase, begun: Begun) -> StartState | None:
-    """The state at other depths than `begun`, with its errors, through the nodes of its sweep.
+    """The state at other depths than `begun`, with its errors, through the nodes of its sweep; else None.
 
-    With nodes of its own, the sweep of each mission would leave other static friction forces: the wear of a mission
-    would jump from depth to depth by the error of the sweep. Where each pair slips or opens within the period, the
-    state keeps nothing of its way, and follows from the depths alone. None where the way has jumped over a fold, where
-    there is no stable state, or where the vibration has changed so much that the way may lead to another branch.
+    With other nodes in each mission, the wear of a mission would jump from depth to depth by the error of the sweep.
+    Where each pair slips or opens within the period, the state follows from the depths alone. None where the way has
+    jumped over a fold, where there is no stable state, or where the way may lead to another branch.
     """
-    start, run = begun.start, Run(case.mission.settings.tolerance, Budget(deadline=case.deadline))
+    start, run = begun.start, case.run
     if start is None or start.state is None or start.branch > 0:
         return None
     ramp, omega, (work, begins) = case.block.way == "ramp", start.state.omega, case.begin(start)
@@ -296,13 +296,11 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, every_node: i
 def _continued(case: BlockCase, carried: StartState) -> StartState:
     """The state of a block that keeps the tangential history of the block before, or why there is none.
 
-    carried: state at the end of the block before. It is solved first at the depth before the block, which a longer or
-    an extrapolated step may have changed. Then amplitude and frequency change, one after the other, the frequency at
-    the smaller of both amplitudes. Raises OutOfTimeError, LinAlgError.
+    carried: state at the end of the block before, solved first at the depth before the block. Then amplitude and
+    frequency change, one after the other, the frequency at the smaller amplitude. Raises OutOfTimeError, LinAlgError.
     """
-    before, frequency = carried.state, case.block.steady[0]
+    before, run, frequency = carried.state, case.run, case.block.steady[0]
     assert before is not None
-    run = Run(case.mission.settings.tolerance, Budget(deadline=case.deadline))
     work, begins = case.begin(carried)
     at = begins.point.evaluation
     balance = Balance(work.at(begins), at.history, at.wear_depth)

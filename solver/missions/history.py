@@ -18,9 +18,7 @@ from solver.model import FloatArray
 from solver.outcome import SENSITIVE_ERROR, Outcome, known_to
 from solver.packing import Packed, unpack
 from solver.results.verdict import describe_cut_off, describe_uncertain
-
-ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
-"""Outcomes of a reference solution that are those of the history."""
+from solver.wear.integrate import ENDS_ALL
 
 
 def integrate_missions(

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.clock import computing_time
+from solver.continuation.natural import Lengths, take_step
 from solver.harmonic_balance.state import Failure
-from solver.march.steps import Lengths, take_step
 from solver.missions.block_run import Begun, BlockCase, BlockRun, run_block
 from solver.missions.mission import Mission, Passage
 from solver.missions.passage import run_passage

@@ -5,9 +5,8 @@ m per cycle, of a sweep with its own tangential history, a passage wears
 
     W = integral of g(f) f / |df/dt| df
 
-by the trapezoidal rule over frequencies that are added where the integrand bends, and on both sides of a jump. The
-frequencies pass one after the other: where wear at the first ones takes load off a pair, the pair wears less at the
-later ones. So the depth y since the start of the passage follows from the linearised rate,
+by the trapezoidal rule over frequencies that are added where the integrand bends, and on both sides of a jump. Wear at
+the first frequencies acts back on the later ones: the depth y since the start of the passage follows from
 
     dy/df = (g + dg/dW y) f / |df/dt|,
 
@@ -15,14 +14,10 @@ with the implicit trapezoidal rule in the order of the passage. The square of th
 a part of the error, and falls with the wear of one passage.
 
 The vibration follows the frequency with a delay: what it differs from that of the steady state dies out as
-exp(-zeta omega t). So a passage shows at one frequency what belongs to another one, which it has passed before:
-
-    lag = |df/dt| / (2 pi zeta f).
-
-Where the wear rate rises or falls, the passage wears less or more than its steady states, at most the lag times the
-largest wear over frequency: a part of the error. The damping ratio zeta is that of the structure with its closed pairs
-sticking, as the vibration grows with the joint still at rest; friction damps more where pairs slip. The sweep rate
-|df/dt| / (zeta f)^2 says how fast a passage is. Without damping the delay is infinite, and the wear not known.
+exp(-zeta omega t), so that it belongs to a frequency passed before, by the lag |df/dt| / (2 pi zeta f). A passage wears
+less or more than its steady states by at most the lag times the largest wear over frequency: a part of the error. The
+damping ratio zeta is that of the structure with its closed pairs sticking; friction damps more where pairs slip. The
+sweep rate |df/dt| / (zeta f)^2 says how fast a passage is. Without damping the wear is not known.
 
 A vibration passes df in the time df / |df/dt|, in which it does not tell apart frequencies that are closer than
 1 / time: an interval far below sqrt(|df/dt|) is not divided. Without this limit no number of frequencies suffices at
@@ -38,8 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.clock import computing_time
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import Failure
+from solver.harmonic_balance.state import Failure, largest_responses
 from solver.loading_history.start_states import follow_line
 from solver.missions.block_run import Begun, BlockCase, BlockRun
 from solver.model import ComplexArray, FloatArray
@@ -61,17 +55,15 @@ MOST_FREQUENCIES = 400
 
 FINEST_INTERVAL = 0.1
 """Longest interval of frequencies that is never divided, over sqrt(|df/dt|): a tenth of zeta f where the sweep rate is
-1. Slider without damping, 1 to 10 000 Hz at 10 Hz/s, once: a result after 89 CPU seconds; without this limit the first
-of two solutions was not finished after 100."""
+1. Slider without damping, 1 to 10 000 Hz at 10 Hz/s: 89 CPU seconds; without this limit not finished after 100."""
 
 FREQUENCY_ERROR = 0.25
 """Allowed error of the wear of a passage by its frequencies, as a fraction of rtol."""
 
 LARGEST_SWEEP_RATE = 1.0
-"""|df/dt| / (zeta f)^2 above which a message says how fast a passage is. Wear over that of the steady states,
-integrated in time, and the estimated error: slider 0.999 to 1.000 and 3.4 % at 1, 0.994 to 0.996 and 9 % at 3, 0.967 to
-0.972 and 29 % at 10; dovetail (mesh 1) 0.983 and 5 % at 1.9, 0.95 and 15 % at 6.3, 0.91 and 45 % at 19, 0.95 and 100 %
-at 63."""
+"""|df/dt| / (zeta f)^2 above which a message says how fast a passage is. Wear, integrated in time, over that of the
+steady states, and the estimated error: slider 0.999 and 3.4 % at 1, 0.995 and 9 % at 3, 0.97 and 29 % at 10; dovetail
+(mesh 1) 0.983 and 5 % at 1.9, 0.95 and 15 % at 6.3, 0.91 and 45 % at 19, 0.95 and 100 % at 63."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +104,17 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
     states = ascending[:: 1 if passage.sweep == "up" else -1]
     starts, parts = [state.start for state in ascending], parts_of(ascending)
     volume = float(parts.sum(axis=0) @ area)
-    growth, slope = in_order(states, (_slope(case, state) for state in states))
+
+    def slope_of(state: SweptState) -> FloatArray:
+        """Derivative (n_contact, n_contact) of the density with respect to the depths, 1/Hz."""
+        pairs = (state.density > 0.0) | (case.depth > 0.0)
+        if not state.density.any():
+            return np.zeros((pairs.size, pairs.size))
+        work, begun = case.begin(state.start)
+        slope = rate_slope(work.at(begun), begun.point.evaluation, work.gain(1.0), work.wearing, pairs, work.run)
+        return np.asarray(slope * state.frequency / passage.rate)
+
+    growth, slope = in_order(states, map(slope_of, states))
     sweep_rate, lag = delay_of(case, ascending)
     error = swept.error + float((parts @ area) @ [start.wear_rate_error for start in starts])
     error += float(np.abs(growth - parts.sum(axis=0)) @ area) ** 2 / volume if volume > 0.0 else 0.0
@@ -127,7 +129,7 @@ def run_passage(case: BlockCase) -> BlockRun | Failure:
         response_error=max(state.start.response_error for state in ends),
         growth_error=error / volume if volume > 0.0 else 0.0,
         inaccurate=max((max(each.response_error, each.wear_rate_error) for each in inaccurate), default=0.0),
-        like=Like(resolutions, math.nan, swept.iterations),
+        like=Like(resolutions, math.nan),
         last=ends[-1].start if case.is_continued else None,
         begun=Begun(swept.needed),
         iterations=swept.iterations,
@@ -155,17 +157,6 @@ def in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) -> tupl
     return np.maximum(grown[:, 0], 0.0), grown[:, 1:]
 
 
-def _slope(case: BlockCase, state: SweptState) -> FloatArray:
-    """Derivative (n_contact, n_contact) of the density of a state with respect to the depths, 1/Hz."""
-    wears = state.density > 0.0
-    if not wears.any():
-        return np.zeros((wears.size, wears.size))
-    work, begun = case.begin(state.start)
-    at, pairs = begun.point.evaluation, wears | (case.depth > 0.0)
-    slope = rate_slope(work.at(begun), at, work.gain(1.0), work.wearing, pairs, work.run)
-    return np.asarray(slope * state.frequency / case.block.passage.rate)
-
-
 def parts_of(states: Sequence[SweptState]) -> FloatArray:
     """Wear (n, n_contact), m, that belongs to each of the frequencies, ascending, by the trapezoidal rule."""
     width = np.diff([state.frequency for state in states])
@@ -190,24 +181,17 @@ def find_states(case: BlockCase) -> Swept | Failure:
         iterations += max(state.start.newton_iterations for state in found)
         states = sorted([*states, *found], key=lambda state: state.frequency)
         errors, volume = interval_errors(states, area), float((parts_of(states) @ area).sum())
-        allowed, error = aim * max(volume, _negligible(case, states)), float(errors.sum())
+        # wear that is small beside the wear so far, or beside that by all work of the excitation, may be round-off
+        size = max(float(np.abs(state.response).max()) for state in states)
+        work = np.pi * case.block.excitation_amplitude * size * passage.cycles
+        least_wear = max(NEGLIGIBLE * float(case.depth @ area), ROUND_OFF * case.mission.wear_coefficient * work)
+        allowed, error = aim * max(volume, least_wear), float(errors.sum())
         wanted = []
         if error > allowed and len(states) < MOST_FREQUENCIES:
             for place in np.flatnonzero(errors > allowed / len(errors)):
                 wanted.extend(_between(states[place], states[place + 1], FINEST_INTERVAL * passage.rate**0.5))
         if not wanted:
             return Swept(tuple(states), error, iterations, _needed(states, errors, allowed / len(errors), least))
-
-
-def _negligible(case: BlockCase, states: list[SweptState]) -> float:
-    """Worn volume of a passage, m3, that does not matter: beside the wear so far, or as round-off.
-
-    Wear by round-off is compared with the wear if friction took up all work of the excitation.
-    """
-    size = max(float(np.abs(state.response).max()) for state in states)
-    work = np.pi * case.block.excitation_amplitude * size * case.block.passage.cycles
-    so_far = float(case.depth @ case.mission.area)
-    return max(NEGLIGIBLE * so_far, ROUND_OFF * case.mission.wear_coefficient * work)
 
 
 def _needed(states: list[SweptState], errors: FloatArray, allowed: float, least: Sequence[float]) -> tuple[float, ...]:

@@ -1,9 +1,9 @@
 """One step over many missions: the missions between are left out, and the wear of one mission is the rate.
 
-A mission takes the depth W before it to W + R(W) after it; R is the wear of its blocks, one after the other. Over many
-missions the depth is a smooth sequence W(n). A step from n to n + H computes only its last mission, which begins at
-the depth Z. The parabola through the depths at n - a, n (the two nodes before) and n + H has this mission for its
-last one, p(n + H) - p(n + H - 1) = R(Z) with Z = p(n + H - 1), so that
+A mission takes the depth W before it to W + R(W) after it; R is the wear of its blocks, one after the other. A step
+from n to n + H computes only its last mission, which begins at the depth Z. The parabola through the depths at n - a, n
+(the two nodes before) and n + H has this mission for its last one, p(n + H) - p(n + H - 1) = R(Z) with
+Z = p(n + H - 1), so that
 
     Z = W(n) + (H - 1) H / (2H - 1 + a) (W(n) - W(n - a)) / a + (H - 1) (H - 1 + a) / (2H - 1 + a) R(Z),
     W(n + H) = Z + R(Z).
@@ -50,9 +50,8 @@ DEPTH_TOLERANCE = 0.1
 class MissionNode:
     """The end of a step over missions, of which the last mission was computed.
 
-    mission: missions computed so far.
-    growth (n_block, n_contact): depth worn by each block so far, m.
-    rate (n_block, n_contact): depth worn by each block in the last mission, m; in the first node in the first mission.
+    mission: missions computed so far. growth (n_block, n_contact): depth worn by each block so far, m.
+    rate (n_block, n_contact): in the last mission, m; in the first node in the first mission.
     local (n_contact,): sum of the local errors of the steps and of the errors of the blocks so far, m.
     runs: the blocks of the last mission; without values in the first node.
     """
@@ -79,11 +78,10 @@ class Step:
 
 @dataclass(frozen=True)
 class Formula:
-    """The step from the nodes before: `Z = base + factor R(Z)`.
+    """The step from at least three nodes before: `Z = base + factor R(Z)`.
 
     base (n_block, n_contact): m, by blocks.
-    first (n_contact,): Z of the parabola through three nodes before, m.
-    ahead (n_contact,): depth of this parabola at the end of the step, m.
+    first, ahead (n_contact,): Z, and the depth at the end, of the parabola through three nodes before, m.
     share: error over the difference of the end to `ahead`.
     """
 
@@ -95,7 +93,7 @@ class Formula:
 
     @classmethod
     def of(cls, nodes: tuple[MissionNode, ...], length: int) -> Formula:
-        """The formula of a step of some missions behind at least three nodes."""
+        """The formula of a step of some missions."""
         past, before, now = nodes[-3:]
         h, a, b = float(length), float(now.mission - before.mission), float(before.mission - past.mission)
         last = (now.growth - before.growth) / a

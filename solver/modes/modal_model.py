@@ -7,13 +7,12 @@ periodic motion concept", Computers and Structures 154 (2015) 59-71) seeks perio
 
 where the negative damping `-2 zeta omega M` feeds in the energy that the joint dissipates. The structure with its joint
 held is singular at the frequency of its own mode. So harmonic 1 gets a spring on its modal coordinate
-`q = phi^H M x_1`, with the mass-normalised linear mode phi. The other end of the spring moves with the real amplitude
-Q (the drive):
+`q = phi^H M x_1`, with the mass-normalised linear mode phi, whose other end moves with the real amplitude Q (the
+drive):
 
     M x'' + (C - 2 zeta omega M) x' + K x + omega_0^2 M phi (q - Q) + (contact forces) = f_0.
 
-At a nonlinear mode `q = Q`, so that the spring has no force. For any other frequency and damping ratio this is a forced
-vibration, which all parts of the solver treat as any other one.
+At a nonlinear mode `q = Q`, so that the spring has no force; any other state is a forced vibration like all others.
 """
 
 from __future__ import annotations
@@ -30,11 +29,8 @@ from solver.settings import NEGLIGIBLE
 
 @dataclass(frozen=True)
 class LinearMode:
-    """A mode of the linear structure that harmonic 1 sees.
-
-    - omega: natural frequency without damping, rad/s.
-    - shape (n,): phi, with `phi^H M phi = 1`; its largest component is real and positive. 0 where the joint is held.
-    - damping_ratio: of the damping matrix alone, `phi^H C phi / (2 omega)`.
+    """A mode of the linear structure that harmonic 1 sees: omega without damping, rad/s; shape (n,), phi,
+    mass-normalised, its largest component real and positive; damping ratio of the damping matrix alone.
     """
 
     omega: float
@@ -45,10 +41,10 @@ class LinearMode:
 def linear_mode(
     model: ReducedModel, closed: BoolArray, friction: FloatArray, *, number: int = 1, near: float | None = None
 ) -> LinearMode | None:
-    """A mode of the joint with its closed pairs held, rigid motions left out; None where the joint has fewer modes.
+    """A mode of the joint, rigid motions left out; None where the joint has fewer modes.
 
     closed, friction (n_contact,): pairs held in the normal direction, and in the tangential ones with friction above 0.
-    number: of the mode, from 1 on in ascending frequency. near: rad/s; the mode nearest to a frequency instead.
+    number: from 1 on in ascending frequency. near: rad/s; the mode nearest to a frequency instead.
     """
     linear, dofs = model.harmonic_structure(1), model.contact.dofs
     held = np.concatenate([dofs[closed, 0], dofs[closed & (friction > 0.0), 1:].ravel()])
@@ -78,10 +74,7 @@ def linear_mode(
 
 @dataclass(frozen=True)
 class ModalModel(ReducedModel):
-    """A model in which harmonic 1 has a spring on its modal coordinate. The excitation amplitude is the drive Q.
-
-    first: linear model of harmonic 1.
-    """
+    """A model in which harmonic 1, `first`, has a spring on its modal coordinate. The excitation amplitude is Q."""
 
     first: LinearModel = field(kw_only=True)
 
@@ -91,10 +84,7 @@ class ModalModel(ReducedModel):
 
 
 def modal_model(model: ReducedModel, mode: LinearMode, damping_rate: float) -> ModalModel:
-    """The model with a spring on a modal coordinate, and with the damping `C - damping_rate M`.
-
-    damping_rate: `2 zeta omega`, rad/s.
-    """
+    """The model with a spring on a modal coordinate and the damping `C - damping_rate M`, `2 zeta omega`, rad/s."""
     first = model.harmonic_structure(1)
     force = mode.omega**2 * (first.mass @ mode.shape)
 

@@ -1,12 +1,11 @@
-"""A nonlinear mode: its equations at an amplitude, and its way along the amplitude.
+"""A nonlinear mode: its equations at an amplitude, its way along the amplitude, and where it begins.
 
-The equations are a harmonic balance with three further unknowns (`solver.newton.bordering`): the frequency omega, the
-damping ratio zeta and the drive Q of the modal model (`modal_model`). The further equations are
+A harmonic balance with three further unknowns (`solver.newton.run`), the frequency omega, the damping ratio zeta and
+the drive Q of the modal model (`modal_model`), and with the further equations
 
-    Re q = Q,      Im q = 0,      x_1^H M x_1 = a^2.
+    Re q = Q,      Im q = 0,      x_1^H M x_1 = a^2:
 
-The first two say that the spring on the modal coordinate has no force, and fix the phase; the last one is the given
-amplitude a.
+the spring on the modal coordinate has no force, which also fixes the phase; and the amplitude a is given.
 """
 
 from __future__ import annotations
@@ -17,27 +16,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
-from solver.contact.coulomb import STICK
-from solver.continuation.natural import NEAR_ITERATIONS
+from solver.contact.coulomb import SEPARATED, STICK, friction_limit
+from solver.continuation.first_state import RELIEF, predicted_at_rest, relieved_history, solve_static_state
+from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
-from solver.harmonic_balance.prolongation import transfer
-from solver.harmonic_balance.state import State, final_history, history_at_rest
+from solver.harmonic_balance.state import Failure, State, final_history, history_at_rest, transfer
 from solver.loading_history.path import FREE_STEP, Step, choose_resolution, largest_change
-from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import ComplexArray, FloatArray, ReducedModel
-from solver.modes.modal_model import LinearMode, modal_model
-from solver.newton.bordering import Bordered
-from solver.newton.run import Run
+from solver.modes.modal_model import LinearMode, linear_mode, modal_model
+from solver.newton.run import Bordered, Run
 from solver.outcome import Outcome
 from solver.packing import packable
-from solver.settings import DIFFERENCE, Resolution
+from solver.settings import DIFFERENCE, Resolution, SolverSettings
 from solver.structure.condensation import relative_indices, whole_motion
-from solver.structure.fourier import to_complex
-from solver.structure.joint import Case, Joint
+from solver.structure.fourier import from_complex, to_complex
+from solver.structure.joint import Case, Joint, build_case, friction_of_pairs
 
 LARGEST_CHANGE = 0.3
-"""Largest change of the frequency (relative) and of the damping ratio in one iteration. With 0.1 and with 1 the modes
-of dovetail and foot are equal."""
+"""Largest change of the frequency (relative) and of the damping ratio in one iteration. With 0.1 and 1 modes are
+equal."""
+
+FIRST_AMPLITUDE = 1e-6
+"""First amplitude of a joint without static normal forces, m sqrt(kg)."""
+
+TOP_BASE = 4.0
+"""Amplitudes are lowered from a power of this number, at least twice the amplitude of the point: all points with one
+such power have one way. With 8 the mode of the foot is equal to 1e-8."""
+
+SLIDING_STARTS = 4
+"""Attempts to find a mode of a sliding joint, each at an amplitude higher by `TOP_BASE`. The slider may need two."""
 
 
 @packable
@@ -54,20 +61,18 @@ class ModeState(State):
 
     @property
     def omega(self) -> float:
-        """Natural frequency, rad/s."""
+        """The first of the values."""
         return float(self.values[0])
 
     @property
     def damping_ratio(self) -> float:
-        """Damping ratio zeta."""
+        """The second of the values."""
         return float(self.values[1])
 
 
 @dataclass(frozen=True)
 class NonlinearMode:
-    """A mode of a joint with some harmonics and samples, as a path along its amplitude.
-
-    Lengths of steps are logarithms of the ratio of two amplitudes.
+    """A mode of a joint as a path along its amplitude; lengths of steps are logarithms of the ratio of two amplitudes.
 
     - model: the model, without the spring on the modal coordinate.
     - linear: the linear mode from which the nonlinear one begins.
@@ -90,18 +95,17 @@ class NonlinearMode:
     def find(
         self,
         amplitude: float,
-        start: FloatArray,
-        values: FloatArray,
+        start: tuple[FloatArray, FloatArray],
         history: FloatArray,
         run: Run,
         most: int | None = None,
     ) -> ModeState | None:
         """The mode at an amplitude a, m sqrt(kg); None where Newton's method fails.
 
-        start (n_rel, 2H+1), N, and values (3,): first predicted force, and first frequency, damping ratio and drive.
-        history (n_contact, 2): tangential history, m. run, most: as in `Run.solve`.
+        start: first predicted force (n_rel, 2H+1), N, and values (3,). history (n_contact, 2): tangential history, m.
+        run, most: as in `Run.solve`.
         """
-        found = run.solve_bordered(_AtAmplitude(self, amplitude, history), start, values, most)
+        found = run.solve_bordered(_AtAmplitude(self, amplitude, history), *start, most)
         # zeta goes to infinity where friction stops a mass for good: with few harmonics there are further states; below
         # frequency 0 there is the mode once more, backwards
         if found is None or abs(found.values[1]) > 1.0 or found.values[0] <= 0.0:
@@ -135,7 +139,7 @@ class NonlinearMode:
             ratio = (target - here.parameter) / (here.parameter - states[-2].parameter)
             change = last - states[-2].evaluation.predicted_h
             starts.insert(0, (last + ratio * change, here.values + ratio * (here.values - states[-2].values)))
-        found = (self.find(target, *start, history, run, NEAR_ITERATIONS) for start in starts)
+        found = (self.find(target, start, history, run, NEAR_ITERATIONS) for start in starts)
         return next((state for state in found if state is not None), None)
 
     def rescue(self, _: ModeState, __: float, ___: Run) -> Step[ModeState] | Outcome:
@@ -144,7 +148,7 @@ class NonlinearMode:
 
     def change(self, before: ModeState, after: ModeState, wider: float) -> float:
         """As in Path."""
-        sticks = all(bool((state.evaluation.status_t == STICK).all()) for state in (before, after))
+        sticks = all((state.evaluation.status_t == STICK).all() for state in (before, after))
         return self.differs(before, after) / largest_change(self.case.settings.rtol, wider, sticks=sticks)
 
     def rests(self, _: ModeState) -> bool:
@@ -167,7 +171,7 @@ class NonlinearMode:
     def move(self, state: ModeState, other: NonlinearMode, run: Run) -> ModeState | None:
         """As in Path."""
         balance, start = transfer(self.case, other.joint_of(state.values), state.evaluation)
-        return other.find(state.parameter, start, state.values, balance.history, run.fresh())
+        return other.find(state.parameter, (start, state.values), balance.history, run.fresh())
 
     def choose(self, state: ModeState, run: Run) -> tuple[NonlinearMode, ModeState, Estimate]:
         """As in Path."""
@@ -188,9 +192,7 @@ class NonlinearMode:
 
 @dataclass(frozen=True)
 class _AtAmplitude:
-    """The equations at an amplitude, m sqrt(kg), with a tangential history (n_contact, 2), m. Errors over the
-    amplitude.
-    """
+    """The equations at an amplitude, m sqrt(kg), over the amplitude, with a tangential history (n_contact, 2), m."""
 
     mode: NonlinearMode
     amplitude: float
@@ -242,3 +244,91 @@ def _shape(joint: Joint, displacement_h: FloatArray, drive: float) -> ComplexArr
     linear, (relative, _) = joint.model.harmonic_structure(1), relative_indices(joint.model.contact)
     moved = to_complex(joint.to_relative(displacement_h))[:, 0]
     return whole_motion(linear, 1j * joint.omega, relative, drive * linear.load_harmonic, moved)
+
+
+# --- where a mode begins ---
+
+
+@dataclass(frozen=True)
+class Rest:
+    """The joint at rest under its static load, and its mode.
+
+    glued: whether the closed pairs of its linear mode stick; else they slide. state: with the harmonics of the mode.
+    """
+
+    mode: NonlinearMode
+    glued: bool
+    state: State
+
+    @property
+    def first_amplitude(self) -> float:
+        """Amplitude, m sqrt(kg), of the first node: the vibration is far too small for slip or separation."""
+        case, normal_force = self.mode.case, self.state.evaluation.force_h[:, 0, 0]
+        limit = np.linalg.norm(friction_limit(case.friction_coefficient, normal_force))
+        force = np.linalg.norm(case.joint(self.mode.linear.omega, 1.0).structure.force_h()[:, 1:])
+        return float(FREE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
+
+    def raised(self, amplitude: float, run: Run) -> ModeState | None:
+        """The mode at a small amplitude, m sqrt(kg), from rest; None where it is not found.
+
+        Pairs that the static load leaves at their friction limit slip under the smallest vibration: further attempts
+        begin with smaller static friction forces.
+        """
+        linear = self.mode.linear
+        joint = self.mode.case.joint(linear.omega, amplitude)
+        start = self.state.evaluation.predicted_h.copy()
+        start[:, 1:] = joint.structure.force_h()[:, 1:]
+        values = np.array([linear.omega, linear.damping_ratio, amplitude])
+        histories = (relieved_history(joint, self.state, fraction) for fraction in (0.0, *RELIEF))
+        found = (self.mode.find(amplitude, (start, values), history, run.fresh()) for history in histories)
+        return next((node for node in found if node is not None), None)
+
+    def sliding(self, amplitude: float, run: Run) -> ModeState | None:
+        """The mode at a large amplitude, at which the joint slides as in its linear mode; None where not found."""
+        linear, dofs = self.mode.linear, self.mode.model.contact.dofs
+        for attempt in range(SLIDING_STARTS):
+            size = amplitude * TOP_BASE**attempt
+            joint = self.mode.case.joint(linear.omega, size)
+            amplitudes = np.zeros((dofs.size, joint.basis.n_harmonics), complex)
+            amplitudes[:, 0] = np.where(dofs.ravel() >= 0, size * linear.shape[dofs.ravel()], 0.0)
+            motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
+            start = self.state.evaluation.predicted_h + joint.to_relative(joint.law.force(motion))
+            values = np.array([linear.omega, linear.damping_ratio, size])
+            if found := self.mode.find(size, (start, values), self.state.history, run.fresh()):
+                return found
+        return None
+
+
+def find_rest(
+    model: ReducedModel,
+    friction_coefficient: float | FloatArray | None,
+    number: int,
+    settings: SolverSettings,
+    run: Run,
+) -> Rest | Failure:
+    """The joint at rest and its linear mode, or why there is none.
+
+    number: among the linear modes with sticking pairs; of a joint with fewer such modes, among those with sliding ones.
+    """
+    friction, unworn = friction_of_pairs(model, friction_coefficient), np.zeros(model.contact.n_contact)
+    closed, omega = np.ones(unworn.size, bool), None
+    # first with all pairs closed, then with those that the static load closes
+    while True:
+        glued = linear_mode(model, closed, friction, number=number)
+        linear = glued or linear_mode(model, closed, unworn, number=number)
+        if linear is None:
+            return Failure(Outcome.START_FAILED, f"mode = {number}: the loaded joint has fewer linear modes")
+        # without the spring on the modal coordinate the held structure is singular at its own frequency
+        case = build_case(modal_model(model, linear, 0.0), friction_coefficient, omega or linear.omega, settings)
+        quiet = case.joint(linear.omega, 0.0)
+        static = solve_static_state(quiet, unworn, run)
+        if isinstance(static, Outcome):
+            return Failure(static)
+        if omega is not None:
+            break
+        closed, omega = static.evaluation.status_t[:, 0] != SEPARATED, linear.omega
+    start = predicted_at_rest(case, quiet, static, unworn)
+    state = run.fresh().state(Balance(quiet, static.history, unworn), start, 0.0)
+    if state is None:
+        return Failure(Outcome.STATIC_FAILED)
+    return Rest(NonlinearMode(model, linear, case), glued is not None, state)

@@ -18,14 +18,13 @@ from solver.accuracy.harmonic_levels import shifted
 from solver.accuracy.refinement import refine
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
+from solver.continuation.natural import LARGEST_STEP_RATIO
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure
 from solver.loading_history.path import Path, Step
 from solver.loading_history.sweep import Sweep
-from solver.march.steps import LARGEST_STEP_RATIO
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
-from solver.modes.mode import ModeState, NonlinearMode
-from solver.modes.mode_start import TOP_BASE, Rest, find_rest
+from solver.modes.mode import TOP_BASE, ModeState, NonlinearMode, Rest, find_rest
 from solver.newton.run import Budget, OutOfTimeError, Run
 from solver.outcome import Outcome, describe_error, known_to
 from solver.settings import ROUND_OFF, Resolution, SolverSettings
@@ -42,10 +41,8 @@ _NO_FIRST = Failure(Outcome.START_FAILED, "the mode was not found at its first a
 
 @dataclass(frozen=True)
 class ModePoint:
-    """A point of a nonlinear mode. Its values are NaN where no state was found.
+    """A point of a nonlinear mode, as `solver.Backbone` at one amplitude. Values are NaN where no state was found.
 
-    - outcome, message: how the computation of the point ended.
-    - frequency to samples_used: as in `solver.Backbone`, at one amplitude.
     - newton_iterations: of the way from rest to the point and of the point, as for this point alone.
     - run_time: CPU seconds of the computing thread since the point before.
     - found: the mode with its harmonics, and its state.
@@ -68,15 +65,6 @@ class ModePoint:
     found: tuple[NonlinearMode, ModeState] | None = None
 
 
-def without_state(model: ReducedModel, failure: Failure) -> ModePoint:
-    """A point of a mode of a model that has no state."""
-    linear, nan = model.linear[0], math.nan
-    sizes = len(linear.response), len(linear.mass), model.contact.n_contact
-    response, shape, pairs = (np.full(size, nan) for size in sizes)
-    vectors = response.astype(complex), shape.astype(complex), pairs, pairs
-    return ModePoint(failure.outcome, failure.message, nan, nan, nan, nan, *vectors, 0, 0)
-
-
 def follow_mode(
     model: ReducedModel,
     friction_coefficient: float | FloatArray | None,
@@ -87,7 +75,7 @@ def follow_mode(
 ) -> Iterator[tuple[int, ModePoint]]:
     """Points of a nonlinear mode: index and point, one by one, in the order of the way to them.
 
-    amplitudes: modal amplitudes, m sqrt(kg), in any order. number, direction: as in `solver.backbone`.
+    amplitudes: m sqrt(kg), in any order. number, direction: as in `solver.backbone`.
     settings: the limit of time holds for each point with the way from the point before.
     """
     way = _Way((model, friction_coefficient, number, settings), direction)
@@ -105,22 +93,24 @@ def follow_mode(
             # an error spoils one point only
             point = Failure(Outcome.EXCEPTION, describe_error(error))
         if isinstance(point, Failure):
-            point = without_state(model, point)
+            linear, pairs = model.linear[0], np.full(model.contact.n_contact, math.nan)
+            response, shape = (np.full(len(part), math.nan, complex) for part in (linear.response, linear.mass))
+            numbers = math.nan, math.nan, math.nan, math.nan
+            point = ModePoint(point.outcome, point.message, *numbers, response, shape, pairs, pairs, 0, 0)
         iterations = way.spent + run.budget.iterations
         yield index, replace(point, newton_iterations=iterations, run_time=computing_time() - began)
 
 
-def top_of(amplitude: float) -> float:
+def _top_of(amplitude: float) -> float:
     """Amplitude, m sqrt(kg), from which the amplitude of a point is lowered."""
     return float(TOP_BASE ** math.ceil(math.log(2.0 * amplitude, TOP_BASE)))
 
 
 @dataclass
 class _Way:
-    """The sweeps to the points: one with rising amplitude, and one with falling amplitude from each `top_of`.
+    """The sweeps to the points: one with rising amplitude, and one with falling amplitude from the present `top`.
 
     - asked: model, friction coefficient, number of the mode, settings.
-    - rest, up, down: what has been found so far, and the sweep from the present `top`.
     - to_rest, spent: Newton iterations to the rest, and of the way to the last point. Each part of the way goes on with
       the count of the part before; ways to other points are left out.
     """
@@ -136,7 +126,7 @@ class _Way:
 
     def place(self, amplitude: float) -> tuple[float, float]:
         """Key by which amplitudes come in the order of the way."""
-        return (0.0, amplitude) if self.direction == "up" else (top_of(amplitude), -amplitude)
+        return (0.0, amplitude) if self.direction == "up" else (_top_of(amplitude), -amplitude)
 
     def point(self, amplitude: float, run: Run) -> ModePoint | Failure:
         """The point at the next amplitude, m sqrt(kg). run: of this point alone."""
@@ -149,13 +139,13 @@ class _Way:
         if isinstance(rest, Failure):
             return rest
         if self.direction == "down":
-            sweep = self._lowered_from(rest, top_of(amplitude), deadline)
+            sweep = self._lowered_from(rest, _top_of(amplitude), deadline)
         elif not rest.glued:
             said = 'the joint has no such mode while its pairs stick: give sweep = "down", from large amplitudes'
             return Failure(Outcome.START_FAILED, said)
         elif amplitude < rest.first_amplitude:
             node = rest.raised(amplitude, run)
-            return _NO_FIRST if node is None else judge_point(rest.mode, node, None, run)
+            return _NO_FIRST if node is None else _judged(rest.mode, node, None, run)
         else:
             sweep = self._raised_to(rest, amplitude, deadline)
         if sweep is None:
@@ -163,28 +153,34 @@ class _Way:
         self.spent = sweep.n_iterations
         if self.up is not None and sweep is self.down and sweep.here is not None and sweep.here.parameter < amplitude:
             # the mode could not be raised to the amplitude from which it is lowered
-            return Failure(Outcome.BRANCH_LOST, describe_loss(self.up))
+            return Failure(Outcome.BRANCH_LOST, _describe_loss(self.up))
         sweep.set_deadline(deadline)
         sweep.advance_to(amplitude)
         self.spent = sweep.n_iterations
-        return solve_point(sweep, amplitude, run)
+        if sweep.here is None:
+            return Failure(Outcome.BRANCH_LOST, _describe_loss(sweep))
+        found = sweep.state_at(amplitude, run.fresh())
+        if not isinstance(found, Step):
+            ahead = sweep.here if sweep.ahead is None else sweep.ahead.state
+            ends = f"{sweep.here.parameter:.4g} and {ahead.parameter:.4g}"
+            said = f"no state was found between the amplitudes {ends} m sqrt(kg), where the mode has states"
+            return Failure(Outcome.BRANCH_LOST, said)
+        return _judged(_mode_of(sweep.path), found.state, _reference_at(sweep, amplitude, run), run)
 
     def _raised_to(self, rest: Rest, amplitude: float, deadline: float) -> Sweep[ModeState] | None:
         """The sweep with rising amplitude at the node before an amplitude; None where it does not begin."""
         if self.up is None:
             budget = Budget(self.to_rest, deadline=deadline)
             first = rest.raised(rest.first_amplitude, Run(rest.mode.case.settings.tolerance, budget))
-            self.up = None if first is None else _begun(rest.mode, first, 1.0, budget)
+            self.up = _begun(rest.mode, first, 1.0, budget)
         if self.up is not None:
             self.up.set_deadline(deadline)
             self.up.advance_to(amplitude)
         return self.up
 
     def _lowered_from(self, rest: Rest, top: float, deadline: float) -> Sweep[ModeState] | None:
-        """The sweep with falling amplitude from a top, m sqrt(kg); None where it does not begin.
-
-        The mode is raised to the top first, or as far as it goes. A joint that has its mode only while it slides begins
-        at the top.
+        """The sweep with falling amplitude from a top, m sqrt(kg), to which the mode is raised first, as far as it
+        goes; None where it does not begin. A joint that has its mode only while it slides begins at the top.
         """
         if top != self.top:
             mode, first, budget = rest.mode, None, Budget(self.to_rest, deadline=deadline)
@@ -192,35 +188,22 @@ class _Way:
                 first = rest.sliding(top, Run(mode.case.settings.tolerance, budget))
             elif (raised := self._raised_to(rest, top, deadline)) is not None:
                 first = raised.last if raised.ahead is None else raised.ahead.state
-                mode, budget.iterations = mode_of(raised.path), raised.n_iterations
-            self.down, self.top = None if first is None else _begun(mode, first, -1.0, budget), top
+                mode, budget.iterations = _mode_of(raised.path), raised.n_iterations
+            self.down, self.top = _begun(mode, first, -1.0, budget), top
         return self.down
 
 
-def _begun(mode: NonlinearMode, first: ModeState, direction: float, budget: Budget) -> Sweep[ModeState]:
-    """A sweep at its first node."""
+def _begun(mode: NonlinearMode, first: ModeState | None, direction: float, budget: Budget) -> Sweep[ModeState] | None:
+    if first is None:
+        return None
     sweep: Sweep[ModeState] = Sweep(mode, direction, budget, with_reference=True)
     sweep.begin(mode, first)
     return sweep
 
 
-def mode_of(path: Path[ModeState]) -> NonlinearMode:
-    """The mode along which a sweep goes."""
+def _mode_of(path: Path[ModeState]) -> NonlinearMode:
     assert isinstance(path, NonlinearMode)
     return path
-
-
-def solve_point(sweep: Sweep[ModeState], amplitude: float, run: Run) -> ModePoint | Failure:
-    """The point of a mode at an amplitude, m sqrt(kg), to which a sweep was advanced."""
-    if sweep.here is None:
-        return Failure(Outcome.BRANCH_LOST, describe_loss(sweep))
-    found, mode = sweep.state_at(amplitude, run.fresh()), mode_of(sweep.path)
-    if not isinstance(found, Step):
-        ahead = sweep.here if sweep.ahead is None else sweep.ahead.state
-        ends = f"{sweep.here.parameter:.4g} and {ahead.parameter:.4g}"
-        said = f"no state was found between the amplitudes {ends} m sqrt(kg), where the mode has states"
-        return Failure(Outcome.BRANCH_LOST, said)
-    return judge_point(mode, found.state, _reference_at(sweep, amplitude, run), run)
 
 
 def _reference_at(sweep: Sweep[ModeState], amplitude: float, run: Run) -> tuple[NonlinearMode, ModeState] | None:
@@ -236,10 +219,10 @@ def _reference_at(sweep: Sweep[ModeState], amplitude: float, run: Run) -> tuple[
         if found is None:
             return None
         states = (*states, found)
-    return mode_of(path), states[-1]
+    return _mode_of(path), states[-1]
 
 
-def judge_point(
+def _judged(
     mode: NonlinearMode, found: ModeState, reference: tuple[NonlinearMode, ModeState] | None, run: Run
 ) -> ModePoint | Failure:
     """The point with the harmonics that it needs, and its errors.
@@ -298,7 +281,7 @@ def _errors_by_resolution(mode: NonlinearMode, state: ModeState, run: Run) -> Fl
     return np.full(3, math.inf)
 
 
-def describe_loss(sweep: Sweep[ModeState]) -> str:
+def _describe_loss(sweep: Sweep[ModeState]) -> str:
     """Sentence about the end of a mode: the last amplitude, and what may end the mode there."""
     here, (way, beyond) = sweep.last, ("up", "larger") if sweep.direction > 0.0 else ("down", "smaller")
     assert here is not None

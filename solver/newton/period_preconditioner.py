@@ -11,11 +11,9 @@ with the derivatives A and B of the contact law at a sample (`sampled_law`), in 
     dx(t) = B(t) dx(t - 1) + [1 + A(t) (Z / eps - 1)]^-1 A(t) [r(t) - (Z / eps - 1) B(t) dx(t - 1)]
 
 is a march with one small system at each sample, in the rows of pairs that slip or are open (A is zero where a pair
-sticks), and `dp = r - (Z / eps - 1) dx` follows in all harmonics at once. The stiffness of an elastic joint hardly
-changes with the harmonic. Resonances of the structure and the truncation of the series are left to GMRES.
-
-CPU s of an adaptive history of the dovetail to 1e5 cycles with the march, and with a factorisation of the most
-important directions in its place: 16 pairs 3.0 and 3.5, 48 pairs 4.8 and 10.5; 336 pairs to 2e4 cycles 35 and 59.
+sticks), and `dp = r - (Z / eps - 1) dx` follows in all harmonics at once. Resonances of the structure and the
+truncation of the series are left to GMRES. CPU s of a history of the dovetail with the march, and with a factorisation
+of the most important directions in its place: 48 pairs 4.8 and 10.5, 336 pairs 35 and 59.
 """
 
 from __future__ import annotations
@@ -35,8 +33,7 @@ from solver.structure.condensation import KEPT_STRUCTURES, CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.joint import Joint
 
-MARCH_PERIODS = 2
-"""Periods of the march: slip removes the influence of the start."""
+MARCH_PERIODS = 2  # slip removes the influence of the start
 
 SingleArray = NDArray[np.float32]
 
@@ -49,7 +46,6 @@ class PeriodMatrices(NamedTuple):
     - first (N + 1,): index in `row` of the first row of each sample.
     - swept (2 n k,): `A (Z / eps - 1)` in these rows and the tangential columns.
     - inverse: inverses of `1 + A (Z / eps - 1)` in these rows and columns, sample by sample.
-    - inverse_first (N + 1,): index in `inverse` of the first value of each sample.
     """
 
     own: FloatArray
@@ -58,15 +54,11 @@ class PeriodMatrices(NamedTuple):
     first: IntArray
     swept: SingleArray
     inverse: SingleArray
-    inverse_first: IntArray
 
 
 @dataclass(frozen=True)
 class PeriodFactor:
-    """March of some pairs (n,) of a joint through the samples of a Fourier basis.
-
-    coupling (n_rel, 3n): `Z / eps - 1`; columns of displacements that a pair does not have are zero.
-    """
+    """March of some pairs (n,) of a joint through the samples of a Fourier basis; coupling (n_rel, 3n): Z / eps - 1."""
 
     joint: Joint
     basis: FourierBasis
@@ -78,13 +70,10 @@ class PeriodFactor:
 
     @property
     def sign(self) -> float:
-        """Sign of the determinant of the march, a product over the samples.
-
-        The truncation of the harmonics may change the sign of the Jacobian: see `JacobianSolver.determinant_sign`.
-        """
-        of = self.matrices
-        ends = zip(of.inverse_first[:-1], of.inverse_first[1:], np.diff(of.first), strict=True)
-        systems = (of.inverse[begin:end].reshape(n_rows, n_rows) for begin, end, n_rows in ends if n_rows)
+        """Sign of the determinant of the march; the truncation of the harmonics may change that of the Jacobian."""
+        n_rows = np.diff(self.matrices.first)
+        inverses = np.split(self.matrices.inverse, np.cumsum(n_rows**2)[:-1])
+        systems = (part.reshape(n, n) for part, n in zip(inverses, n_rows, strict=True) if n)
         return float(np.prod([np.linalg.slogdet(system)[0] for system in systems]))
 
     def solve(self, right: FloatArray) -> FloatArray:
@@ -131,15 +120,13 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
             return None
         swept.append(product[:, tangential].astype(np.float32).ravel())
         rows.append(row)
-    sizes = np.array([row.size for row in rows])
-    first, inverse_first = (np.concatenate([[0], np.cumsum(part)]) for part in (sizes, sizes**2))
-    all_rows, all_swept, all_inverse = np.concatenate(rows), np.concatenate(swept), np.concatenate(inverse)
+    first = np.cumsum([0, *(row.size for row in rows)])
     coupling = np.ascontiguousarray(square[np.ix_(joint.component_index, components)])
-    matrices = PeriodMatrices(own, carried, all_rows, first, all_swept, all_inverse, inverse_first)
+    all_rows, all_swept, all_inverse = np.concatenate(rows), np.concatenate(swept), np.concatenate(inverse)
+    matrices = PeriodMatrices(own, carried, all_rows, first, all_swept, all_inverse)
     return PeriodFactor(joint, build_basis(joint.basis.orders, n_samples), pairs, coupling, matrices)
 
 
-# the marches of one history need the stiffness of a few structures only
 @lru_cache(maxsize=KEPT_STRUCTURES)
 def stiffness_of_most(structure: CondensedStructure) -> FloatArray:
     """Real stiffness (n_rel, n_rel), N/m: median of all harmonics, which ignores those near a resonance."""
@@ -150,11 +137,8 @@ def stiffness_of_most(structure: CondensedStructure) -> FloatArray:
 
 @njit(cache=True)
 def march_samples(right_t: FloatArray, of: PeriodMatrices, periods: int) -> FloatArray:
-    """Changes of the state (N, 3n) in the last of some periods, from a state without change.
-
-    right_t (N, 3n): right-hand sides at the pairs of the march.
-    """
-    own, carried, row, first, swept, inverse, inverse_first = of
+    """Changes of the state (N, 3n) in the last of some periods, for right-hand sides (N, 3n) at the pairs."""
+    own, carried, row, first, swept, inverse = of
     n_samples, size = right_t.shape
     n_pairs = size // 3
     state_t = np.zeros((n_samples, size))
@@ -162,6 +146,7 @@ def march_samples(right_t: FloatArray, of: PeriodMatrices, periods: int) -> Floa
     after = np.zeros((n_pairs, 2))
     pushed = np.zeros(size, inverse.dtype)
     for _ in range(periods):
+        system = 0
         for n in range(n_samples):
             begin, end = first[n], first[n + 1]
             n_rows = end - begin
@@ -179,7 +164,8 @@ def march_samples(right_t: FloatArray, of: PeriodMatrices, periods: int) -> Floa
                     for k in range(3):
                         total += own[n, pair, i, k] * right_t[n, 3 * pair + k]
                     pushed[place] = total - held[place]
-                small = inverse[inverse_first[n] : inverse_first[n + 1]].reshape(n_rows, n_rows)
+                small = inverse[system : system + n_rows**2].reshape(n_rows, n_rows)
+                system += n_rows**2
                 change = np.dot(small, pushed[:n_rows])
                 for place in range(n_rows):
                     where = row[begin + place]

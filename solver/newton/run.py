@@ -1,37 +1,180 @@
-"""A computation: its tolerance, its limits, and `solve`, the one way to a state of a harmonic balance."""
+"""Newton's method, and a computation with its tolerance and limits: `Run`, the one way to a state of a balance.
+
+A balance may have k further unknowns q and k further equations, R(p, q) = 0 and e(p, q) = 0 (`Bordered`): the parameter
+of an arc-length step, the frequency at a given phase lag, frequency, damping and drive of a nonlinear mode.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from solver.clock import computing_time
-from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.prolongation import transfer
-from solver.harmonic_balance.state import State, final_history
+from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
+from solver.harmonic_balance.state import State, final_history, transfer
 from solver.model import FloatArray
-from solver.newton.bordering import Bordered, BorderedProblem, bordered_step
-from solver.newton.iteration import NewtonResult, solve_newton
 from solver.newton.linear_solver import FORCING, JacobianSolver
 from solver.structure.joint import Case, Joint
+
+MOST_ITERATIONS = 30
+"""Most iterations of one solve. Prototypes took 2 to 5 from a warm start, up to 40 from a cold one near a resonance."""
+
+FULL_STEPS = 6
+"""Full steps in a row without a new lowest residual before steps are halved. Half and twice as many: equal states."""
+
+SHORTEST_STEP = 1.0 / 128.0
+"""Shortest step as a fraction of the full step: seven halvings. With six one of 60 random scenes gets no accurate
+state. Also the shortest natural step over the range to the target (where a shorter one is needed, the branch is assumed
+to fold), and the shortest relaxation step in periods."""
+
+
+class _HasResidual(Protocol):
+    @property
+    def scale(self) -> tuple[float, float]: ...
+
+    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float: ...
+
+
+EvaluationT = TypeVar("EvaluationT", bound=_HasResidual)
+
+
+@dataclass(frozen=True)
+class NewtonResult(Generic[EvaluationT]):
+    """End of an iteration: its last unknown and evaluation, or those of the lowest norm where it has not converged."""
+
+    converged: bool
+    unknown: FloatArray
+    evaluation: EvaluationT
+    iterations: int
+
+
+def solve_newton(
+    evaluate: Callable[[FloatArray], EvaluationT],
+    direction: Callable[[EvaluationT], FloatArray],
+    start: FloatArray,
+    tolerance: float,
+    most: int = MOST_ITERATIONS,
+) -> NewtonResult[EvaluationT]:
+    """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance.
+
+    The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution, while a line
+    search takes very short steps at every kink. So full steps come first, as long as the lowest norm is improved once
+    in `FULL_STEPS` iterations. Then the iteration returns to the best point and halves its steps until the norm falls.
+    """
+    unknown, current = start, evaluate(start)
+    best, best_norm, since_best = (unknown, current), np.inf, 0
+    cutting = False
+    for iteration in range(most + 1):
+        norm = current.scaled_residual()
+        if norm <= tolerance:
+            return NewtonResult(True, unknown, current, iteration)
+        if norm < best_norm:
+            best, best_norm, since_best = (unknown, current), norm, 0
+        else:
+            since_best += 1
+        if iteration == most:
+            break
+        if not cutting and (not np.isfinite(norm) or since_best > FULL_STEPS):
+            cutting = True
+            unknown, current = best
+        step = direction(current)
+        if not np.all(np.isfinite(step)):
+            break
+        length, trial = 1.0, evaluate(unknown + step)
+        while cutting and not trial.scaled_residual(current.scale) < current.scaled_residual():
+            length *= 0.5
+            if length <= SHORTEST_STEP:
+                return NewtonResult(False, *best, most)
+            trial = evaluate(unknown + length * step)
+        unknown, current = unknown + length * step, trial
+    return NewtonResult(False, *best, most)
+
+
+@dataclass(frozen=True)
+class Bordered:
+    """Evaluation of a balance with further equations.
+
+    balance, at: at the values of the further unknowns.
+    values, errors (k,): further unknowns, and residuals of the further equations, dimensionless.
+    reduced (k, k): derivative of the errors by the values with p eliminated, of the last Newton step; None without one.
+    extra: what the problem needs again for its derivatives.
+    """
+
+    balance: Balance
+    at: Evaluation
+    values: FloatArray
+    errors: FloatArray
+    reduced: FloatArray | None = None
+    extra: Any = field(default=None, repr=False)
+
+    @property
+    def scale(self) -> tuple[float, float]:
+        """As in Evaluation."""
+        return self.at.scale
+
+    def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
+        """Norm of all residuals, dimensionless."""
+        return float(np.hypot(self.at.scaled_residual(scale), np.linalg.norm(self.errors)))
+
+
+class BorderedProblem(Protocol):
+    """A balance with further unknowns and equations."""
+
+    def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
+        """Both residuals at a predicted force (n_rel, m), N, and values (k,)."""
+
+    def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
+        """Derivatives by the values at a fixed predicted force: k times (n_rel, m) of the residual, N; (k, k)."""
+
+    def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
+        """Change (k,) of the errors with a step (n_rel, m), N, of the predicted force."""
+
+    def fraction(self, here: Bordered, step: FloatArray, change: FloatArray) -> float:
+        """Fraction of a Newton step that is taken: 1 for a usual one, NaN to give up."""
+
+
+def bordered_step(
+    problem: BorderedProblem, here: Bordered, solver: JacobianSolver, rtol: float
+) -> tuple[FloatArray, FloatArray]:
+    """Newton step of all unknowns (n_rel m + k,), and the derivative `reduced` (k, k) as in `Bordered`.
+
+    With the Jacobian J = dR/dp, the steps a and B of p for the residual and for each of the further unknowns, J a = -R
+    and J B = -dR/dq, leave k equations for the change of q (Govaerts, Numerical Methods for Bifurcations of Dynamical
+    Equilibria, 2000, section 3.6):
+
+        (de/dq + de/dp B) dq = -e - de/dp a,      dp = a + B dq.
+
+    rtol: relative residual of the linear solves.
+    """
+    tangent = here.balance.linearise(here.at)
+    slopes, by_values = problem.by_values(here)
+    rights = np.array([-here.at.residual, *(-slope for slope in slopes)])
+    steps = solver.solve_all(tangent, rights, rtol)
+    own, *others = (problem.by_step(here, tangent, step) for step in steps)
+    reduced = by_values + np.stack(others, axis=1)
+    if not np.isfinite(reduced).all():
+        return np.full(here.at.residual.size + len(here.values), np.nan), reduced
+    change = np.asarray(np.linalg.lstsq(reduced, -here.errors - own)[0])
+    step, right = (np.tensordot(np.append(1.0, change), parts, 1) for parts in (steps, rights))
+    # the steps may cancel each other, not so their errors
+    left = right - tangent.apply(step)
+    if np.linalg.norm(left) > rtol * np.linalg.norm(here.at.residual):
+        step = step + solver.solve(tangent, left)
+    return problem.fraction(here, step, change) * np.concatenate([step.ravel(), change]), reduced
 
 
 class OutOfTimeError(Exception):
     """A computation has used up its CPU time; the caller turns this error into an outcome."""
 
 
-def _silent(_: str) -> None:
-    """Report no progress."""
-
-
 @dataclass
 class Budget:
-    """Limits of one computation with all its parts, and the iterations that it has taken.
+    """Limits of one computation with all its parts.
 
-    iterations: Newton iterations so far.
-    limit: iterations after which no new step of a search begins.
+    iterations, limit: Newton iterations so far, and those after which no new step of a search begins.
     deadline: CPU time of the thread, s, after which the whole computation ends.
     report: called with a description of the progress, in words, at every change.
     """
@@ -39,7 +182,7 @@ class Budget:
     iterations: int = 0
     limit: float = np.inf
     deadline: float = np.inf
-    report: Callable[[str], None] = _silent
+    report: Callable[[str], None] = lambda _: None
 
     @property
     def exhausted(self) -> bool:
@@ -56,8 +199,7 @@ class Budget:
 class Run:
     """Solves of one computation, one after the other. Each raises OutOfTimeError after the deadline of the budget.
 
-    tolerance: of the scaled residual, dimensionless.
-    budget: shared by all parts of the computation.
+    tolerance: of the scaled residual. budget: shared by all parts of the computation.
     solver: keeps a factorisation from solve to solve, which saves time and changes the last bits only.
     """
 
@@ -79,13 +221,10 @@ class Run:
         start (n_rel, 2H+1): first predicted force, N. most: iterations, `MOST_ITERATIONS` by default.
         """
 
-        def direction(at: Evaluation) -> FloatArray:
-            self.budget.check_time()
-            return self.step(balance, at, -at.residual, self._forcing(at.scaled_residual()))
+        def direction(at: Evaluation, rtol: float) -> FloatArray:
+            return self.step(balance, at, -at.residual, rtol)
 
-        end = solve_newton(balance.evaluate, direction, start, self.tolerance, most)
-        self.budget.iterations += end.iterations
-        return end
+        return self._iterate(balance.evaluate, direction, start, most)
 
     def state(
         self, balance: Balance, start: FloatArray, parameter: float = np.nan, most: int | None = None
@@ -97,24 +236,37 @@ class Run:
     def solve_bordered(
         self, problem: BorderedProblem, start: FloatArray, values: FloatArray, most: int | None = None
     ) -> Bordered | None:
-        """Solve a balance with k further unknowns and equations, as `solve`; None where Newton's method fails.
-
-        values (k,): first values of the further unknowns.
-        """
-        size, last = start.size, None
+        """Solve a balance with further equations, as `solve`, from first values (k,) of the further unknowns."""
+        last: FloatArray | None = None
 
         def evaluate(unknown: FloatArray) -> Bordered:
-            return problem.evaluate(unknown[:size].reshape(start.shape), unknown[size:])
+            return problem.evaluate(unknown[: start.size].reshape(start.shape), unknown[start.size :])
 
-        def direction(here: Bordered) -> FloatArray:
+        def direction(here: Bordered, rtol: float) -> FloatArray:
             nonlocal last
-            self.budget.check_time()
-            step, last = bordered_step(problem, here, self.solver, self._forcing(here.scaled_residual()))
+            step, last = bordered_step(problem, here, self.solver, rtol)
             return step
 
-        end = solve_newton(evaluate, direction, np.concatenate([start.ravel(), values]), self.tolerance, most)
-        self.budget.iterations += end.iterations
+        end = self._iterate(evaluate, direction, np.concatenate([start.ravel(), values]), most)
         return replace(end.evaluation, reduced=last) if end.converged else None
+
+    def _iterate(
+        self,
+        evaluate: Callable[[FloatArray], EvaluationT],
+        direction: Callable[[EvaluationT, float], FloatArray],
+        start: FloatArray,
+        most: int | None,
+    ) -> NewtonResult[EvaluationT]:
+        """`solve_newton` within the budget; direction: of an evaluation, and the relative residual of its solve."""
+
+        def within_time(at: EvaluationT) -> FloatArray:
+            self.budget.check_time()
+            # no more accurate than the tolerance needs
+            return direction(at, max(FORCING, 0.1 * self.tolerance / max(at.scaled_residual(), self.tolerance)))
+
+        end = solve_newton(evaluate, within_time, start, self.tolerance, MOST_ITERATIONS if most is None else most)
+        self.budget.iterations += end.iterations
+        return end
 
     def step(self, balance: Balance, at: Evaluation, right: FloatArray, rtol: float = FORCING) -> FloatArray:
         """Step (n_rel, m), N, with Jacobian times step = right (n_rel, m), N, in a state, to a relative residual."""
@@ -124,7 +276,3 @@ class Run:
         """The state of a case with the harmonics and samples of another joint; None where it is not found."""
         balance, start = transfer(old, joint, state.evaluation)
         return self.fresh().state(balance, start, state.parameter)
-
-    def _forcing(self, residual: float) -> float:
-        """Relative residual of a direction: no more accurate than the tolerance needs."""
-        return max(FORCING, 0.1 * self.tolerance / max(residual, self.tolerance))

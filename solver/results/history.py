@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
+from solver.model import ComplexArray, FloatArray, IntArray
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.presentation import PresentedHistory
@@ -41,15 +41,14 @@ class PeriodicState:
 class StartState:
     """Unworn state of one frequency of a sweep, or the reason why there is none.
 
-    outcome: whether the state is a result.
-    state: the state; None where there is none.
+    outcome: whether the state is a result. state: None where there is none.
     penalty_omega: rad/s, frequency at which the penalty is taken, common to all points of a quarter octave.
     resolution: harmonics and samples of the state.
     response_error, wear_rate_error: estimated relative errors of the state, errors by the steps of the sweep included.
-    newton_iterations: iterations of the whole sweep to this frequency and of the state, as for this frequency alone.
+    newton_iterations: of the whole sweep to this frequency and of the state, as for this frequency alone.
     run_time: CPU seconds of the computing thread since the last frequency.
-    branch: number of folds that the sweep has jumped over since its start; 0 on its first branch.
-    fold_frequency: Hz, frequency of the last such fold; NaN if none. NaN for a ramp, whose folds are load factors.
+    branch, fold_frequency: number of folds that the sweep has jumped over, 0 on its first branch, and frequency of the
+        last one, Hz; NaN if none, and for a ramp, whose folds are load factors.
     message: sentence of an unexpected error (`Outcome.EXCEPTION`), or how far a sweep came.
     reference: state of the reference sweep, solved with the resolution of the state; None where there is none.
     """
@@ -70,44 +69,37 @@ class StartState:
 
 @dataclass(frozen=True, repr=False)
 class WearHistory(PresentedHistory):
-    """A point of a study on the slow time scale, at `n_output` cycle counts.
+    """A point of a study on the slow time scale, at `n_output` cycle counts; not reached: NaN, whole numbers 0.
 
-    At output counts that were not reached, real values are NaN and whole numbers 0.
-
-    - cycles (n_output,): cycle counts.
-    - worn_volume (n_output,), m3; wear_rate (n_output,), m3 per cycle; wear_depth (n_output, n_contact), m.
+    - cycles (n_output,): counts; worn_volume, m3, wear_rate, m3 per cycle; wear_depth (n_output, n_contact), m.
     - mean_pressure, Pa, slip_range, m, open_fraction (n_output, n_contact): of a period.
-    - response (n_output, n_response): complex first harmonic, m.
-    - response_mean, response_peak (n_output, n_response): mean and largest magnitude over a period, m.
+    - response (n_output, n_response): complex first harmonic, m; response_mean, response_peak: mean and largest
+      magnitude over a period, m.
     - loop_displacement, loop_force (n_output, n_loops, n_phase, 3): m and N, fretting loops of the chosen pairs, see
       `solver.results.state_report.contact_loops`.
-    - excitation_frequency, excitation_frequency_error (n_output,): frequency of the excitation and its estimated error,
-      Hz; the error of a given frequency is 0.
+    - excitation_frequency, excitation_frequency_error (n_output,): Hz; the error of a given frequency is 0.
     - worn_volume_error (n_output,): estimated relative error of the worn volume by steps and their propagation,
-      harmonics, samples and start state; 0 where nothing has worn.
-    - wear_depth_error (n_output, n_contact): estimated error of the depths by these causes, m.
+      harmonics, samples and start state, 0 where nothing has worn; wear_depth_error (n_output, n_contact): m.
     - error_estimate: `worn_volume_error` at the last count that was reached; NaN where nothing has worn at this count
       and the joint wears.
-    - reference_volume (n_output,): m3, worn volume of the reference solution; NaN beyond the end of this solution.
+    - reference_volume (n_output,): m3, of the reference solution; NaN beyond its end.
     - residual, penetration, tension, cone_violation, energy_error, response_error, wear_rate_error (n_output,):
       certificate of the states, all relative; NaN where not estimated.
-    - stable (n_output,): bool.
-    - harmonics_used, samples_used (n_output,): int, 0 where there is no state.
-    - last_cycle: count up to which the point was computed, whatever ended the history; NaN where there is no state.
+    - harmonics_used, samples_used (n_output,): int.
+    - last_cycle: count up to which the point was computed; NaN where there is no state.
     - jump_cycle: first cycle count at which the branch was lost, NaN if never.
-    - cycles_to_target, cycles_to_target_error: count at which the target of the wear was reached, and its estimated
-      error, cycles; NaN if never or without a target. The history ends with the step that reaches the target.
+    - cycles_to_target, cycles_to_target_error: count at which the target was reached, and its estimated error, cycles;
+      NaN if never or without a target. The history ends with the step that reaches the target.
     - cut_off_cycle: first count at which a pair at an edge of the modelled contact (`ContactInterface.edge`) carries
       load or has worn, NaN if never.
     - inaccurate_from, inaccurate_in, inaccurate_error: count from which on harmonics and samples do not bring the error
       of a state below rtol, inf if never; name of the result, and its largest error from there on.
     - held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
-    - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.rate_slope`); inf if
-      there is no limit.
-    - run_time: CPU seconds of the computing thread, start state included.
-    - branch, fold_frequency: `StartState.branch` and `StartState.fold_frequency` of the start state.
-    - message: addition to the outcome: an unexpected error, the cycle from which on a condition is violated, the error
-      reached; empty where there is nothing to add.
+    - step_limit: cycles, largest stable explicit step at the first state that wears (`solver.wear.rate_slope`); or inf.
+    - newton_iterations; run_time: CPU seconds of the computing thread, both with those of the start state.
+    - branch, fold_frequency: of the start state.
+    - outcome, message: how the history ended; an unexpected error, the cycle from which on a condition is violated, or
+      the error reached.
     """
 
     OVER = ("cycles", "cycle")
@@ -137,7 +129,6 @@ class WearHistory(PresentedHistory):
     wear_rate_error: FloatArray
     harmonics_used: IntArray
     samples_used: IntArray
-    stable: BoolArray
     worn_volume_error: FloatArray
     wear_depth_error: FloatArray
     last_cycle: float = math.nan

@@ -15,9 +15,9 @@ from solver.structure.joint import Joint
 
 @dataclass(frozen=True)
 class PeriodicMotion:
-    """A periodic motion of a joint: its Fourier coefficients, and its signals at N times of a period.
+    """A periodic motion of a joint: Fourier coefficients, complex, and signals at N times of a period.
 
-    Coefficients are complex: harmonic k is Re(value exp(i k omega t)); the first of them is the mean, which is real.
+    Harmonic k is Re(value exp(i k omega t)); the first coefficient is the mean, which is real.
 
     - frequency, excitation_amplitude: Hz, N.
     - orders (H+1,): harmonics, 0 first.

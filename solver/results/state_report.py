@@ -10,14 +10,13 @@ from numba import njit
 from solver.accuracy.certificate import Certificate
 from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Balance, Evaluation
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.state import State, largest_responses
 from solver.model import ComplexArray, FloatArray
 from solver.packing import packable
 from solver.results.history import PeriodicState
 from solver.settings import Resolution
 from solver.structure.condensation import relative_indices, whole_motion
-from solver.structure.fourier import to_complex
+from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import Joint
 
 LOOP_PHASES = 128
@@ -49,8 +48,8 @@ class StateReport:
     """Reported values of a state; units and shapes as in `WearHistory`, without the dimension n_output.
 
     excitation_frequency_error: by the harmonics and samples of the state.
-    resonance: `resonance_frequency`, rad/s; resonance_error: its estimated relative error by harmonics and samples; NaN
-        where they were not asked for.
+    resonance: `resonance_frequency`, rad/s; resonance_error: its estimated relative error by harmonics and samples;
+        both NaN where they were not asked for.
     """
 
     wear_depth: FloatArray
@@ -78,10 +77,7 @@ def report_state(
     *,
     with_resonance: bool = False,
 ) -> StateReport:
-    """Pressures, slip and responses of a converged state.
-
-    loops: pairs with reported fretting loops. with_resonance: whether the resonance of the vibration is reported.
-    """
+    """Report of a converged state. loops: pairs with fretting loops. with_resonance: whether with the resonance."""
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
     response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
     resonance, slope = resonance_frequency(joint, evaluation) if with_resonance else (float("nan"),) * 2
@@ -107,9 +103,8 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     """Resonance w_r of the vibration, rad/s, and its relative change per relative change of the motion at most.
 
     With x and F, the first harmonics of all displacements and of the excitation, `x^H` times Eq. (1) is
-    `w^2 x^H M x = Re x^H (K x + lambda) - Re x^H F`. At the resonance x with its contact forces needs no part of F in
-    phase with x: `w_r^2 = w^2 + Re (x^H F) / (x^H M x)`. For a linear oscillator w_r is the natural frequency, whatever
-    w is; for a joint that slips and opens a Rayleigh quotient with the contact forces of the state. The change is
+    `w^2 x^H M x = Re x^H (K x + lambda) - Re x^H F`. At the resonance x needs no part of F in phase with x:
+    `w_r^2 = w^2 + Re (x^H F) / (x^H M x)`, a Rayleigh quotient with the contact forces of the state. The change is
     `|x^H F| / (2 w_r^2 x^H M x)`. Both are NaN where no mass moves, or where w_r^2 is not positive.
     """
     linear = joint.model.harmonic_structure(1)
@@ -147,17 +142,16 @@ def loop_phases() -> FloatArray:
 def contact_loops(joint: Joint, evaluation: Evaluation, pairs: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
     """Relative displacement, m, and contact force, N, of chosen pairs of a state, both (n_pairs, LOOP_PHASES, 3).
 
-    Force: the values of the contact law in time, linearly interpolated between the samples of the state: a Fourier
-    series would overshoot at corners and at jumps. Displacement: the series of the state, which is exact at any phase;
-    a pair with a sliding mass moves with harmonics beyond the series, which follow from the integration through the
-    period.
-
-    Components: normal, first and second tangent; closing and compression are positive. Along a direction in which a
-    pair has no displacement, displacement and force are 0, but for a constant normal load.
+    Force: linear between the samples of the contact law: a Fourier series would overshoot at corners and jumps.
+    Displacement: the series of the state, and for a sliding mass the harmonics beyond it. Components: normal, first and
+    second tangent; closing and compression are positive. Along a direction that a pair does not have both are 0, but
+    for a constant normal load.
     """
-    chosen = list(pairs)
-    displacement = evaluation.displacement_h[chosen] @ joint.basis.at(loop_phases())
-    displacement[:, 1:] += at_phases(joint.law.beyond_series(evaluation, evaluation.displacement_h)[chosen], 0.5)
+    chosen, n_samples, orders = list(pairs), joint.basis.n_samples, joint.basis.orders
+    motion_h = evaluation.displacement_h[chosen]
+    displacement = motion_h @ synthesis(orders, loop_phases())
+    ends = motion_h[:, 1:] @ synthesis(orders, 2.0 * np.pi * (np.arange(n_samples) - 0.5) / n_samples)
+    displacement[:, 1:] += at_phases(joint.law.beyond_series(evaluation, chosen, ends), 0.5)
     displacement *= (joint.contact.dofs[chosen] >= 0)[:, :, None]
     force = at_phases(evaluation.force_t[chosen], 0.0)
     return displacement.transpose(0, 2, 1), force.transpose(0, 2, 1)
@@ -167,8 +161,8 @@ def at_phases(values_t: FloatArray, lead: float) -> FloatArray:
     """Values (..., LOOP_PHASES) at the phases of a loop, by linear interpolation of periodic samples (..., N).
 
     lead: 0 where the first sample is at phase 0, 0.5 where the first sample is half a step before.
-    The positions of the phases are whole numbers: a phase of a sample gives this sample to the last bit.
     """
+    # positions of the phases in whole numbers: a phase of a sample gives this sample to the last bit
     n_samples = values_t.shape[-1]
     whole, rest = np.divmod(2 * n_samples * np.arange(LOOP_PHASES) + round(2 * lead) * LOOP_PHASES, 2 * LOOP_PHASES)
     before, after = values_t[..., whole % n_samples], values_t[..., (whole + 1) % n_samples]

@@ -46,9 +46,7 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
 def last_error(history: WearHistory, rows: IntArray, last: float) -> float:
     """Estimated relative error of the last worn volume of a history; NaN where there is none.
 
-    The unworn joint has no volume that could be wrong. But a history may reach its target before its first count: what
-    has worn there is not known.
-
+    A history may reach its target before its first count: what has worn there is not known.
     rows: indices of the counts that were reached, ascending. last: count up to which the history was computed.
     """
     if not rows.size or (history.cycles[rows[-1]] == 0.0 and last > 0.0 and bool(history.wear_rate[rows[-1]] > 0.0)):

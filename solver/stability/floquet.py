@@ -1,15 +1,20 @@
-"""Floquet multipliers of a periodic state, and the kind of its stability.
+"""Stability of a periodic state: the sign of Hill's determinant, and the Floquet multipliers.
 
-A small disturbance of a state is multiplied by the monodromy (`monodromy`) in each period. A disturbance whose
-multiplier lies outside the unit circle grows:
+A small disturbance p' of a state with amplitudes that vary slowly as exp(sigma t) obeys Hill's equation
 
-- a real multiplier beyond +1 leads to another state;
-- a real multiplier beyond -1 leads to a vibration that repeats after two periods (period doubling);
-- a complex pair leads to a vibration with a second frequency (Neimark-Sacker bifurcation).
+    [Z_r(i n w + sigma) du/dp + dlambda/dp] p' = 0.
 
-`find_multipliers` chooses the method: the linear structure where no pair slips, opens or closes; Hill's method (`hill`)
-for a small joint that opens and closes, with at least `OPENING_HARMONICS`; else integration in time, with all
-multipliers of a small joint and the largest ones of a large joint.
+Its determinant is that of the Jacobian, Eq. (16), at sigma = 0, and positive for sigma towards infinity. So a negative
+determinant of the Jacobian means an odd number of real, positive growth rates: multipliers on the real axis beyond +1,
+as between two folds of a branch. The sign is tested at each state of a branch (`is_stable`).
+
+Disturbances with a multiplier outside the unit circle grow: beyond +1 to another state, beyond -1 with twice the
+period, a complex pair with a second frequency (Neimark-Sacker bifurcation). The multipliers of reported states come
+from the first method that serves:
+
+1. the exponents of the linear structure, where no pair slips, opens or closes;
+2. the exponents of Hill's equation, for a small joint that opens and closes;
+3. time integration, with all multipliers of a small joint and the largest ones of a large joint.
 """
 
 from __future__ import annotations
@@ -19,27 +24,28 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import eigvals
 
 from solver.contact.coulomb import SEPARATED
-from solver.harmonic_balance.dlft import Evaluation
-from solver.harmonic_balance.state import State
+from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.state import Failure, State
 from solver.model import BoolArray, ComplexArray, FloatArray, LinearModel
-from solver.newton.krylov import MOST_PRODUCTS, ritz_values
-from solver.newton.linear_solver import EXPENSIVE_UNKNOWNS, SMALL_JOINT
+from solver.newton.linear_solver import MOST_PRODUCTS, SMALL_JOINT, ritz_values
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF, Resolution, all_orders, samples_for
-from solver.stability.hill import hill_multipliers, hill_size
-from solver.stability.monodromy import Monodromy, build_monodromy, switching_pairs
+from solver.stability.disturbances import (
+    Monodromy,
+    build_monodromy,
+    hill_multipliers,
+    linear_exponents,
+    pass_period,
+    switching_pairs,
+)
 from solver.structure.joint import Case, Joint
 
 SMALL_SAMPLES = 512
-"""Samples of the law in a period, for joints of which all multipliers are computed. In 72 scenes with one pair all
-multipliers of states that are the exact motion lie on the right side of 1. Most errors are below 0.01; for sliders
-that turn or stop up to 0.16, where the multiplier is far below 1. A quarter for larger joints, whose
-largest multipliers belong to few modes: within 0.003 of the multipliers with all (48 pairs). At most eight times as
-many where the structure alone vibrates fast."""
+"""Samples of the law in a period, for joints of which all multipliers are computed: 72 scenes with one pair lie on the
+right side of 1, most within 0.01. A quarter for larger joints: within 0.003 with 48 pairs."""
 
 SAMPLES_A_VIBRATION = 40
 """Samples in a period of the fastest growing vibration of the structure alone, which BDF2 damps by 0.6 %."""
@@ -49,32 +55,36 @@ OPENING_HARMONICS = 19
 harmonics: multiplier 0.95 in place of 2.8)."""
 
 OTHER_BRANCH = 0.05
-"""Relative difference of the vibration above which two states belong to different branches: a state with
-`OPENING_HARMONICS` (on the branches of a mass at a wall more than 9 harmonics change means and first harmonics by
-up to 3 %), or a state behind the end of a branch. Corners at which a branch folds back a little are no jumps, and
-there may be many of them."""
+"""Relative difference of the vibration above which two states belong to different branches. At a wall more than 9
+harmonics change means and first harmonics by up to 3 %; a corner at which a branch folds back a little is no jump."""
 
 MOST_ROWS = 600
 """Largest number of displacements of switching pairs: 200 such pairs take 0.4 GB and 10 s."""
 
 SMALLEST_GROWTH = 1e-3
-"""Growth in a period, beyond 1, that counts, and the residual of Arnoldi's method below which a multiplier has
-converged. Sliding pairs that stick have multipliers of 1. The largest multiplier of 48 pairs converges in 20
-products."""
+"""Growth in a period, beyond 1, that counts, and residual below which a multiplier has converged. Pairs that stick have
+multipliers of 1. The largest multiplier of 48 pairs converges in 20 products."""
 
 _EPS = float(np.finfo(np.float64).eps)
 
 Stability = Literal["stable", "fold", "period doubling", "Neimark-Sacker", "unknown"]
-"""Stability of a state: stable, or by which kind of disturbance unstable: a growing one ("fold", as between two folds),
-one that changes sign in each period, or one with a second frequency."""
+"""Stable, or the kind of disturbance that grows: one that keeps its sign ("fold", as between two folds), one that
+changes sign in each period, or one with a second frequency."""
+
+
+def is_stable(balance: Balance, at: Evaluation, run: Run) -> bool:
+    """False where a state has an odd number of real multipliers beyond +1.
+
+    balance: of the state at a fixed wear depth, as the vibration is fast and the wear is slow.
+    """
+    return bool(run.solver.determinant_sign(balance.linearise(at)) >= 0.0)
 
 
 @dataclass(frozen=True)
 class Multipliers:
-    """Multipliers of a state.
+    """Multipliers of a state, largest modulus first; of a large joint the largest ones only; none where not computed.
 
-    - values: the multipliers, largest modulus first; of a large joint the largest ones only; none where not computed.
-    - error: estimated error of the first value by the time steps.
+    error: estimated error of the first value by the time steps.
     """
 
     values: ComplexArray
@@ -98,75 +108,12 @@ class Multipliers:
         return "fold" if self.values[0].real > 0.0 else "period doubling"
 
 
-@dataclass(frozen=True)
-class Instability:
-    """Why a state is unstable.
+def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: bool = True) -> Failure | None:
+    """Why a state is unstable at a fixed wear depth; None where it is stable, or where stability is not known.
 
-    - outcome: PERIOD_DOUBLED where a disturbance of a switching joint changes sign in each period, else UNSTABLE.
-    - sentence: growth of a disturbance in a period, and its kind.
-    """
-
-    outcome: Outcome
-    sentence: str
-
-
-def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, growing_only: bool = False) -> Multipliers:
-    """Multipliers of a state at a fixed wear depth; none where they are not known:
-
-    - in a travelling wave in which a pair slips or opens: disturbances move in other nodal diameters;
-    - for a joint with more than `MOST_ROWS` displacements of switching pairs;
-    - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch.
-
-    The number of time steps is doubled until the first multiplier has settled, or lies on one side of 1 by more than
-    its error. growing_only: to see whether something grows, with one number of time steps where nothing does, and of a
-    state with more harmonics on any branch. Raises OutOfTimeError.
-    """
-    switching, stuck = switching_pairs(at)
-    if not switching.any():
-        linear = joint.model.harmonic_structure(1)
-        return Multipliers(_sorted(np.exp(_exponents(linear, _moving(joint, stuck)) * 2.0 * np.pi / joint.omega)), 0.0)
-    travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
-    bounces = _bounces(joint, at)
-    if not travels and 3 * np.count_nonzero(switching) <= MOST_ROWS:
-        sharp = _sharper(case, joint, at, run) if bounces else (joint, at)
-        # beside folds a solve may change the branch
-        if sharp is not None and (growing_only or _first(sharp[1], at) <= OTHER_BRANCH):
-            if bounces and hill_size(sharp[0]) <= EXPENSIVE_UNKNOWNS and not joint.law.rate_dependent:
-                values = _sorted(hill_multipliers(*sharp))
-                # none where the series is too short to give an exponent
-                if values.size:
-                    return Multipliers(values, 0.0)
-            return _settled(*sharp, growing_only, case.settings.rtol)
-    return Multipliers(np.empty(0, np.complex128), np.inf)
-
-
-def _settled(joint: Joint, at: Evaluation, growing_only: bool, rtol: float) -> Multipliers:
-    """Multipliers by integration in time with as many samples as they need."""
-    small = _is_small(joint, at)
-    n_samples = _samples(joint, at, small) // (1 if growing_only else 2)
-    found = Multipliers(_integrated(joint, at, n_samples, small), np.inf)
-    while found.values.size and found.error > rtol and n_samples < 8 * SMALL_SAMPLES:
-        largest = abs(found.values[0])
-        if abs(largest - 1.0) > 2.0 * found.error or (growing_only and largest <= 1.0 + SMALLEST_GROWTH):
-            break
-        n_samples, coarse = 2 * n_samples, found.values[0]
-        values = _integrated(joint, at, n_samples, small)
-        error = np.inf
-        if values.size:
-            # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
-            error = abs(abs(values[0]) - abs(coarse)) if growing_only else abs(values[0] - coarse)
-        found = Multipliers(values, float(error))
-    return found
-
-
-def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: bool = True) -> Instability | None:
-    """Instability of a state at a fixed wear depth; None where the state is stable, or where stability is not known.
-
-    case, joint, at: case, joint and evaluation of the state. run: tolerance and limits.
-    every: False leaves out joints that switch, but for small ones that open and close. This is for states between the
-    first and the last of a wear history, where only impacts change the motion of a joint suddenly.
-
-    Raises OutOfTimeError where the time is over.
+    The outcome is PERIOD_DOUBLED where a disturbance of a switching joint changes sign in each period, else UNSTABLE.
+    every: False leaves out joints that switch, but for small ones that open and close, for states within a wear
+    history, where only impacts change the motion suddenly. Raises OutOfTimeError.
     """
     switches = bool(switching_pairs(at)[0].any())
     if (not switches and _is_passive(joint.model.harmonic_structure(1))) or (
@@ -186,11 +133,38 @@ def find_instability(case: Case, joint: Joint, at: Evaluation, run: Run, every: 
         said = f"{said} and brings a second frequency, {turn:.4g} Hz beside that of the excitation"
     if _is_driven(joint):
         said = f"{said}: look for negative damping or stiffness of the structure"
-    return Instability(Outcome.PERIOD_DOUBLED if doubles else Outcome.UNSTABLE, said)
+    return Failure(Outcome.PERIOD_DOUBLED if doubles else Outcome.UNSTABLE, said)
+
+
+def find_multipliers(case: Case, joint: Joint, at: Evaluation, run: Run, growing_only: bool = False) -> Multipliers:
+    """Multipliers of a state at a fixed wear depth; none where they are not known:
+
+    - in a travelling wave in which a pair slips or opens: disturbances move in other nodal diameters;
+    - for a joint with more than `MOST_ROWS` displacements of switching pairs;
+    - for a small joint that opens and closes, where no state with `OPENING_HARMONICS` is found on the same branch.
+
+    growing_only: with one number of time steps where nothing grows, and of a state with more harmonics on any branch.
+    Raises OutOfTimeError.
+    """
+    switching, stuck = switching_pairs(at)
+    if not switching.any():
+        linear = joint.model.harmonic_structure(1)
+        return Multipliers(
+            _sorted(np.exp(linear_exponents(linear, _moving(joint, stuck)) * 2.0 * np.pi / joint.omega)), 0.0
+        )
+    travels = joint.model.n_sectors > 0 and joint.model.nodal_diameter > 0
+    bounces = _bounces(joint, at)
+    if not travels and 3 * np.count_nonzero(switching) <= MOST_ROWS:
+        sharp = _sharper(case, joint, at, run) if bounces else (joint, at)
+        # beside folds a solve may change the branch
+        if sharp is not None and (growing_only or _apart(sharp[1], at) <= OTHER_BRANCH):
+            if bounces and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
+                return Multipliers(_sorted(values), 0.0)
+            return _integrated(*sharp, growing_only, case.settings.rtol)
+    return Multipliers(np.empty(0, np.complex128), np.inf)
 
 
 def _is_small(joint: Joint, at: Evaluation) -> bool:
-    """Whether all multipliers are computed."""
     return int(_moving(joint, switching_pairs(at)[1]).sum()) <= SMALL_JOINT
 
 
@@ -211,7 +185,7 @@ def _sharper(case: Case, joint: Joint, at: Evaluation, run: Run) -> tuple[Joint,
     return None if moved is None else (finer, moved.evaluation)
 
 
-def _first(finer: Evaluation, at: Evaluation) -> float:
+def _apart(finer: Evaluation, at: Evaluation) -> float:
     """Relative difference of means and first harmonics of two states."""
     one, other = (state.displacement_h[..., :3] for state in (finer, at))
     return float(np.linalg.norm(one - other)) / max(float(np.linalg.norm(other)), 1e-300)
@@ -220,6 +194,32 @@ def _first(finer: Evaluation, at: Evaluation) -> float:
 def _sorted(values: ComplexArray) -> ComplexArray:
     # of a conjugate pair the one that turns forward comes first
     return values[np.lexsort((-values.imag, -np.abs(values).round(12)))]
+
+
+# --- by time integration ---
+
+
+def _integrated(joint: Joint, at: Evaluation, growing_only: bool, rtol: float) -> Multipliers:
+    """Multipliers by integration in time, with samples doubled until the first one has settled, or lies on one side of
+    1 by more than its error.
+    """
+    small, error = _is_small(joint, at), np.inf
+    n_samples = _samples(joint, at, small) // (1 if growing_only else 2)
+
+    def integrated() -> ComplexArray:
+        return _sorted(multipliers_of(build_monodromy(joint, joint.model.linear[0], at, n_samples), small))
+
+    values = integrated()
+    while values.size and error > rtol and n_samples < 8 * SMALL_SAMPLES:
+        largest = abs(values[0])
+        if abs(largest - 1.0) > 2.0 * error or (growing_only and largest <= 1.0 + SMALLEST_GROWTH):
+            break
+        coarse, n_samples = values[0], 2 * n_samples
+        values, error = integrated(), np.inf
+        if values.size:
+            # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
+            error = float(abs(abs(values[0]) - abs(coarse)) if growing_only else abs(values[0] - coarse))
+    return Multipliers(values, error)
 
 
 def _samples(joint: Joint, at: Evaluation, small: bool) -> int:
@@ -231,24 +231,19 @@ def _samples(joint: Joint, at: Evaluation, small: bool) -> int:
     return int(np.clip(wanted, SMALL_SAMPLES if small else SMALL_SAMPLES // 4, 8 * SMALL_SAMPLES))
 
 
-def _integrated(joint: Joint, at: Evaluation, n_samples: int, every: bool) -> ComplexArray:
-    """Sorted multipliers of a state by time integration with a number of samples."""
-    return _sorted(multipliers_of(build_monodromy(joint, joint.model.linear[0], at, n_samples), every))
-
-
 def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
     """All multipliers, or the largest ones, as far as Arnoldi's method has converged."""
     if every:
-        return np.asarray(np.linalg.eigvals(monodromy.matrix()), np.complex128)
-    # a fixed start: the result must not depend on earlier computations
-    start = np.random.default_rng(0).normal(size=monodromy.size)
+        return np.asarray(np.linalg.eigvals(pass_period(monodromy, np.eye(monodromy.size))), np.complex128)
 
     def product(vector: FloatArray) -> FloatArray:
-        return monodromy.apply(vector[:, None])[:, 0]
+        return pass_period(monodromy, vector[:, None])[:, 0]
 
     def settled(values: ComplexArray, residuals: FloatArray) -> bool:
         return bool(residuals[np.argmax(np.abs(values))] < SMALLEST_GROWTH)
 
+    # a fixed start: the result must not depend on earlier computations
+    start = np.random.default_rng(0).normal(size=monodromy.size)
     values, residuals = ritz_values(product, start, MOST_PRODUCTS, settled)
     return values[residuals < SMALLEST_GROWTH]
 
@@ -265,11 +260,7 @@ def _moving(joint: Joint, fixed: BoolArray) -> BoolArray:
 
 
 def _is_driven(joint: Joint) -> bool:
-    """Whether the structure itself gains energy.
-
-    True where a motion grows while all pairs stick, or where a vibration grows while no pair does. A motion without
-    vibration that grows without the pairs does not count: a free blade leaves its spinning disk.
-    """
+    """Whether a motion grows while all pairs stick, or a vibration while none does: a free blade leaves its disk."""
     linear, every = joint.model.harmonic_structure(1), np.ones(joint.contact.n_contact, bool)
     stuck, free = (_growing(linear, _moving(joint, pairs).tobytes()) for pairs in (every, ~every))
     return stuck.size > 0 or bool((np.abs(free.imag) > free.real).any())
@@ -285,29 +276,10 @@ def _is_passive(linear: LinearModel) -> bool:
 
 @lru_cache(maxsize=4)
 def _growing(linear: LinearModel, moves: bytes) -> ComplexArray:
-    """Exponents sigma, 1/s, of the growing motions; moves: the bytes of those of `_exponents`, kept for next states."""
+    """Exponents sigma, 1/s, of the growing motions; moves: bytes of those of `linear_exponents`, for the cache."""
     if _is_passive(linear):
         return np.empty(0, complex)
-    found = _exponents(linear, np.frombuffer(moves, bool))
+    found = linear_exponents(linear, np.frombuffer(moves, bool))
     # round-off of a fast vibration is no growth
     growing: ComplexArray = found[found.real > found.size * _EPS * np.abs(found).max(initial=0.0)]
     return growing
-
-
-def _exponents(linear: LinearModel, moves: BoolArray) -> ComplexArray:
-    """Exponents sigma, 1/s, of all motions exp(sigma t) of a linear structure; moves (n,): displacements that move."""
-    parts = [part[np.ix_(moves, moves)] for part in (linear.mass, linear.damping, linear.stiffness)]
-    sizes, motions = np.linalg.eigh(parts[0])
-    n = len(sizes)
-    mass, damping, stiffness = (motions.conj().T @ part @ motions for part in parts)
-    # motions without mass come first, as the mass has no negative eigenvalues but round-off
-    light = int(np.count_nonzero(sizes <= n * _EPS * sizes.max(initial=0.0)))
-    damping[:light][np.abs(damping[:light]) <= n * _EPS * np.abs(damping).max(initial=0.0)] = 0.0
-    # y: all motions, v: velocities of those with mass; -K y - C v = sigma (C_light y_light + M v), sigma y_heavy = v.
-    # A motion without mass and damping has an infinite exponent.
-    heavy = n - light
-    left = np.block([[-stiffness, -damping[:, light:]], [np.zeros((heavy, n)), np.eye(heavy)]])
-    right = np.zeros_like(left)
-    right[:n, :light], right[light:n, n:], right[n:, light:n] = damping[:, :light], mass[light:, light:], np.eye(heavy)
-    found = eigvals(left, right)
-    return np.asarray(found[np.isfinite(found)], np.complex128)

@@ -41,10 +41,6 @@ class FourierBasis:
         angle = np.pi * np.array(self.orders) / self.n_samples
         return np.concatenate([[1.0], np.repeat(np.sin(angle) / angle, 2)])
 
-    def at(self, phase: FloatArray) -> FloatArray:
-        """`synthesis` at other phases (n,), rad: (2H+1, n)."""
-        return synthesis(self.orders, phase)
-
 
 @lru_cache(maxsize=32)
 def build_basis(orders: tuple[int, ...], n_samples: int) -> FourierBasis:

@@ -1,9 +1,8 @@
-"""Check of a state of a wearing joint: whether it is a result (certificate, harmonics, stability), and the last one.
+"""Check of a state of a wearing joint: whether it is a result, and whether it is the last one.
 
-A history ends at a last count, at a target, where nothing wears any more, or where wear goes on without end. In a
-steady state every pair that slips carries no force. The slowest pair determines how fast a history approaches this
-state. So the history ends where the wear rate of every pair is below a fraction of the largest rate of this pair. A
-joint that slips everywhere under a load that nothing else carries has no steady state: its wear rate is constant.
+In a steady state every pair that slips carries no force, and the slowest pair determines how fast a history approaches
+this state. So a history to the end of wear ends where the wear rate of every pair is below a fraction of its largest
+one. A joint that slips everywhere under a load that nothing else carries has no steady state: its rate is constant.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED, certify
 from solver.accuracy.error_estimate import UNKNOWN
-from solver.accuracy.period_events import lacks_even, left_out
+from solver.accuracy.harmonic_levels import lacks_even, left_out
 from solver.accuracy.refinement import KEPT_FRACTION, VIBRATION_RECHECK, refine
 from solver.harmonic_balance.dlft import worn_by
 from solver.harmonic_balance.state import Failure
@@ -78,12 +77,18 @@ def full_check(
         checked = report(choose_anew(work, state))
     if isinstance(checked, Failure):
         return checked
-    state, reported = _note_accuracy(checked[0]), checked[1]
-    at = state.point.evaluation
+    (state, reported), at = checked, checked[0].point.evaluation
+    estimate, worst = state.choice.estimate, state.worst
+    # NaN for given harmonics and samples, where no state with others was found for a comparison
+    unknown = np.isnan(estimate.largest)
+    if unknown or not state.choice.accurate:
+        if not estimate.largest < worst.largest:
+            worst = UNKNOWN if unknown else estimate
+        state = replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
     if state.hold is not None and creeps(work.at(state), state.hold, at):
         return Failure(Outcome.ADRIFT)
     if _vibrates_otherwise(state):
-        if (unstable := _multipliers(work, state, every=False)) is not None:
+        if (unstable := find_instability(work.case, work.at(state), at, work.run, False)) is not None:
             return unstable
         state = replace(state, judged_h=at.predicted_h)
     return state, reported
@@ -137,30 +142,12 @@ def choose_anew(work: WearingJoint, state: WearState) -> WearState | Failure:
     return work.at_followed(replace(state, point=refined.point, resolution=resolution, choice=choice))
 
 
-def _note_accuracy(state: WearState) -> WearState:
-    """The state with the count from which on its harmonics do not suffice, and with the largest error since."""
-    estimate, worst = state.choice.estimate, state.worst
-    # NaN for given harmonics and samples, where no state with others was found for a comparison
-    known = not np.isnan(estimate.largest)
-    if state.choice.accurate and known:
-        return state
-    if not estimate.largest < worst.largest:
-        worst = estimate if known else UNKNOWN
-    return replace(state, inaccurate_from=min(state.inaccurate_from, state.cycle), worst=worst)
-
-
 def _vibrates_otherwise(state: WearState) -> bool:
     """Whether the vibration differs from the vibration of the last stability check."""
     if state.judged_h is None or state.judged_h.shape != state.point.evaluation.predicted_h.shape:
         return True
     before, now = state.judged_h[:, 1:], state.point.evaluation.predicted_h[:, 1:]
     return float(np.linalg.norm(now - before)) > VIBRATION_RECHECK * float(np.linalg.norm(before))
-
-
-def _multipliers(work: WearingJoint, state: WearState, *, every: bool) -> Failure | None:
-    """Instability of a state by its Floquet multipliers, None if stable; every: as in `find_instability`."""
-    unstable = find_instability(work.case, work.at(state), state.point.evaluation, work.run, every)
-    return None if unstable is None else Failure(unstable.outcome, unstable.sentence)
 
 
 def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
@@ -171,10 +158,10 @@ def unstable_at_end(work: WearingJoint, state: WearState) -> Failure | None:
     # the determinant of a joint that is free to slide is zero, and its sign is round-off
     if free_slide(joint, at) is None and not work.is_stable(joint, at):
         return Failure(Outcome.UNSTABLE)
-    return _multipliers(work, state, every=True)
+    return find_instability(work.case, joint, at, work.run, True)
 
 
-def why_ended(work: WearingJoint, state: WearState, course: Course, share: float) -> Failure | None:
+def why_ended(work: WearingJoint, state: WearState, course: Course) -> Failure | None:
     """Why a history ends at a state: AS_ASKED, or NO_FINAL_STATE where wear has no end; None to go on."""
     reached = not math.isnan(course.reached)
     if reached or not state.wears or state.cycle >= course.end * (1.0 - 1e-12):
@@ -182,7 +169,7 @@ def why_ended(work: WearingJoint, state: WearState, course: Course, share: float
     if course.end < math.inf:
         return None
     # over where the rate of every pair is below a share of its largest one
-    largest = state.largest_rates[:-1]
+    share, largest = course.final_share, state.largest_rates[:-1]
     if (state.rates[:-1] <= share * np.maximum(largest, share * float(largest.max(initial=0.0)))).all():
         return AS_ASKED
     rate, n_steps = float(state.rates[-1]), len(course.ends) - 1

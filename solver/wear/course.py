@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.accuracy.certificate import NOT_CERTIFIED
+from solver.accuracy.certificate import NOT_CERTIFIED, Certificate
 from solver.model import FloatArray, IntArray, ReducedModel
 from solver.packing import packable
+from solver.results.history import WearHistory
 from solver.results.state_report import LOOP_PHASES, StateReport
 from solver.settings import Resolution, WearTarget
 
@@ -21,29 +22,12 @@ KEPT_STEPS = 800
 """Most stored steps of a history beside those with an output; half as many after the steps with the least progress are
 dropped. A result has 101 outputs by default, an adaptive history of 1e5 cycles about 100 steps."""
 
-INTERPOLATED = (
-    "mean_pressure",
-    "slip_range",
-    "open_fraction",
-    "response",
-    "response_mean",
-    "response_peak",
-    "excitation_frequency",
-    "excitation_frequency_error",
-    "loop_displacement",
-    "loop_force",
-)
+_REPORTED = {each.name for each in fields(WearHistory)} - {"wear_depth", "stable"}
+
+INTERPOLATED = tuple(each.name for each in fields(StateReport) if each.name in _REPORTED)
 """Reported values that are interpolated between the ends of a step."""
 
-CERTIFIED = (
-    "residual",
-    "penetration",
-    "tension",
-    "cone_violation",
-    "energy_error",
-    "response_error",
-    "wear_rate_error",
-)
+CERTIFIED = tuple(each.name for each in fields(Certificate) if each.name in _REPORTED)
 """Values of the certificate; within a step, the larger value of both ends holds."""
 
 BISECTIONS = 100
@@ -69,7 +53,7 @@ class DenseOutput:
 
     def at(self, counts: FloatArray) -> FloatArray:
         """Depths (n, k), m, at counts (n,); beyond the last step those at its end."""
-        start, end, fraction = self._steps_of(counts)
+        start, end, fraction = self.steps_of(counts)
         s, length = fraction[:, None], (self.counts[end] - self.counts[start])[:, None]
         grown = self.depth[end] - self.depth[start]
         if not self.smooth:
@@ -80,7 +64,7 @@ class DenseOutput:
 
     def interpolation(self, counts: FloatArray) -> Callable[[ArrayLike], Any]:
         """Function that reads values (n_node, ...) at counts (n,)."""
-        start, end, fraction = self._steps_of(counts)
+        start, end, fraction = self.steps_of(counts)
         if self.smooth:
             volumes = self.depth @ self.area
             grown = volumes[end] - volumes[start]
@@ -106,12 +90,8 @@ class DenseOutput:
             return float(low if above(0.0) >= 0.0 else high)
         return float(low + brentq(above, 0.0, 1.0, xtol=1e-12) * (high - low))
 
-    def ends_of(self, counts: FloatArray) -> tuple[IntArray, IntArray]:
-        """Nodes (n,) at the start and the end of the steps with counts (n,)."""
-        return self._steps_of(counts)[:2]
-
-    def _steps_of(self, counts: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
-        """As `ends_of`, and the fractions (n,) of these steps."""
+    def steps_of(self, counts: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+        """Nodes (n,) at the start and the end of the steps with counts (n,), and the fractions (n,) of these steps."""
         counts = np.minimum(counts, self.counts[-1])
         end = np.searchsorted(self.counts, counts, "left")
         start = np.maximum(end - 1, 0)
@@ -142,7 +122,7 @@ class Course:
 
     area (n_contact,): m2. smooth: of `DenseOutput`; adaptive steps are.
     counts (n_output,): ascending counts to be read, whose steps are stored; empty for counts not known beforehand.
-    target: wear whose count is sought; None for none.
+    target: wear whose count is sought; None for none. final_share: `ToTheEnd.final_share` of a history to the end.
     nodes: first state and ends of the steps, ascending, thinned where the steps are many.
     ends (n_steps + 1,): counts at the first state and at the ends of all steps.
     resolutions: cycle count from which on a resolution holds, and this resolution.
@@ -152,6 +132,7 @@ class Course:
     smooth: bool
     counts: FloatArray = field(default_factory=lambda: np.zeros(0))
     target: WearTarget | None = None
+    final_share: float = 0.0
     nodes: tuple[Node, ...] = ()
     ends: tuple[float, ...] = ()
     resolutions: tuple[tuple[float, Resolution], ...] = ()
@@ -180,8 +161,7 @@ class Course:
     def after(self, cycle: float, report: StateReport, rate: FloatArray, error: float) -> Course:
         """The course with another step.
 
-        cycle: count at its end. report: of its state. rate (n_contact,): m per cycle. error: local error of the step,
-        as worn volume, m3.
+        cycle: at its end. report: of its state. rate (n_contact,): m per cycle. error: local error of the step, m3.
         """
         nodes = (*self.nodes, Node(cycle, report, rate, error + (self.nodes[-1].local if self.nodes else 0.0)))
         resolutions = self.resolutions
@@ -206,13 +186,13 @@ class Course:
     def read(self, counts: FloatArray) -> dict[str, Any]:
         """Values at ascending counts (n,), by name; beyond the last step NaN, whole numbers 0.
 
-        - Names and shapes of `INTERPOLATED`, of `CERTIFIED`, `wear_depth`, `harmonics_used`, `samples_used` and
-          `stable` as in `WearHistory`.
+        - Names and shapes of `INTERPOLATED`, of `CERTIFIED`, `wear_depth`, `harmonics_used` and `samples_used` as in
+          `WearHistory`.
         - `wear_rate` (n,): m3 per cycle; `depth_rate` (n, n_contact): of each pair, m per cycle.
         - `local` (n,): sum of the local errors, m3.
         """
         dense, reports = self.dense, [node.report for node in self.nodes]
-        (start, end), between = dense.ends_of(counts), dense.interpolation(counts)
+        (start, end, _), between = dense.steps_of(counts), dense.interpolation(counts)
         found: dict[str, Any] = {"wear_depth": dense.at(counts)}
         found |= {name: between([getattr(report, name) for report in reports]) for name in INTERPOLATED}
         found["depth_rate"] = between(dense.rate)
@@ -225,16 +205,14 @@ class Course:
         at_end = [reports[place] for place in end]
         found["harmonics_used"] = np.array([report.resolution.highest for report in at_end])
         found["samples_used"] = np.array([report.resolution.samples for report in at_end])
-        found["stable"] = np.array([report.certificate.stable for report in at_end])
         for values in found.values():
             values[counts > dense.counts[-1]] = np.nan if values.dtype.kind in "fc" else 0
         return found
 
     def even_counts(self, n_outputs: int) -> FloatArray:
-        """Counts (n_outputs,) that divide the progress of the history evenly, up to its end or its target.
+        """Counts (n_outputs,) to the end or the target, evenly spaced in the shares of worn volume and cycles together.
 
-        The progress is the fraction of the worn volume plus that of the cycles: neither a burst of wear nor a long calm
-        phase is missed.
+        So neither a burst of wear nor a long calm phase is missed.
         """
         end = self.nodes[-1].cycle if math.isnan(self.reached) else self.reached
         whole = float(self.dense.at(np.array([end]))[0] @ self.area)

@@ -1,15 +1,13 @@
 """The integration of a wear history over the slow time, and of its reference solution, step by step.
 
 The reference solution is a second computation whose difference, pair by pair, is taken for the error. It starts from
-another sweep: a third of the nodes, placed between those of the fine sweep (`solver.loading_history`). It is coarser in
-all: its steps on the slow time have twice the tolerance, and it has the next lower harmonics (the next higher ones
-where the harmonics are few) with the samples that belong to them. Some events make an error grow: pairs stick again, a
-resonance passes, a branch ends. The difference to the reference solution grows as well, a sum of local errors does not.
+another sweep, with a third of the nodes (`solver.loading_history`), and is coarser in all: its steps have twice the
+tolerance, and it has the next lower harmonics and samples. Where pairs stick again, a resonance passes or a branch
+ends, errors grow. The difference to the reference solution grows as well, a sum of local errors does not.
 
-A history with given Euler steps has no reference solution of its own: it is compared with the adaptive history, whose
-errors are known, and which all given steps share. A coarser history with the same steps errs as they do: where a pair
-only just slips (dovetail, 16 pairs, 212.5 Hz) it sticks with implicit steps, 1.89 mm3, with steps of 250 cycles 1.90;
-the truth is 2.03.
+A history with given Euler steps is compared with the adaptive history, which all given steps share. A coarser history
+with the same steps errs as they do: where a pair only just slips (dovetail, 16 pairs, 212.5 Hz) it sticks with implicit
+steps, 1.89 mm3, with steps of 250 cycles 1.90; the truth is 2.03.
 """
 
 from __future__ import annotations
@@ -31,7 +29,7 @@ from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, describe_error
-from solver.packing import in_rows, packable
+from solver.packing import Packed, in_rows, pack, packable
 from solver.results.history import StartState
 from solver.settings import FIRST_HARMONICS, FollowedFrequency, Resolution, SolverSettings, ToTheEnd, WearTarget
 from solver.structure.joint import Case
@@ -42,14 +40,20 @@ from solver.wear.wearing_joint import WearingJoint, WearState
 
 T = TypeVar("T")
 
+Check = Callable[[WearingJoint, WearState], Checked | Failure]
+"""Gives a state with its report, or the reason of its rejection."""
+
+ENDS_ALL = (Outcome.TIME_LIMIT, Outcome.EXCEPTION)
+"""Ends of an integration that end the whole history, and after which no other solution is integrated."""
+
 RTOL_RATIO = 2.0
 """Ratio of the step tolerances of reference solution and adaptive history: BDF2 steps are then a quarter longer. With 4
 the steps of a reference solution are too long for pairs that stick again: dovetail, 16 pairs, 13 harmonics, 212.75 Hz:
 1.208 mm3 for 1.540, an error of 32 % where 0.4 % is true."""
 
 HISTORY_ITERATIONS = 3000
-"""Most Newton iterations of a history, in addition to `NEAR_ITERATIONS` for each step, and of its reference solution,
-in addition to those of the history. A travelling wave at its resonance: 1400 in a corner within 500 cycles."""
+"""Most Newton iterations of a history or a reference solution, in addition to `NEAR_ITERATIONS` for each step. A
+travelling wave at its resonance: 1400 in a corner within 500 cycles."""
 
 ITERATIONS_PER_SAVE = 100
 """Newton iterations after which a history is saved and its factorisation dropped, so that a resumed history is equal to
@@ -99,7 +103,7 @@ class SlowTime:
     def adaptive_to(self, reached: float, rtol: float) -> SlowTime:
         """The adaptive history with which one with given steps is compared, that has come to the count `reached`.
 
-        Equal for all histories with given steps to one last count; to another end it is no longer than needed.
+        Equal for all given steps to one last count; to another end it is no longer than needed.
         """
         known = self.end < math.inf and self.until is None
         never = None if self.until is None else replace(self.until, value=math.inf)
@@ -118,12 +122,11 @@ class Like:
     """What a reference solution takes from its history.
 
     resolutions: cycle count from which on a resolution holds, and this resolution; of a passage the frequency, Hz.
-    step_limit: largest stable explicit step, cycles. iterations: of Newton's method.
+    step_limit: largest stable explicit step, cycles.
     """
 
     resolutions: tuple[tuple[float, Resolution], ...]
     step_limit: float
-    iterations: int
 
 
 @packable
@@ -132,62 +135,55 @@ class Ended:
     """A finished integration.
 
     state: the last one; None where there is no first state. failure: reason of the end; CONVERGED for a regular end.
-    course: all steps. iterations: Newton iterations spent.
+    course: all steps. iterations, seconds: Newton iterations and CPU time.
     """
 
     state: WearState | None
     failure: Failure
     course: Course
     iterations: int
+    seconds: float
 
 
 @packable
 @dataclass(frozen=True)
-class Saved:
-    """The progress of a history and its reference solution, from which both go on.
+class Progress:
+    """How far the integrations from one start state are.
 
-    state, course, iterations: of the present integration.
-    fine: the finished history, while its reference solution is integrated; else None.
-    spent: CPU seconds so far.
+    done: those that are complete, by name. name: of the present one; state, course, iterations, seconds: its progress.
     """
 
-    state: WearState
-    course: Course
-    iterations: int
-    fine: Ended | None
-    spent: float
+    done: dict[str, Ended] = field(default_factory=dict)
+    name: str = ""
+    state: WearState | None = None
+    course: Course | None = None
+    iterations: int = 0
+    seconds: float = 0.0
 
 
-@dataclass
-class Integration:
-    """Integrates a history and, where its steps are adaptive, its reference solution, one after the other.
+class Integrations:
+    """Histories from one start state, which exists, and their reference solutions, each integrated once.
 
-    case, start, asked: as in `history.integrate_wear`; the start state exists.
-    keep: called from time to time with the progress; None for no calls.
-    saved: progress to go on from; None to begin.
-    began: CPU time, s, at which the computation would have begun without an interruption.
+    keep: called from time to time with the packed progress. progress: to go on from.
     """
 
-    case: Case
-    start: StartState
-    asked: SlowTime
-    keep: Callable[[Saved], None] | None = None
-    saved: Saved | None = None
-    began: float = field(init=False)
+    def __init__(
+        self,
+        case: Case,
+        start: StartState,
+        keep: Callable[[Packed], None] | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        self._case, self._start, self._keep, self._resumed = case, start, keep, progress or Progress()
+        self._done = dict(self._resumed.done)
 
-    def __post_init__(self) -> None:
-        self.began = computing_time() - (self.saved.spent if self.saved is not None else 0.0)
+    def history(self, asked: SlowTime, spent: float = 0.0, *, stable_end: bool = True) -> Ended:
+        """Integrate a history.
 
-    @property
-    def spent(self) -> float:
-        """CPU seconds so far, those before an interruption included."""
-        return computing_time() - self.began
-
-    def history(self, *, stable_end: bool = True) -> Ended:
-        """Integrate the history. stable_end: whether the stability of its last state is tested."""
-        if self.saved is not None and self.saved.fine is not None:
-            return self.saved.fine
-        asked, work, counts, share = self.asked, self._joint(), np.zeros(0), 0.0
+        spent: CPU seconds of its time limit that are gone. stable_end: whether the stability of its last state is
+        tested.
+        """
+        work, counts, share = self._joint(asked), np.zeros(0), 0.0
         if isinstance(asked.cycles, ToTheEnd):
             share = asked.cycles.final_share
         else:
@@ -195,71 +191,51 @@ class Integration:
         # adaptive steps go beyond the last count, where nothing else begins there
         line = WearLine(work, asked.steps, math.inf if asked.adaptive and not asked.ends_at_last else asked.end)
         check = partial(full_check, loops=asked.loops, with_resonance=asked.shifts)
-        course = Course(work.area, asked.adaptive, counts, asked.until)
-        ended = self._integrate(line, check, work.begin, course, HISTORY_ITERATIONS, share=share)
-        state = ended.state
-        if state is None or ended.failure.outcome is not Outcome.CONVERGED or not stable_end:
-            return ended
-        unstable = guarded(lambda: unstable_at_end(work, state))
-        return replace(ended, failure=unstable or ended.failure, iterations=work.run.budget.iterations)
+        course = Course(work.area, asked.adaptive, counts, asked.until, share)
+        return self._integrated(asked.name, line, check, work.begin, course, spent, stable_end=stable_end)
 
-    def reference(self, fine: Ended, counts: FloatArray) -> Ended:
-        """Integrate the reference solution of an adaptive history, read at counts (n,) and at the ends of its steps."""
-        assert fine.state is not None
-        like = Like(fine.course.resolutions, fine.state.step_limit, fine.iterations)
-        reached = min(fine.course.ends[-1], self.asked.end)
-        # NaN where no target was reached
-        compared = np.concatenate([[0.0, fine.course.reached], counts, fine.course.dense.counts])
-        return self.follow(like, np.unique(compared[compared <= reached]), fine)
-
-    def follow(self, like: Like, compared: FloatArray, fine: Ended | None = None) -> Ended:
+    def reference(self, asked: SlowTime, like: Like, compared: FloatArray, spent: float = 0.0) -> Ended:
         """Integrate the reference solution of an adaptive history of which the start state may be another one.
 
-        compared (n,): ascending counts at which it is read, the first 0.
-        fine: the history, to be saved with the progress.
+        compared (n,): ascending counts at which it is read, the first 0. spent: as for `history`.
         """
-        work, asked, end = self._joint(), self.asked, float(compared[-1])
-        resolutions = tuple((count, coarser(resolution, self.case.model)) for count, resolution in like.resolutions)
+        work, end = self._joint(asked), float(compared[-1])
+        resolutions = tuple((count, coarser(resolution, self._case.model)) for count, resolution in like.resolutions)
         # a short history may consist of its first steps, which do not depend on rtol
-        steps = Adaptive(RTOL_RATIO * self.case.settings.rtol, 2.0 if asked.ends_at_last else 1.0)
+        steps = Adaptive(RTOL_RATIO * self._case.settings.rtol, 2.0 if asked.ends_at_last else 1.0)
         line = WearLine(work, steps, end if asked.ends_at_last else math.inf)
         check = partial(report_only, resolutions=resolutions, with_resonance=asked.shifts)
         first = partial(begin_reference, work, like.step_limit)
         course = Course(work.area, smooth=True, counts=compared)
-        return self._integrate(line, check, first, course, like.iterations + HISTORY_ITERATIONS, fine)
+        return self._integrated(f"{asked.name} reference", line, check, first, course, spent)
 
-    def _joint(self) -> WearingJoint:
-        """The joint, with the rest of the time limit."""
-        asked = self.asked
-        work = WearingJoint(self.case, self.start, asked.wear_coefficient, asked.law, asked.follow)
-        work.run.budget.deadline = self.began + self.case.settings.time_limit
-        return work
+    def _joint(self, asked: SlowTime) -> WearingJoint:
+        return WearingJoint(self._case, self._start, asked.wear_coefficient, asked.law, asked.follow)
 
-    def _integrate(
+    def _integrated(
         self,
+        name: str,
         line: WearLine,
-        check: Callable[[WearingJoint, WearState], Checked | Failure],
+        check: Check,
         first: Callable[[], WearState],
         course: Course,
-        most: int,
-        fine: Ended | None = None,
-        share: float = 0.0,
+        spent: float,
+        *,
+        stable_end: bool = False,
     ) -> Ended:
-        """Integrate from the first or the saved state to the end.
-
-        check: gives a state with its report, or the reason of its rejection. first: gives the first state.
-        course: without steps. most: Newton iterations, in addition to `NEAR_ITERATIONS` for each step.
-        share: `ToTheEnd.final_share` of a history to the end of wear.
-        """
-        work, budget, state = line.work, line.work.run.budget, None
-        if self.saved is not None:
-            state, course, budget.iterations = self.saved.state, self.saved.course, self.saved.iterations
-            self.saved = None
-        saved_at = budget.iterations
+        """Integrate from the first or the saved state to the end. course: without steps."""
+        if name in self._done:
+            return self._done[name]
+        work, budget, saved, state = line.work, line.work.run.budget, self._resumed, None
+        began = computing_time()
+        if saved.name == name and saved.course is not None:
+            state, course, budget.iterations = saved.state, saved.course, saved.iterations
+            began -= saved.seconds
+        budget.deadline, saved_at = began + self._case.settings.time_limit - spent, budget.iterations
         while True:
             if state is not None:
-                ended = why_ended(work, state, course, share)
-                if ended is None and budget.iterations > most + NEAR_ITERATIONS * len(course.ends):
+                ended = why_ended(work, state, course)
+                if ended is None and budget.iterations > HISTORY_ITERATIONS + NEAR_ITERATIONS * len(course.ends):
                     ended = Failure(Outcome.MARCH_FAILED)
                 if ended is not None:
                     break
@@ -272,19 +248,25 @@ class Integration:
                 # done in every history, so that an interrupted one gives equal numbers
                 state, saved_at = in_rows(state), budget.iterations
                 work.drop_factor()
-                if self.keep is not None:
-                    self.keep(Saved(state, course, budget.iterations, fine, self.spent))
-        if state is not None and ended is AS_ASKED and state.cycle < course.end < math.inf and not state.wears:
-            # nothing wears any more: the state holds for all later counts
-            course = course.after(course.end, course.nodes[-1].report, course.nodes[-1].rate, 0.0)
-        return Ended(state, ended, course, budget.iterations)
+                if self._keep is not None:
+                    # what its time limit has ended is not complete
+                    done = {key: each for key, each in self._done.items() if each.failure.outcome not in ENDS_ALL}
+                    self._keep(pack(Progress(done, name, state, course, saved_at, computing_time() - began)))
+        if state is not None and ended is AS_ASKED:
+            if state.cycle < course.end < math.inf and not state.wears:
+                # nothing wears any more: the state holds for all later counts
+                course = course.after(course.end, course.nodes[-1].report, course.nodes[-1].rate, 0.0)
+            if stable_end:
+                ended = guarded(partial(unstable_at_end, work, state)) or ended
+        self._done[name] = Ended(state, ended, course, budget.iterations, computing_time() - began)
+        return self._done[name]
 
 
 def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
     """Harmonics and samples of the reference solution: those of the next lower level.
 
-    With one harmonic alone a joint that slips is another joint. So the reference solution of a history with three
-    harmonics or one has the next higher level, where the model has matrices for it.
+    With one harmonic alone a joint that slips is another joint: three harmonics or one become more, where the model has
+    matrices for them.
     """
     richer = shifted(resolution, 1)
     if resolution.highest <= FIRST_HARMONICS and model.holds(richer.highest):
@@ -296,10 +278,9 @@ def coarser(resolution: Resolution, model: ReducedModel) -> Resolution:
 def begin_reference(work: WearingJoint, step_limit: float) -> WearState:
     """The unworn state of the reference solution.
 
-    The state of the reference sweep differs from the start state in its tangential history. Even a small difference may
-    decide whether a pair goes on slipping while the joint wears. So the state is solved with twice the difference
-    (dovetail, 212.5 Hz: the worn volume is 0.082 or 0.106 mm3; both sweeps lead to 0.082, twice their difference to
-    0.097). Where this state is not found, the state of the reference sweep is taken.
+    The state of the reference sweep has another tangential history, which may decide whether a pair goes on slipping
+    while the joint wears. So the state is solved with twice the difference (dovetail, 212.5 Hz: 0.082 or 0.106 mm3;
+    both sweeps lead to 0.082, twice their difference to 0.097); where it is not found, that of the sweep is taken.
     """
     begun, fine, reference = work.begin(step_limit, of_reference=True), work.start.state, work.start.reference
     if fine is None or reference is None:
@@ -324,11 +305,7 @@ def guarded(compute: Callable[[], T]) -> T | Failure:
 
 
 def _next(
-    line: WearLine,
-    check: Callable[[WearingJoint, WearState], Checked | Failure],
-    first: Callable[[], WearState],
-    before: WearState | None,
-    course: Course,
+    line: WearLine, check: Check, first: Callable[[], WearState], before: WearState | None, course: Course
 ) -> tuple[WearState, Course] | Failure:
     """The first state, or that at the end of the next step, checked and stored; or why there is none."""
     work, error = line.work, 0.0

@@ -6,8 +6,8 @@ its mean position gets a soft hold in the direction without stiffness:
 Only friction holds a root along a prismatic slot. Where every pair slips at some time of the period, nothing determines
 the mean position along the slot: the Jacobian is singular. Pairs with unequal wear leave a small mean force g along the
 slot (dovetail, friction 0.3, 1 N: up to 2e-6 of the friction F). Strictly, the root creeps by about g / F of its slip
-path in a period, here 1e-12 m, and motion and wear change by g / F at most. So a soft spring holds the mean position
-from there on. Where g / F is no longer negligible there is no periodic state, and the outcome is ADRIFT.
+path in a period, and motion and wear change by g / F at most. So a soft spring holds the mean position from there on.
+Where g / F is no longer negligible there is no periodic state, and the outcome is ADRIFT.
 """
 
 from __future__ import annotations
@@ -50,11 +50,11 @@ def _held(work: WearingJoint, state: WearState, worn: FloatArray, *, drifts: boo
 
     drifts: whether the joint is known to slide as a whole, although some pairs still stick.
     """
-    at = state.point.evaluation
+    at, before = state.point.evaluation, state.depth
     hold = None if state.hold is not None else free_slide(work.at(state), at, drifts=drifts)
     if hold is None:
         return None
-    joint, before = work.case.held(hold).joint(state.omega, work.excitation_amplitude), state.depth
+    joint = work.case.held(hold).joint(state.omega, work.excitation_amplitude)
 
     def balance_at(fraction: float, _: FloatArray) -> Balance:
         return Balance(joint, state.point.history, before + fraction * (worn - before))
@@ -75,7 +75,7 @@ def _on_another_branch(work: WearingJoint, state: WearState, worn: FloatArray) -
     length along the frequency through the folds of the branch, nor a first state from rest.
     """
     joint, last = work.at(state), state.point
-    found = relax_to_periodic(work.case, joint, worn, last.evaluation, joint, last.history, work.run)
+    found = relax_to_periodic(work.case, joint, worn, last, joint, work.run)
     if isinstance(found, Outcome):
         return Failure(found if found is Outcome.ADRIFT else Outcome.MARCH_FAILED)
     # a small fold of the branch at a corner is no jump, and there may be many corners

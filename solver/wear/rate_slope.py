@@ -2,12 +2,6 @@
 
 The motion follows the depths as dp = -J^-1 Z E dW, where E puts the depths into the static normal displacements, and
 the rates follow the motion as dg = G dp. A table of factors adds its own derivative with respect to the depth.
-
-Explicit limit: the wear rate falls where wear takes load off a pair. An explicit Euler step, Eq. (20), multiplies a
-disturbance of W by 1 + h dg/dW. It grows where h exceeds 2 / mu, with mu the largest positive eigenvalue of -dg/dW.
-
-Largest meaningful step: a step is rejected where its wear would move many times all normal forces at once, those of
-the linear static structure with free tangents of pairs that slip.
 """
 
 from __future__ import annotations
@@ -21,8 +15,7 @@ from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.wear_law import WearingWork
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.model import BoolArray, FloatArray
-from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
-from solver.newton.linear_solver import FORCING
+from solver.newton.linear_solver import FORCING, SIGN_PRODUCTS, ritz_values
 from solver.newton.run import Run
 from solver.outcome import in_digits
 from solver.structure.joint import Joint
@@ -35,12 +28,10 @@ worn volume is a sufficient warning (27 % with 0.6)."""
 def rate_changes(
     joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, depths: FloatArray, run: Run
 ) -> FloatArray:
-    """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths.
+    """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths, m.
 
-    joint, at: the joint and its converged state, whose tangential history is given.
-    gain (n_contact,): growth of the depth over wearing work in one cycle, m/J.
-    wearing: part of the slip work that wears.
-    depths (k, n_contact): changes of the depths, m.
+    joint, at: the joint and its converged state. gain (n_contact,): growth of the depth over wearing work in one cycle,
+    m/J. wearing: part of the slip work that wears. depths (k, n_contact): the changes.
     run: solves with the Jacobian of the state, to the relative residual of a Newton direction.
     """
     balance = Balance(joint, at.history, at.wear_depth)
@@ -61,10 +52,7 @@ def rate_changes(
 def rate_slope(
     joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, pairs: BoolArray, run: Run
 ) -> FloatArray:
-    """Derivative dg/dW (n_contact, n_contact), 1 per cycle; column: pair whose depth changes.
-
-    pairs (n_contact,): those whose depths change; the columns of all others are 0. Others as in `rate_changes`.
-    """
+    """Derivative dg/dW (n_contact, n_contact), 1 per cycle, with one column a pair; those not in `pairs` are 0."""
     slope = np.zeros((pairs.size, pairs.size))
     slope[:, pairs] = rate_changes(joint, at, gain, wearing, np.eye(pairs.size)[pairs], run).T
     return slope
@@ -73,8 +61,10 @@ def rate_slope(
 def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing: WearingWork, run: Run) -> float:
     """Largest stable explicit step of Eq. (20) at a state, cycles; inf where the wear rate of no pair falls.
 
-    The eigenvalues come from Arnoldi's method. A complex one counts where its real part is larger than its imaginary
-    part. Arguments as in `rate_changes`; that the wearing work depends on the depth itself is neglected.
+    The wear rate falls where wear takes load off a pair. A step multiplies a disturbance of W by 1 + h dg/dW, which
+    grows where h exceeds 2 / mu, with mu the largest positive eigenvalue of -dg/dW, by Arnoldi's method. A complex one
+    counts where its real part is larger than its imaginary part. That the wearing work depends on the depth itself is
+    neglected.
     """
     wears, held = gain * wearing.work(*worn_by(at)) > 0.0, replace(wearing, depth_held=True)
 
@@ -95,10 +85,8 @@ def explicit_step_limit(joint: Joint, at: Evaluation, gain: FloatArray, wearing:
 def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, free_tangents: bool = True) -> float:
     """Change of the mean normal forces by wear to depths (n_contact,), m, relative to these forces, both as norms.
 
-    Pairs that are open throughout the period carry no force.
-
-    before: state at the start of the step.
-    free_tangents: whether the tangents of pairs that slip are free; if not, the result is a bound, which is cheaper.
+    Of the linear static structure; pairs that are open throughout the period carry no force. before: state at the start
+    of the step. free_tangents: whether the tangents of pairs that slip are free; if not, a bound, which is cheaper.
     """
     pair, component = joint.component_index // 3, joint.component_index % 3
     stuck = (before.status_t == STICK).all(axis=1)
@@ -118,8 +106,7 @@ def moved_fraction(joint: Joint, before: Evaluation, wear_depth: FloatArray, *, 
 def too_long(joint: Joint, before: Evaluation, wear_depth: FloatArray, cycle: float, length: float) -> str | None:
     """Why a step or a jump is rejected because of its wear, and which length would be accepted; None if it is not.
 
-    joint, before: the joint and its state at the start. wear_depth (n_contact,): at the end, m.
-    cycle, length: count at the start, and length, cycles.
+    joint, before: at the start. wear_depth (n_contact,): at the end, m. cycle, length: count at the start, and cycles.
     """
     if moved_fraction(joint, before, wear_depth, free_tangents=False) <= LARGEST_MOVED_LOAD:
         return None

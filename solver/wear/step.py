@@ -6,24 +6,21 @@
 
     W_(n+1) = W_n + w^2 / (1 + 2 w) (W_n - W_(n-1)) + (1 + w) / (1 + 2 w) h_n g(W_(n+1)),
 
-  an implicit Euler step from a depth that is already worn and with a shorter h. It is L-stable for equal steps and
-  zero-stable for w < 1 + sqrt(2); both factors are positive, so that wear never falls. The local error follows from the
-  difference to an explicit formula of the same order (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations
-  I, III.5; Gresho, Lee, Sani 1980):
+  an implicit Euler step from a depth that is already worn and with a shorter h. It is zero-stable for w < 1 + sqrt(2);
+  both factors are positive, so that wear never falls. The local error follows from the difference to an explicit
+  formula of the same order (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, III.5):
 
     P = W_n + (1 + w) h_n g_n - w^2 (W_n - W_(n-1)),      e = c / (c + c_P) (W_(n+1) - P),
     c = (1 + w)^2 / (6 w (1 + 2 w)),      c_P = (1 + 1 / w) / 6.
 
-  The first step, and the first step behind a jump, is an implicit Euler step. The error of an Euler step is its
-  difference to the trapezoidal rule.
+  The first step, also behind a jump, is an implicit Euler step. Its error is the difference to the trapezoidal rule.
 
-Friction on the slow time scale: the wear of other pairs changes the force of a pair, which slides a little in each
-cycle at its friction limit, to a place that depends on the way. A balance alone takes one slide for the whole way, an
-error of first order in the step that the local error does not show (dovetail, 16 pairs, 212.6 Hz, `rtol` 1e-2: 1.8 %
-of the worn volume, with the way in parts 0.4 %). So the law is applied at parts of a straight line from the predicted
-force towards the extrapolated one, at each until the period repeats. The last part is left to the balance: with the
-whole line, pairs may keep the history of a way that the joint did not go (48 pairs, 211.5 Hz: 1.667 mm3, another
-branch, for 2.284 mm3; 2.261 by time integration).
+The wear of other pairs changes the force of a pair, which slides a little in each cycle at its friction limit, to a
+place that depends on the way. A balance alone takes one slide for the whole way, an error of first order in the step
+(dovetail, 16 pairs, 212.6 Hz, `rtol` 1e-2: 1.8 % of the worn volume, with the way in parts 0.4 %). So the law is
+applied at parts of a straight line from the predicted force towards the extrapolated one, at each until the period
+repeats. The last part is left to the balance: with the whole line, pairs may keep the history of a way that the joint
+did not go (48 pairs, 211.5 Hz: 1.667 mm3, another branch, for 2.284 mm3; 2.261 by time integration).
 
 Where the shortest step is not found, `WearLine.rescue` tries in this order, each once: an implicit Euler step, a longer
 step across corners of the branch (both in adaptive histories only), and a jump to a state behind the end of the branch.
@@ -39,12 +36,11 @@ import numpy as np
 
 from solver.contact.coulomb import STICK
 from solver.contact.law import Marched
-from solver.continuation.natural import SMOOTH_CHANGE
+from solver.continuation.natural import SMOOTH_CHANGE, Lengths, take_step
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure, vibration_change
-from solver.march.steps import Lengths, take_step
 from solver.model import FloatArray
-from solver.newton.iteration import SHORTEST_STEP
+from solver.newton.run import SHORTEST_STEP
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF, Scheme
 from solver.structure.joint import Joint
@@ -272,10 +268,7 @@ def predicted(work: WearingJoint, state: WearState, balance: Balance, length: fl
 
 
 def history_along(joint: Joint, state: WearState, ahead: Marched) -> FloatArray:
-    """Tangential history (n_contact, 2), m, for the balance at the end of a step.
-
-    state: at the start of the step. ahead: at its end, extrapolated, from the history that `state` leaves.
-    """
+    """Tangential history (n_contact, 2), m, for the balance at the end of a step; ahead: this end, extrapolated."""
     before = state.point.evaluation
     # a pair that sticks with one history at both ends sticks everywhere between: its force lies on a straight line
     sticks = (before.status_t == STICK).all(axis=1) & (ahead.status_t == STICK).all(axis=1) & (ahead.periods == 1)
@@ -292,12 +285,10 @@ def euler_step(work: WearingJoint, state: WearState, length: float, scheme: Sche
 
 
 def step_across(work: WearingJoint, state: WearState, shortest: float, end: float) -> Step | None:
-    """A step that is longer than the shortest one, across corners of the branch; None where it is not found.
+    """A step longer than the shortest one (cycles), across corners of the branch; None where it is not found.
 
     Where the last pairs that stick come loose one by one, the branch has a corner with a small fold at each pair.
     Between them no step ends, however short, while Newton's method finds the state behind all of them.
-
-    shortest: length of the step whose end is not found, cycles. end: cycle count beyond which no step goes.
     """
     # a search without success leaves no trace: where a joint begins to slide, round-off decides what is found next
     kept = work.run

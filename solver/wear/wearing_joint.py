@@ -12,20 +12,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from solver.accuracy.error_estimate import NOTHING, Estimate
-from solver.accuracy.period_events import left_out
+from solver.accuracy.harmonic_levels import left_out
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, final_history
 from solver.model import FloatArray
-from solver.newton.iteration import MOST_ITERATIONS
-from solver.newton.run import Run
+from solver.newton.run import MOST_ITERATIONS, Run
 from solver.outcome import Outcome, in_digits
 from solver.packing import packable
 from solver.results.history import StartState
 from solver.settings import FollowedFrequency, Resolution
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.joint import Case, Hold, Joint
 from solver.wear.rate_slope import explicit_step_limit
 
@@ -181,10 +180,7 @@ class WearingJoint:
         return cycles * self.wear_coefficient / self.area
 
     def begin(self, step_limit: float = math.nan, *, of_reference: bool = False) -> WearState:
-        """The unworn state, or that of the reference sweep where there is one. It is evaluated, not solved again.
-
-        step_limit: largest stable explicit step, cycles; NaN if unknown.
-        """
+        """The unworn state, or that of the reference sweep where there is one, evaluated and not solved again."""
         start = self.start
         state = start.reference if of_reference and start.reference is not None else start.state
         assert state is not None
@@ -275,8 +271,8 @@ class WearingJoint:
     def frequency_error(self, state: WearState) -> float:
         """Error of a followed frequency, Hz, by the relative error of the response; 0 for a given one.
 
-        The phase of the vibration, and so the phase lag, is wrong by as much as the amplitude. The amplitude is flat at
-        its maximum: every amplitude that is less than the largest one by its error may be the largest one.
+        The phase lag is wrong by as much as the amplitude. Every amplitude that is less than the largest one by its
+        error may be the largest one.
         """
         if self.follow is None:
             return 0.0

@@ -1,8 +1,12 @@
-"""Finished tasks of a plan, and results of earlier runs: the link between tasks and the file of a run."""
+"""Finished tasks of a plan, and results of earlier runs: the link between tasks and the file of a run.
+
+The record of a result is one element of an array of numpy with all values of the result.
+"""
 
 from __future__ import annotations
 
-import itertools
+import functools
+import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
@@ -11,16 +15,57 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.records import empty_record, record_of
 from studyrunner.checkpoint.store import PROGRESS, RESULTS, STARTS, Store
-from studyrunner.kinds.task import Identity, Result, StartResult, Task, TaskPlan, digest, unpack_start
-
-MOST_OF_OTHERS = 2.0**30
-"""Largest size, bytes, of results of other studies that are kept under the same name."""
+from studyrunner.kinds.kind import kind_of
+from studyrunner.kinds.task import Identity, PointResult, Result, StartResult, Task, TaskPlan, digest, unpack_start
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.study.study import Study
+from studyrunner.variables import COUNTS, LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 MOST_CRASHES = 3
 """A task is given up after so many runs in a row that were killed or crashed before the task had given anything. Such
 tasks are tried one after the other, so that another task is seldom to blame."""
+
+
+def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
+    """Lengths of the dimensions after the axes."""
+    return {
+        **study.sizes,
+        "contact": len(facts.area),
+        "response": len(facts.response_names),
+        **({"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}),
+    }
+
+
+def record_type(study: Study, facts: SceneFacts) -> np.dtype[np.void]:
+    """Data type of the record of a point: all values of a result."""
+    sizes = variable_sizes(study, facts)
+    fields: list[tuple[str, str, tuple[int, ...]]] = [(name, entry.dtype, ()) for name, entry in study.kept.items()]
+    for name in kind_of(study).variables(study):
+        # of all pairs, only those asked for have a loop
+        lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes
+        entry = {**study.variables, **LOOPS, **COUNTS}[name]
+        fields.append((name, entry.dtype, tuple(lengths[dimension] for dimension in entry.dimensions)))
+    return np.dtype(fields)
+
+
+@functools.lru_cache(maxsize=1)
+def _empty_record(kind: np.dtype[np.void]) -> bytes:
+    """Record of a point without result: NaN, or 0 in whole numbers. Bytes: numpy copies a record field by field."""
+    records = np.zeros(1, dtype=kind)
+    for name in kind.names or ():
+        if kind[name].base.kind == "f":
+            records[name] = math.nan
+    return records.tobytes()
+
+
+def _record_of(kind: np.dtype[np.void], result: PointResult) -> NDArray[np.uint8]:
+    """Bytes of the record of a point. Pairs that its scene does not have are NaN, or 0 in whole numbers."""
+    records = np.frombuffer(bytearray(_empty_record(kind)), kind)
+    for name, values in result.values.items():
+        own = tuple(slice(size) for size in np.shape(values))
+        records[name][0:1][(slice(None), *own)] = values
+    return records.view(np.uint8)
 
 
 class CompletionIndex:
@@ -61,20 +106,16 @@ class CompletionIndex:
 
         Raises StorageError where the disk fails.
         """
-        # one after the other into their places: a slab of results is in memory once
-        size, first = self.kind.itemsize, dict[str, int]()
-        contents, there = bytearray(len(names) * size), np.zeros(len(names), np.bool_)
-        # the data type of a record is part of its name
-        empty = empty_record(self.kind).tobytes()
+        contents = np.frombuffer(bytearray(_empty_record(self.kind) * len(names)), np.uint8).reshape(len(names), -1)
+        there, first = np.zeros(len(names), np.bool_), dict[str, int]()
         for place, name in enumerate(names):
             before = first.setdefault(name, place)
+            # the data type of a record is part of its name
             if before < place:
-                there[place], content = there[before], bytes(contents[before * size : (before + 1) * size])
-            else:
-                found = self.store.read(RESULTS, name)
-                there[place], content = found is not None, empty if found is None else found.arrays[0].tobytes()
-            contents[place * size : (place + 1) * size] = content
-        return np.frombuffer(contents, self.kind), there
+                contents[place], there[place] = contents[before], there[before]
+            elif (found := self.store.read(RESULTS, name)) is not None:
+                contents[place], there[place] = found.arrays[0], True
+        return contents.reshape(-1).view(self.kind), there
 
     @property
     def n_points_finished(self) -> int:
@@ -117,16 +158,18 @@ class CompletionIndex:
                     yield sweep, unpack_start(place, start)
 
     def add(self, task: Task, result: Result) -> None:
-        """Adds a result."""
+        """Adds a result. What progress there was is forgotten with the last one, but for a history without time."""
         name = self._names[task.key][result.place]
+        progress = None
         if isinstance(result, StartResult):
             self.store.put(STARTS, name, result.pack())
         else:
-            self.store.put(RESULTS, name, Packed("", (record_of(self.kind, result).view(np.uint8),)))
-            if result.progress is not None:
-                self.keep(task, result.progress)
-            elif self.is_finished(task):
-                self.store.forget(PROGRESS, task.key)
+            self.store.put(RESULTS, name, Packed("", (_record_of(self.kind, result),)))
+            progress = result.progress
+        if progress is not None:
+            self.keep(task, progress)
+        elif self.is_finished(task):
+            self.store.forget(PROGRESS, task.key)
         self.store.note_life(task.key)
 
     def keep(self, task: Task, progress: object) -> None:
@@ -188,15 +231,6 @@ class CompletionIndex:
             self.store.forget(PROGRESS, key)
             self.store.note_life(key)
         self.store.flush()
-
-    def prune(self, most: float = MOST_OF_OTHERS) -> None:
-        """Removes what a finished study does not need, and results of others until they take at most so many bytes."""
-        for sweep in self.plan.sweeps:
-            # a history that was given up for its time goes on from its progress
-            if self.is_finished(sweep):
-                self.store.forget(PROGRESS, sweep.key)
-        names = frozenset(itertools.chain.from_iterable(self._names.values()))
-        self.store.prune({RESULTS: names, STARTS: names, PROGRESS: self._names.keys()}, most)
 
     def _needed(self, sweep: Task) -> frozenset[int]:
         """Places of a sweep from which a task is still to begin."""

@@ -15,7 +15,7 @@ import socket
 import sqlite3
 import time
 import zlib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.packing import Packed
-from studyrunner.system.endings import uninterrupted
 from studyrunner.system.files import sync_folder
+from studyrunner.system.process import uninterrupted
 from studyrunner.user_error import StorageError
 
 STARTS, PROGRESS, RESULTS, COMPUTED = "start", "progress", "result", "computed"
@@ -45,17 +45,14 @@ _SECONDS_TO_DIE = 5.0  # after which all ranks of a run that was killed have not
 _PAUSE = 0.1
 _RUN = "run"  # kind of the only entry about the file itself
 _SCHEMA = "CREATE TABLE entries (kind TEXT NOT NULL, key TEXT NOT NULL, blob BLOB NOT NULL, PRIMARY KEY (kind, key))"
-_APPLICATION = int.from_bytes(b"wear", "big")
-_VERSION = 4
+_MARKS = {"application_id": int.from_bytes(b"wear", "big"), "user_version": 4}
 _PRAGMAS = ("trusted_schema=OFF", "temp_store=MEMORY", "locking_mode=EXCLUSIVE", "synchronous=FULL")
 _DAMAGES = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_FORMAT)
 _FAULTS = {
     sqlite3.SQLITE_FULL: errno.ENOSPC,
     sqlite3.SQLITE_IOERR: errno.EIO,
     sqlite3.SQLITE_READONLY: errno.EACCES,
-    sqlite3.SQLITE_PERM: errno.EACCES,
     sqlite3.SQLITE_CANTOPEN: errno.EACCES,
-    sqlite3.SQLITE_NOMEM: errno.ENOMEM,
 }
 
 
@@ -64,7 +61,7 @@ class StoreInUseError(Exception):
 
 
 class _OtherFileError(Exception):
-    """The file is none of this version, or is damaged; the text says which."""
+    """The file is damaged, or is none of this version."""
 
 
 def to_blob(packed: Packed) -> bytes:
@@ -107,16 +104,16 @@ class Store:
         self.notes: list[str] = []
         self._waiting: dict[tuple[str, str], bytes | None] = {}
         self._n_bytes = 0  # that wait
-        self._used: set[str] = set()
         self._next_write = 0.0
-        with _faults_told(path):
+        with _storage_errors(path):
             try:
                 self._database = _open_locked(path)
-            except _OtherFileError as error:
+            except _OtherFileError:
                 aside = path.with_name(f"{path.name}.old")
                 path.rename(aside)
                 path.with_name(f"{path.name}-journal").unlink(missing_ok=True)
-                self.notes.append(f"{path.name} {error}: it is kept as {aside.name}, and the study begins anew")
+                why = "is damaged or of another version of this program"
+                self.notes.append(f"{path.name} {why}: it is kept as {aside.name}, and the study begins anew")
                 self._database = _open_locked(path)
             self._file = path.stat().st_ino
             self._keys: dict[str, set[str]] = {kind: set() for kind in (STARTS, PROGRESS, RESULTS, COMPUTED, _RUN)}
@@ -127,14 +124,14 @@ class Store:
         self.crashes: dict[str, int] = dict(before.get("crashes", {}))
         for key in before.get("under_way", ()) if self.ended_hard else ():
             self.crashes[key] = self.crashes.get(key, 0) + 1
-        self._study: dict[str, str] = {name: before[name] for name in ("name", "scene") if name in before}
+        self._study: str | None = before.get("study")
         self._under_way: set[str] = set()
         self._is_open, self._is_noted = True, False
         self.flush()
 
-    def note_study(self, name: str, scene: str) -> None:
-        """Writes which study the file belongs to."""
-        self._study = {"name": name, "scene": scene}
+    def note_study(self, study: str) -> None:
+        """Writes which study the file belongs to, in words."""
+        self._study = study
         self._is_noted = False
         self.flush()
 
@@ -168,12 +165,8 @@ class Store:
         if self._n_bytes > _BYTES_A_TRANSACTION:
             self.flush()
 
-    def has(self, kind: str, key: str) -> bool:
-        """Whether there is an entry, on the disk or on its way."""
-        return key in self._keys[kind]
-
     def keys(self, kind: str) -> Collection[str]:
-        """Keys of all entries of a kind."""
+        """Keys of all entries of a kind, on the disk or on their way."""
         return self._keys[kind]
 
     def read(self, kind: str, key: str) -> Packed | None:
@@ -182,7 +175,7 @@ class Store:
             return None
         blob = self._waiting.get((kind, key))
         if blob is None:
-            with _faults_told(self.path):
+            with _storage_errors(self.path):
                 query = "SELECT blob FROM entries WHERE kind=? AND key=?"
                 (blob,) = self._database.execute(query, [kind, key]).fetchone() or (b"",)
         with contextlib.suppress(zlib.error, ValueError, TypeError):
@@ -192,12 +185,10 @@ class Store:
 
     def keep_computed(self, key: str, value: Packed) -> None:
         """Keeps what is computed once for a study. key: hash of its inputs."""
-        self._used.add(key)
         self.put(COMPUTED, key, value)
 
     def read_computed(self, key: str) -> Packed | None:
         """What `keep_computed` has kept, in this run or an earlier one; None where there is nothing."""
-        self._used.add(key)
         return self.read(COMPUTED, key)
 
     def forget(self, kind: str, key: str) -> None:
@@ -205,24 +196,6 @@ class Store:
         if key in self._keys[kind]:
             self._keys[kind].discard(key)
             self._waiting[kind, key] = None
-
-    def prune(self, used: Mapping[str, Collection[str]], most: float) -> None:
-        """Removes the oldest entries without a name in `used` until these have at most `most` bytes together.
-
-        used: keys by kind. What was kept or read by `read_computed` in this run is used as well.
-        """
-        self.flush()
-        named = {_RUN: frozenset({""}), COMPUTED: self._used, **used}
-        with _faults_told(self.path):
-            rows = self._database.execute("SELECT kind, key, length(blob) FROM entries ORDER BY rowid").fetchall()
-        idle = [(kind, key, size) for kind, key, size in rows if key not in named.get(kind, ())]
-        too_much = sum(size for *_, size in idle) - most
-        for kind, key, size in idle:
-            if too_much <= 0.0:
-                break
-            too_much -= size
-            self.forget(kind, key)
-        self.flush()
 
     def tick(self) -> None:
         """Called many times a second: writes what waits, when it has waited long enough. Raises StorageError."""
@@ -236,7 +209,7 @@ class Store:
         if not self._is_noted:
             self._waiting[_RUN, ""] = self._describe_run()
         began = time.monotonic()
-        with uninterrupted(), _faults_told(self.path):
+        with uninterrupted(), _storage_errors(self.path):
             if self.path.stat().st_ino != self._file:
                 raise FileNotFoundError(None, "another file has taken its place")
             with self._database as database:
@@ -264,7 +237,7 @@ class Store:
 
     def _describe_run(self) -> bytes:
         run = {
-            **self._study,
+            "study": self._study,
             "run": f"process {os.getpid()} on {socket.gethostname()}",
             "open": self._is_open,
             "under_way": sorted(self._under_way),
@@ -273,10 +246,10 @@ class Store:
         return json.dumps(run).encode()
 
 
-def read_study(path: Path) -> tuple[str, str] | None:
-    """Name and scene of the study that a file belongs to, without its lock; None where the file does not say so."""
-    found = _read_run(path)
-    return (str(found["name"]), str(found["scene"])) if "name" in found and "scene" in found else None
+def read_study(path: Path) -> str | None:
+    """The study that a file belongs to, without its lock; None where the file does not say so."""
+    found = _read_run(path).get("study")
+    return found if isinstance(found, str) else None
 
 
 def _read_run(path: Path) -> dict[str, Any]:
@@ -312,7 +285,7 @@ def _open_locked(path: Path) -> sqlite3.Connection:
             if not isinstance(error, sqlite3.Error):
                 raise
             if _code(error) in _DAMAGES:
-                raise _OtherFileError("is damaged") from error
+                raise _OtherFileError from error
             if _code(error) != sqlite3.SQLITE_BUSY:
                 raise
         else:
@@ -325,23 +298,18 @@ def _open_locked(path: Path) -> sqlite3.Connection:
 
 def _check(database: sqlite3.Connection) -> None:
     """Checks the table of a file; creates it in an empty file. Raises _OtherFileError and sqlite3.Error."""
-    found = [sql for (sql,) in database.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL")]
-    (version,) = database.execute("PRAGMA user_version").fetchone()
-    (application,) = database.execute("PRAGMA application_id").fetchone()
-    if not found and (version, application) == (0, 0):
+    schema = [sql for (sql,) in database.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL")]
+    marks = {name: database.execute(f"PRAGMA {name}").fetchone()[0] for name in _MARKS}
+    if not schema and not any(marks.values()):
         database.execute(_SCHEMA)
-        database.execute(f"PRAGMA application_id={_APPLICATION}")
-        database.execute(f"PRAGMA user_version={_VERSION}")
-    elif application == _APPLICATION and version != _VERSION:
-        raise _OtherFileError("is of another version of this program")
-    elif found != [_SCHEMA] or application != _APPLICATION:
-        raise _OtherFileError("is no file of a run")
-    elif database.execute("PRAGMA quick_check(1)").fetchall() != [("ok",)]:
-        raise _OtherFileError("is damaged")
+        for name, value in _MARKS.items():
+            database.execute(f"PRAGMA {name}={value}")
+    elif (schema, marks) != ([_SCHEMA], _MARKS) or database.execute("PRAGMA quick_check(1)").fetchall() != [("ok",)]:
+        raise _OtherFileError
 
 
 @contextlib.contextmanager
-def _faults_told(path: Path) -> Iterator[None]:
+def _storage_errors(path: Path) -> Iterator[None]:
     """Raises StorageError where the disk, or what is on it, is at fault."""
     try:
         yield
@@ -350,9 +318,8 @@ def _faults_told(path: Path) -> Iterator[None]:
             remedy = "the next run keeps it aside and begins anew"
             raise StorageError(path, ValueError("is damaged"), remedy) from error
         number = _FAULTS.get(_code(error))
-        raise StorageError(
-            path, ValueError(error) if number is None else OSError(number, os.strerror(number))
-        ) from error
+        fault = ValueError(error) if number is None else OSError(number, os.strerror(number))
+        raise StorageError(path, fault) from error
     except OSError as error:
         raise StorageError(path, error) from error
 

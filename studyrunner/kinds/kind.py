@@ -8,8 +8,7 @@ from typing import Any, Protocol
 from studyrunner.kinds import missions, modes, wear_plan
 from studyrunner.kinds.task import Task, TaskPlan
 from studyrunner.scene.scene_set import SceneSet, find_scenes
-from studyrunner.study.kinds import MISSIONS, MODES
-from studyrunner.study.study import Study
+from studyrunner.study.study import MISSIONS, MODES, Study
 
 
 class Kind(Protocol):

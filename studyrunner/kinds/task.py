@@ -26,8 +26,7 @@ from studyrunner.mpi.cost_model import CostKeys
 from studyrunner.scene.pairs import ContactChange
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
-from studyrunner.system.machine_faults import MachineFaultError, tells_of_machine
-from studyrunner.system.source_digest import package_digest
+from studyrunner.system.machine import MachineFaultError, package_digest, tells_of_machine
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel

@@ -28,8 +28,6 @@ MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
 one of them: with 4 a fifth more than with all, and another rank may take the rest."""
 
-_FOR_THE_TABLE = (*CERTIFICATE, "stable")  # at the end of a run, whatever the result file holds
-
 TIME = "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long"
 
 
@@ -51,7 +49,7 @@ class _Start(NamedTuple):
 
 def variables(study: Study) -> tuple[str, ...]:
     """Variables of a history: those asked for and those that the table at the end is made of."""
-    asked = (name for name in ASKED if name in study.outputs.variables or name in _FOR_THE_TABLE)
+    asked = (name for name in ASKED if name in study.outputs.variables or name in CERTIFICATE)
     return (*asked, *(LOOPS if study.outputs.loops else ()), *(COUNTS if study.to_the_end else ()))
 
 

@@ -7,21 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 
 CostKeys = Sequence[tuple[Hashable, ...]]
 """Groups of similar tasks that a task belongs to: sequences of keys, each from a general group to a special one."""
 
+Measurement = Sequence[tuple[Hashable, float, float]]
+"""What is learnt from one task: keys of groups, each with the measured and the expected time, s. The expected time of a
+key contains the corrections of all other sequences of keys."""
 
-@dataclass(frozen=True)
-class Measurement:
-    """What the cost model has learnt from one task.
-
-    entries: key of a group, measured time and expected time in seconds. The expected time of an entry contains the
-    corrections of all other sequences of keys.
-    """
-
-    entries: tuple[tuple[Hashable, float, float], ...]
+_LEAST = 1e-6
 
 
 class CostModel:
@@ -41,17 +35,15 @@ class CostModel:
         """Adds the times of a task, s; the estimated time is positive."""
         factors = [self._factor(keys) for keys in cost_keys]
         expected = estimated * math.prod(factors)
-        entries = tuple(
-            (key, measured, expected / factor) for keys, factor in zip(cost_keys, factors, strict=True) for key in keys
-        )
-        for entry in entries:
-            self._add(*entry, 1)
-        return Measurement(entries)
+        found = [
+            (key, measured, expected / each) for keys, each in zip(cost_keys, factors, strict=True) for key in keys
+        ]
+        self._add(found, 1)
+        return found
 
     def forget(self, measurement: Measurement) -> None:
         """Takes back a measurement."""
-        for key, measured, expected in measurement.entries:
-            self._add(key, -measured, -expected, -1)
+        self._add(measurement, -1)
 
     def correction(self, cost_keys: CostKeys) -> float:
         """Factor by which an estimated time is multiplied, positive."""
@@ -62,22 +54,18 @@ class CostModel:
         return self._sums.get(key, (0.0, 0.0, 0))[0]
 
     def _factor(self, keys: tuple[Hashable, ...]) -> float:
-        known = self._factors.get(keys)
-        if known is not None:
-            return known
-        found = 1.0
-        for key in keys:
-            measured, expected, n = self._sums.get(key, (0.0, 0.0, 0))
-            if n > 0:
-                mean = expected / n
-                found = (measured + found * mean) / (expected + mean)
-        self._factors[keys] = found = max(found, _LEAST)
-        return found
+        if keys not in self._factors:
+            found = 1.0
+            for key in keys:
+                measured, expected, n = self._sums.get(key, (0.0, 0.0, 0))
+                if n > 0:
+                    mean = expected / n
+                    found = (measured + found * mean) / (expected + mean)
+            self._factors[keys] = max(found, _LEAST)
+        return self._factors[keys]
 
-    def _add(self, key: Hashable, measured: float, expected: float, n: int) -> None:
+    def _add(self, measurement: Measurement, sign: int) -> None:
         self._factors.clear()
-        before = self._sums.get(key, (0.0, 0.0, 0))
-        self._sums[key] = (before[0] + measured, before[1] + expected, before[2] + n)
-
-
-_LEAST = 1e-6
+        for key, measured, expected in measurement:
+            before = self._sums.get(key, (0.0, 0.0, 0))
+            self._sums[key] = (before[0] + sign * measured, before[1] + sign * expected, before[2] + sign)

@@ -1,8 +1,5 @@
-"""Decides which rank gets which task. This module sends no messages, does not know what a task is, and is given its
-clock.
-
-The server on real ranks and a simulation with thousands of ranks make the same decisions. No decision looks at all
-ranks.
+"""Decides which rank gets which task. This module sends no messages and is given its clock: the server on real ranks
+and a simulation with thousands of ranks make the same decisions.
 
 By hand: the pools of mpi4py and schwimmbad know no expected run times and leave rank 0 idle (speed-up 0.92 of 2 ranks,
 here 1.97).
@@ -13,9 +10,18 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any
 
 from studyrunner.mpi.cost_model import CostKeys, CostModel, Measurement
+
+Task = Any
+"""What is done as a whole by one rank. It has
+
+- cost: estimated time, s, positive; cost_of(first=...): that of the first result, or of one of the others;
+- cost_keys: groups of similar tasks, see `CostModel`;
+- n_results: that the task gives one after the other, at least 1;
+- gives_starts: whether other tasks wait for the results.
+"""
 
 AHEAD_SECONDS = 0.2
 """A rank gets a second task in advance behind a task that takes less than this time, s."""
@@ -32,34 +38,8 @@ _FEW_MEASURED = 16
 _MEASURED_SHARE = 8
 
 
-class Work(Protocol):
-    """What the dispatcher needs to know of a task.
-
-    cost: estimated time, s, positive; cost_of: that of the first result, or of one of the others. cost_keys: groups of
-    similar tasks, see `CostModel`. n_results: that the task gives one after the other, at least 1.
-    gives_starts: whether other tasks wait for the results.
-    """
-
-    @property
-    def cost(self) -> float: ...  # noqa: D102
-
-    def cost_of(self, *, first: bool) -> float: ...  # noqa: D102
-
-    @property
-    def cost_keys(self) -> CostKeys: ...  # noqa: D102
-
-    @property
-    def n_results(self) -> int: ...  # noqa: D102
-
-    @property
-    def gives_starts(self) -> bool: ...  # noqa: D102
-
-
-Task = TypeVar("Task", bound=Work)
-
-
 @dataclass(frozen=True)
-class Assignment(Generic[Task]):
+class Assignment:
     """A task on its way to a rank."""
 
     number: int
@@ -67,20 +47,19 @@ class Assignment(Generic[Task]):
 
 
 @dataclass
-class _Running(Generic[Task]):
-    """A task that a rank has.
+class _Running:
+    """A task that a rank has: results still to come, and when it was begun, None where it waits behind another one.
 
-    n_left: number of results that are still to come. began: when the rank began the task, None where the task waits.
     measurement: what the cost model has learnt from a task that takes longer than expected.
     """
 
     task: Task
     n_left: int
     began: float | None
-    measurement: Measurement | None = None
+    measurement: Measurement = ()
 
 
-class _Waiting(Generic[Task]):
+class _Waiting:
     """Waiting tasks; the one with the longest expected time comes first, of equal ones the earliest."""
 
     def __init__(self, costs: CostModel) -> None:
@@ -110,8 +89,8 @@ class _Waiting(Generic[Task]):
         return -task.cost * self._costs.correction(cost_keys), number
 
 
-class Dispatcher(Generic[Task]):
-    """Decides which rank gets which task.
+class Dispatcher:
+    """Decides which rank gets which task. No decision looks at all ranks.
 
     - Tasks that give starts go first, unless enough tasks wait for all ranks: so the memory for waiting tasks is
       bounded.
@@ -126,9 +105,9 @@ class Dispatcher(Generic[Task]):
         self._n_measured = 0
         self._began = clock()
         self._next_watch = self._began + WATCH_SECONDS
-        self._first: _Waiting[Task] = _Waiting(costs)
-        self._others: _Waiting[Task] = _Waiting(costs)
-        self._given: dict[int, _Running[Task]] = {}
+        self._first = _Waiting(costs)
+        self._others = _Waiting(costs)
+        self._given: dict[int, _Running] = {}
         self._of_rank: list[list[int]] = [[] for _ in range(n_ranks)]
         # Ranks without a task, and those that may get one more: the last is the next to get one.
         self._free = dict.fromkeys(reversed(range(n_ranks)))
@@ -151,7 +130,7 @@ class Dispatcher(Generic[Task]):
             (self._first if task.gives_starts else self._others).add(self._n_known, task)
             self._n_known += 1
 
-    def assign(self) -> Iterator[tuple[int, Assignment[Task]]]:
+    def assign(self) -> Iterator[tuple[int, Assignment]]:
         """Ranks that get a task now, and the tasks."""
         if self._n_measured >= max(_FEW_MEASURED, len(self._others) // _MEASURED_SHARE):
             self._n_measured = 0
@@ -166,15 +145,14 @@ class Dispatcher(Generic[Task]):
             yield rank, self._hand_out(rank)
 
     def deliver(self, rank: int, number: int, seconds: float, *, typical: bool = True) -> Task:
-        """Notes a result; returns its task. seconds: time that the result took.
+        """Notes a result, which took so many seconds; returns its task.
 
         typical: whether similar tasks may take as long; not where the task broke off.
         """
         given = self._given[number]
         task = given.task
-        if given.measurement is not None:
-            self._costs.forget(given.measurement)
-            given.measurement = None
+        self._costs.forget(given.measurement)
+        given.measurement = ()
         if typical:
             self._costs.learn(task.cost_keys, task.cost_of(first=given.n_left == task.n_results), seconds)
             self._n_measured += 1
@@ -224,8 +202,7 @@ class Dispatcher(Generic[Task]):
                 continue
             at_least = _AS_LONG_AGAIN * (now - given.began)
             if at_least > task.cost * self._costs.correction(task.cost_keys):
-                if given.measurement is not None:
-                    self._costs.forget(given.measurement)
+                self._costs.forget(given.measurement)
                 given.measurement = self._costs.learn(task.cost_keys, task.cost, at_least)
         self._n_measured = 0
         self._others.reorder()
@@ -234,7 +211,7 @@ class Dispatcher(Generic[Task]):
     def _n_waiting(self) -> int:
         return len(self._first) + len(self._others)
 
-    def _hand_out(self, rank: int) -> Assignment[Task]:
+    def _hand_out(self, rank: int) -> Assignment:
         number, task = (self._first if self._first and (self.wants_more or not self._others) else self._others).pop()
         self._given[number] = _Running(task, task.n_results, None if self._of_rank[rank] else self._clock())
         self._of_rank[rank].append(number)

@@ -16,8 +16,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studyrunner.system.endings import uninterrupted
-from studyrunner.system.source_digest import package_digest
+from studyrunner.system.machine import package_digest
+from studyrunner.system.process import uninterrupted
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -170,10 +170,7 @@ def _unlink_shared_memory() -> None:
 def start_ranks() -> Ranks:
     """The ranks that the launcher started, or this process alone where there is no launcher.
 
-    Raises
-    ------
-    LauncherError
-        Where the launcher started more processes than the MPI library knows of.
+    Raises LauncherError where the launcher started more processes than the MPI library knows of.
     """
     if not any(name in os.environ for name in _SIGNS):
         return Ranks()
@@ -190,6 +187,27 @@ def start_ranks() -> Ranks:
     return ranks
 
 
+class RankInterrupted:
+    """Message of a rank that was ended from outside; all ranks end."""
+
+
+class Question:
+    """What rank 0 asks the other ranks."""
+
+    def answer(self) -> object:
+        """What this process answers; not None."""
+        raise NotImplementedError
+
+
+class WhatSoftware(Question):
+    """What a rank runs."""
+
+    def answer(self) -> tuple[str, str]:
+        """Name of this machine, and a hash of what this process runs."""
+        packages = ("solver", "studies", "studyrunner")
+        return platform.node(), " ".join((platform.machine(), *map(package_digest, packages)))
+
+
 def wait_for_message(ranks: Ranks) -> object:
     """The next message; for ranks that have nothing else to do."""
     while (received := ranks.receive()) is None:
@@ -197,8 +215,8 @@ def wait_for_message(ranks: Ranks) -> object:
     return received[1]
 
 
-def ask_all(ranks: Ranks, question: object) -> dict[int, object]:
-    """Rank 0: the answers of all other ranks to a message, by rank; None for a rank that is silent.
+def ask_all(ranks: Ranks, question: Question) -> dict[int, object]:
+    """Rank 0: the answers of all other ranks, by rank; None for a rank that is silent.
 
     Raises KeyboardInterrupt where a rank was interrupted.
     """
@@ -217,26 +235,11 @@ def ask_all(ranks: Ranks, question: object) -> dict[int, object]:
     return answers
 
 
-class RankInterrupted:
-    """Message of a rank that was ended from outside; all ranks end."""
-
-
-class WhatSoftware:
-    """Question of rank 0: which software a rank runs. Answered by `describe_software`."""
-
-
-def describe_software() -> tuple[str, str]:
-    """Name of this machine, and a hash of what this process runs."""
-    packages = ("solver", "studies", "studyrunner")
-    return platform.node(), " ".join((platform.machine(), *map(package_digest, packages)))
-
-
 def check_software(ranks: Ranks) -> None:
     """Rank 0: raises LauncherError where a rank runs other software, with which numbers may differ, or is silent."""
-    if ranks.size == 1:
-        return
-    host, own = describe_software()
-    for rank, answer in ask_all(ranks, WhatSoftware()).items():
+    question = WhatSoftware()
+    host, own = question.answer() if ranks.size > 1 else ("", "")
+    for rank, answer in ask_all(ranks, question).items():
         if not isinstance(answer, tuple):
             said = f"has not said within {_SECONDS_TO_ANSWER:.0f} s what it runs"
         elif answer[1] != own:

@@ -1,4 +1,4 @@
-"""Sends tasks to ranks and receives results. This module does not know what a task is.
+"""Sends tasks to ranks and receives results. This module does not know what a task computes.
 
 A task has one result or several; each result is handed on at once. A long task reports its progress from time to time,
 so that another run can continue from there. Rank 0 computes as well: the main thread sends tasks and receives results,
@@ -13,33 +13,23 @@ import itertools
 import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any
 
 from studyrunner.mpi.cost_model import CostModel
-from studyrunner.mpi.dispatch import Assignment, Dispatcher, Work
-from studyrunner.mpi.mapped_file import WhetherSeen
-from studyrunner.mpi.ranks import (
-    POLL_SECONDS,
-    RankInterrupted,
-    Ranks,
-    WhatSoftware,
-    describe_software,
-    wait_for_message,
-)
-from studyrunner.system.endings import begin_ending, raise_ending, uninterrupted
-from studyrunner.system.mailbox import LONGEST_WAIT, Mailbox
+from studyrunner.mpi.dispatch import Assignment, Dispatcher, Task
+from studyrunner.mpi.ranks import POLL_SECONDS, Question, RankInterrupted, Ranks, wait_for_message
+from studyrunner.system.process import begin_ending, raise_ending, uninterrupted
 
 SECONDS_TO_PROGRESS = 3.0
-"""Shortest time between two reports of progress of a task, s; longer with many ranks.
+"""Shortest time between two reports of progress of a task, s; longer with many ranks. Together with the second that a
+report waits for others (`checkpoint.store`) a kill loses no step that was finished more than 5 s before, where steps
+are short and the disk is fast enough."""
 
-Together with the second that a report waits for others (`checkpoint.store`) a kill loses no step that was finished more
-than 5 s before, where steps are short and the disk is fast enough.
-"""
-
-SECONDS_TO_WORDS = 1.0
-"""Shortest time between two reports in words, s."""
+SECONDS_TO_SHARE = 1.0
+"""Shortest time between two reports of the share of a task that is done, s."""
 
 _MANY_RANKS = 100
 """With more ranks each rank reports less often, as rank 0 writes all reports to the disk."""
@@ -47,12 +37,14 @@ _MANY_RANKS = 100
 _LOOKS_A_TICK = 100
 _AT_ONCE = 64
 
-Task = TypeVar("Task", bound=Work)
-Result = TypeVar("Result")
+Result = Any
+
+Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
+"""Does a task: gives the results one by one and may hand the progress to the given function."""
 
 
 @dataclass(frozen=True)
-class _Delivery(Generic[Result]):
+class _Delivery:
     """A result that is sent to rank 0, and the time that it took, s."""
 
     number: int
@@ -62,95 +54,13 @@ class _Delivery(Generic[Result]):
 
 @dataclass(frozen=True)
 class _Progress:
-    """Progress of a task: data to continue from, words, or the share that is done."""
+    """Progress of a task: data to continue from, or the share that is done."""
 
     number: int
     progress: object
 
 
-Run = Callable[[Task, Callable[[object], None]], Iterable[Result]]
-"""Does a task: gives the results one by one and may hand the progress to the given function."""
-
-
-def _work(
-    assignment: Assignment[Task],
-    run: Run[Task, Result],
-    send: Callable[[object], None],
-    seconds_to_progress: float,
-    check: Callable[[], None] = raise_ending,
-) -> None:
-    """Sends the results of a task, each as soon as it is there. check: raises KeyboardInterrupt where the run ends."""
-    task = assignment.task
-    wrong = ValueError(f"not {task.n_results} results from {task}")
-    n_given = 0
-    began = time.perf_counter()
-    sent = dict.fromkeys((True, False), began)
-
-    def keep(progress: object) -> None:
-        check()
-        in_words, now = isinstance(progress, str | float), time.perf_counter()
-        # a task that has given all its results has no progress
-        if n_given < task.n_results and now > sent[in_words] + (SECONDS_TO_WORDS if in_words else seconds_to_progress):
-            send(_Progress(assignment.number, progress))
-            sent[in_words] = time.perf_counter()
-
-    for result in run(task, keep):
-        n_given += 1
-        if n_given > task.n_results:
-            raise wrong
-        send(_Delivery(assignment.number, result, time.perf_counter() - began))
-        began = time.perf_counter()
-    if n_given < task.n_results:
-        raise wrong
-
-
-class _LocalWorker(Generic[Task, Result]):
-    """The computing thread of rank 0. assign: takes tasks. given_up: the thread ends at the next step of its task."""
-
-    def __init__(self, run: Run[Task, Result], seconds_to_progress: float) -> None:
-        self._run = run
-        self._seconds_to_progress = seconds_to_progress
-        self._tasks: queue.SimpleQueue[Assignment[Task] | None] = queue.SimpleQueue()
-        self._sent: Mailbox[object] = Mailbox()
-        self.given_up = False
-        self.assign = self._tasks.put
-        # A daemon: an exception in the main thread ends the process although a task still runs.
-        self._thread = threading.Thread(target=self._compute, name="tasks of rank 0", daemon=True)
-        self._thread.start()
-
-    def receive(self, seconds: float = 0.0) -> object:
-        """The next message; None where none comes within `seconds`. Raises the exception of a task."""
-        if seconds:
-            self._sent.wait(seconds)
-        message = self._sent.take()
-        if isinstance(message, BaseException):
-            raise message
-        return message
-
-    def stop(self) -> None:
-        """Ends the thread after its last task. Raises an exception that the last task raised after its last result."""
-        self._tasks.put(None)
-        with uninterrupted():
-            self._thread.join()
-        self.receive()
-
-    def _compute(self) -> None:
-        try:
-            while (assignment := self._tasks.get()) is not None:
-                _work(assignment, self._run, self._send, self._seconds_to_progress, self._check)
-        except BaseException as error:  # handed to the main thread, which raises it
-            self._sent.put(error)
-
-    def _check(self) -> None:
-        if self.given_up:
-            raise KeyboardInterrupt
-
-    def _send(self, message: object) -> None:
-        self._check()
-        self._sent.put(message)
-
-
-class Office(Generic[Task, Result]):
+class Office:
     """What rank 0 does with tasks, results and messages. All of it is called in the main thread."""
 
     def begin(self) -> Iterable[Task]:
@@ -170,26 +80,23 @@ class Office(Generic[Task, Result]):
         return False
 
     def keep(self, task: Task, progress: object) -> None:
-        """Takes the progress of a task, or words on it; never after the last result of the task."""
+        """Takes the progress of a task; never after the last result of the task."""
 
     def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
         """Called many times a second. running: returns the running tasks, as `Dispatcher.running`."""
 
 
-def serve_tasks(
-    ranks: Ranks, office: Office[Task, Result], run: Run[Task, Result], costs: CostModel | None = None
-) -> None:
-    """Rank 0: has all tasks done and computes some of them.
+def serve_tasks(ranks: Ranks, office: Office, run: Run, costs: CostModel | None = None) -> None:
+    """Rank 0: has all tasks done and computes some of them. costs: learns the run times of tasks.
 
-    An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here.
-    run: gives the results of a task one by one. costs: learns the run times of tasks.
-    Raises KeyboardInterrupt where another rank was interrupted.
+    An exception on another rank ends the process of that rank. An exception of a task on rank 0 is raised here, and
+    KeyboardInterrupt where another rank was interrupted.
     """
     server = _Server(ranks, office, run, costs or CostModel())
     try:
         with uninterrupted():
             server.hand_out()
-        while not server.done:
+        while not server.dispatcher.done:
             with uninterrupted():
                 server.look()
     except BaseException:
@@ -198,20 +105,106 @@ def serve_tasks(
     server.local.stop()
 
 
-class _Server(Generic[Task, Result]):
+def follow_rank_0(ranks: Ranks, run: Run) -> None:
+    """Any other rank: answers questions and does the tasks that rank 0 sends, until rank 0 sends None."""
+
+    def send(reply: object) -> None:
+        ranks.send(reply, 0)
+        ranks.flush()
+
+    while (message := wait_for_message(ranks)) is not None:
+        if isinstance(message, Question):
+            send(message.answer())
+        elif isinstance(message, Assignment):
+            _work(message, run, send, _seconds_to_progress(ranks), raise_ending)
+        else:
+            raise TypeError(f"rank 0 sent {message!r} instead of a task")
+
+
+def _work(
+    assignment: Assignment,
+    run: Run,
+    send: Callable[[object], None],
+    seconds_to_progress: float,
+    check: Callable[[], None],
+) -> None:
+    """Sends the results of a task, each as soon as it is there. check: raises KeyboardInterrupt where the run ends."""
+    task = assignment.task
+    n_given = 0
+    began = time.perf_counter()
+    sent = dict.fromkeys((True, False), began)
+
+    def keep(progress: object) -> None:
+        check()
+        is_share, now = isinstance(progress, float), time.perf_counter()
+        # a task that has given all its results has no progress
+        if n_given < task.n_results and now > sent[is_share] + (SECONDS_TO_SHARE if is_share else seconds_to_progress):
+            send(_Progress(assignment.number, progress))
+            sent[is_share] = time.perf_counter()
+
+    for result in run(task, keep):
+        n_given += 1
+        if n_given > task.n_results:
+            break
+        send(_Delivery(assignment.number, result, time.perf_counter() - began))
+        began = time.perf_counter()
+    if n_given != task.n_results:
+        raise ValueError(f"not {task.n_results} results from {task}")
+
+
+class _LocalWorker:
+    """The computing thread of rank 0. assign: takes tasks. given_up: the thread ends at the next step of its task."""
+
+    def __init__(self, run: Run, seconds_to_progress: float) -> None:
+        self._run = run
+        self._seconds_to_progress = seconds_to_progress
+        self._tasks: queue.SimpleQueue[Assignment | None] = queue.SimpleQueue()
+        self._sent: deque[object] = deque()
+        self.given_up = False
+        self.assign = self._tasks.put
+        # A daemon: an exception in the main thread ends the process although a task still runs.
+        self._thread = threading.Thread(target=self._compute, name="tasks of rank 0", daemon=True)
+        self._thread.start()
+
+    def receive(self) -> object:
+        """The next message, None where there is none. Raises the exception of a task."""
+        message = self._sent.popleft() if self._sent else None
+        if isinstance(message, BaseException):
+            raise message
+        return message
+
+    def stop(self) -> None:
+        """Ends the thread after its last task. Raises an exception that the last task raised after its last result."""
+        self._tasks.put(None)
+        with uninterrupted():
+            self._thread.join()
+        self.receive()
+
+    def _compute(self) -> None:
+        try:
+            while (assignment := self._tasks.get()) is not None:
+                _work(assignment, self._run, self._send, self._seconds_to_progress, self._check)
+        except BaseException as error:  # handed to the main thread, which raises it
+            self._sent.append(error)
+
+    def _check(self) -> None:
+        if self.given_up:
+            raise KeyboardInterrupt
+
+    def _send(self, message: object) -> None:
+        self._check()
+        self._sent.append(message)
+
+
+class _Server:
     """Rank 0: sends tasks, receives results."""
 
-    def __init__(self, ranks: Ranks, office: Office[Task, Result], run: Run[Task, Result], costs: CostModel) -> None:
+    def __init__(self, ranks: Ranks, office: Office, run: Run, costs: CostModel) -> None:
         self._ranks = ranks
         self._office = office
         self._waiting = iter(office.begin())
-        self._dispatcher: Dispatcher[Task] = Dispatcher(ranks.size, costs, time.monotonic)
+        self.dispatcher = Dispatcher(ranks.size, costs, time.monotonic)
         self.local = _LocalWorker(run, _seconds_to_progress(ranks))
-
-    @property
-    def done(self) -> bool:
-        """Whether all tasks are done."""
-        return self._dispatcher.done
 
     def look(self) -> None:
         """Receives what there is; waits a moment where there is nothing."""
@@ -225,17 +218,17 @@ class _Server(Generic[Task, Result]):
             quiet = received is None and message is None
             if quiet:
                 break
-        self._dispatcher.watch()
-        self._office.tick(self._dispatcher.running)
-        wait = POLL_SECONDS if self._ranks.size > 1 else LONGEST_WAIT
-        if quiet and (message := self.local.receive(wait)) is not None:
-            self._accept(0, message)
+        self.dispatcher.watch()
+        self._office.tick(self.dispatcher.running)
+        if quiet:
+            # no wait for a message: a signal may make that of `queue.SimpleQueue` endless in Python 3.11
+            time.sleep(POLL_SECONDS)
 
     def hand_out(self) -> None:
         """Sends tasks to the ranks that have none."""
-        while self._dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
-            self._dispatcher.add(more)
-        for rank, assigned in self._dispatcher.assign():
+        while self.dispatcher.wants_more and (more := list(itertools.islice(self._waiting, _AT_ONCE))):
+            self.dispatcher.add(more)
+        for rank, assigned in self.dispatcher.assign():
             assignment = Assignment(assigned.number, self._office.prepare(rank, assigned.task))
             if rank == 0:
                 self.local.assign(assignment)
@@ -244,7 +237,7 @@ class _Server(Generic[Task, Result]):
 
     def _accept(self, rank: int, message: object) -> None:
         if isinstance(message, _Progress):
-            self._office.keep(self._dispatcher.task(message.number), message.progress)
+            self._office.keep(self.dispatcher.task(message.number), message.progress)
             return
         if isinstance(message, RankInterrupted):
             begin_ending()
@@ -253,28 +246,10 @@ class _Server(Generic[Task, Result]):
             raise TypeError(f"rank {rank} sent {message!r} instead of a result")
         sick = self._office.is_sick(rank, message.result)
         if sick:
-            self._dispatcher.shun(rank)
-        task = self._dispatcher.deliver(rank, message.number, message.seconds, typical=not sick)
-        self._dispatcher.add(self._office.take(task, message.result))
+            self.dispatcher.shun(rank)
+        task = self.dispatcher.deliver(rank, message.number, message.seconds, typical=not sick)
+        self.dispatcher.add(self._office.take(task, message.result))
         self.hand_out()
-
-
-def follow_rank_0(ranks: Ranks, run: Run[Task, Result]) -> None:
-    """Any other rank: answers questions and does the tasks that rank 0 sends, until rank 0 sends None."""
-
-    def send(reply: object) -> None:
-        ranks.send(reply, 0)
-        ranks.flush()
-
-    while (message := wait_for_message(ranks)) is not None:
-        if isinstance(message, Assignment):
-            _work(message, run, send, _seconds_to_progress(ranks))
-        elif isinstance(message, WhatSoftware):
-            send(describe_software())
-        elif isinstance(message, WhetherSeen):
-            send(message.answer())
-        else:
-            raise TypeError(f"rank 0 sent {message!r} instead of a task")
 
 
 def _seconds_to_progress(ranks: Ranks) -> float:

@@ -12,8 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from studyrunner.system.endings import raise_ending, take_endings
-from studyrunner.system.streams import keep_talking
+from studyrunner.system.process import keep_talking, raise_ending, take_endings
 from studyrunner.user_error import UserError
 
 if TYPE_CHECKING:

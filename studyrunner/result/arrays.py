@@ -1,4 +1,4 @@
-"""Attributes and coordinates of the variables of a result file."""
+"""Attributes of the variables of a result file, and all of its arrays that no task computes."""
 
 from __future__ import annotations
 
@@ -9,12 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.coordinates import COORDINATES
+from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY
 from studyrunner.scene.answers import SceneVariable
+from studyrunner.scene.pairs import drawn_pairs, scatters_pairs, worn_depth
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import PairArrays
+from studyrunner.scene.scene_set import (
+    PairArrays,
+    SceneSet,
+    frequencies_of_ratios,
+    merge_facts,
+    pair_arrays,
+    stuck_frequencies_of,
+)
+from studyrunner.study.realisation import block_of_input, draw_inputs
+from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study import Study
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
+
+_OF_CONTACT = {"gap": ("m", "initial gap of the contact pair"), "area": ("m2", "area of the contact pair")}
 
 
 @dataclass(frozen=True)
@@ -49,21 +61,26 @@ def attributes(name: str, entry: Variable, of_modes: bool = False) -> dict[str, 
     return found
 
 
-def _coordinate_entry(study: Study, name: str) -> Variable:
-    if name == "cycle" and study.to_the_end:
-        comment = "Spaced evenly in worn volume and cycles, to the last; cycle_count has the counts of each point."
-        return Variable((), "1", "number of the output", comment=comment)
-    if name == "sweep" and not study.kind.counted:
-        comment = "up: the modal amplitude is raised from zero; down: raised to a larger one, then lowered."
-        return Variable((), "1", "how the amplitude is reached", comment=comment)
-    for axis in study.scene_axes:
-        if axis.name == name:
-            return Variable((), axis.units, axis.meaning, comment=f"Key {axis.table}.{axis.dotted} of the study.")
-    return COORDINATES[name]
+def small_arrays(
+    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], of_scene: Sequence[SceneVariable] = ()
+) -> list[SmallArray]:
+    """Coordinates of the file, and its variables that no task computes. facts: of each scene.
+
+    of_scene: what the study asks of the scene.
+    """
+    hertz = frequencies_of_ratios(study, facts, scenes)
+    return [
+        *([] if hertz is None else [SmallArray("frequency", *hertz, COORDINATES["frequency"])]),
+        *coordinates(study, merge_facts(facts), pair_arrays(study, facts, scenes)),
+        SmallArray("stuck_frequency", *stuck_frequencies_of(study, facts, scenes), STUCK_FREQUENCY),
+        *_worn_coordinate(study, facts),
+        *sample_coordinates(study, facts, scenes),
+        *scene_arrays(study, of_scene),
+    ]
 
 
 def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[SmallArray]:
-    """Coordinates of the file."""
+    """Coordinates of the file but those of samples and worn joints."""
     along: dict[str, Sequence[object] | NDArray[np.generic]] = dict(study.dimensions)
     counted = study.missions_kept if study.mission else np.array(study.cycles_kept)
     along.setdefault(study.kind.counted or "cycle", counted)
@@ -85,12 +102,17 @@ def coordinates(study: Study, facts: SceneFacts, pairs: PairArrays) -> Iterator[
         yield SmallArray("contact_edge", ("contact",), facts.edge.astype(np.int8), COORDINATES["contact_edge"])
 
 
-def scene_arrays(study: Study, of_scene: Sequence[SceneVariable]) -> Iterator[SmallArray]:
-    """Variables of the scene."""
-    for each in of_scene:
-        own = (each.name,) if each.coordinate else each.entry.dimensions
-        dimensions = (*study.dimensions, *own) if each.axes else own
-        yield SmallArray(each.name, dimensions, each.values, each.entry, over_axes=each.axes)
+def _coordinate_entry(study: Study, name: str) -> Variable:
+    if name == "cycle" and study.to_the_end:
+        comment = "Spaced evenly in worn volume and cycles, to the last; cycle_count has the counts of each point."
+        return Variable((), "1", "number of the output", comment=comment)
+    if name == "sweep" and not study.kind.counted:
+        comment = "up: the modal amplitude is raised from zero; down: raised to a larger one, then lowered."
+        return Variable((), "1", "how the amplitude is reached", comment=comment)
+    for axis in study.scene_axes:
+        if axis.name == name:
+            return Variable((), axis.units, axis.meaning, comment=f"Key {axis.table}.{axis.dotted} of the study.")
+    return COORDINATES[name]
 
 
 def _labels(values: Sequence[object] | NDArray[np.generic]) -> NDArray[np.generic]:
@@ -103,3 +125,88 @@ def _labels(values: Sequence[object] | NDArray[np.generic]) -> NDArray[np.generi
     if array.dtype.kind == "b":
         return array.astype(np.int8)
     return array.astype(np.int32) if array.dtype.kind == "i" else array
+
+
+def scene_arrays(study: Study, of_scene: Sequence[SceneVariable]) -> Iterator[SmallArray]:
+    """Variables of the scene."""
+    for each in of_scene:
+        own = (each.name,) if each.coordinate else each.entry.dimensions
+        dimensions = (*study.dimensions, *own) if each.axes else own
+        yield SmallArray(each.name, dimensions, each.values, each.entry, over_axes=each.axes)
+
+
+def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[SmallArray]:
+    """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
+    if study.scene.worn is None or len(facts) > 1:
+        return
+    axis = next((axis for axis in study.scene_axes if axis.key == ("worn",)), None)
+    # the axis of worn states is the last one
+    states = (study,) if axis is None else study.variants[: len(axis.values)]
+    values = np.array([worn_depth(state, facts[0]) for state in states])
+    dimensions = ("contact",) if axis is None else (axis.name, "contact")
+    comment = "Key scene.worn; wear_depth counts from there."
+    entry = Variable(dimensions, "m", "wear depth at the start", comment=comment)
+    yield SmallArray("worn_depth", dimensions, values[0] if axis is None else values, entry)
+
+
+def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
+    """The drawn values of each input, in the unit of the input.
+
+    Along the samples; along an axis as well where the input is drawn around the values of the axis; along the pairs
+    where pairs differ.
+    """
+    if study.scatter is None:
+        return
+    variants = study.variants or (study,)
+    shape = [len(axis.values) for axis in study.scene_axes]
+    drawn = [draw_inputs(variant) for variant in variants]
+    for name, first in drawn[0].items():
+        dimensions: tuple[str, ...] = ("sample",)
+        values = first
+        if first.ndim == 2:
+            # around each value of an axis
+            dimensions, values = (("sample",), first[0]) if len(first) == 1 else ((name, "sample"), first)
+        elif any(axis.name == name for axis in study.scene_axes):
+            place = [axis.name for axis in study.scene_axes].index(name)
+            every = np.array([each[name] for each in drawn]).reshape(*shape, -1)
+            along = tuple(slice(None) if each == place else 0 for each in range(len(shape)))
+            dimensions, values = (name, "sample"), every[along]
+        yield _sample_coordinate(study, name, dimensions, values)
+    if scatters_pairs(study):
+        yield from _of_pairs(study, facts, scenes)
+
+
+def _of_pairs(study: Study, facts: Sequence[SceneFacts], scenes: SceneSet) -> Iterator[SmallArray]:
+    """Values of the pairs along the axes on which they depend; NaN where a scene does not have a pair."""
+    drawn = [of_part for _, _, of_part in drawn_pairs(study, scenes, facts)]
+    n_contact = max(len(each.area) for each in facts)
+    for name in drawn[0]:
+        values = np.full((len(drawn), n_contact), np.nan)
+        for row, of_part in zip(values, drawn, strict=True):
+            row[: len(of_part[name])] = of_part[name]
+        values = values.reshape(*(len(each) for each in study.axes_of_parts.values()), n_contact)
+        dimensions = ["contact"]
+        for place, axis in reversed(list(enumerate(study.axes_of_parts))):
+            first = values.take([0], axis=place)
+            if axis != "sample" and np.array_equal(np.broadcast_to(first, values.shape), values, equal_nan=True):
+                values = values.take(0, axis=place)
+            else:
+                dimensions.insert(0, axis)
+        yield _sample_coordinate(study, name, tuple(dimensions), values)
+
+
+def _sample_coordinate(study: Study, name: str, dimensions: tuple[str, ...], values: NDArray[np.float64]) -> SmallArray:
+    if name in COORDINATES:
+        units, meaning = COORDINATES[name].units, COORDINATES[name].long_name
+    elif name in _OF_CONTACT:
+        units, meaning = _OF_CONTACT[name]
+    elif name in study.wear.numbers:
+        # `surfaces_flat` is the factor of the surface "flat"
+        units, meaning = describe_key(type(study.wear), *name.split("_", 1))
+    else:
+        units, meaning = describe_key(type(study.scene.parameters), name)
+    block, comment = block_of_input(study, name), "By [scatter] of the study."
+    if block is not None:
+        comment += f" In the block {block.name}; in another block around the value of that block."
+    entry = Variable(dimensions, units, f"{meaning}, as the sample draws it", comment=comment)
+    return SmallArray(f"sample_{name}", dimensions, np.asarray(values, dtype=np.float64), entry)

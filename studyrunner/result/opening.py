@@ -13,18 +13,28 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
-from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS
-from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
 from studyrunner.statistics.samples import DRAWN, SAMPLE
 from studyrunner.study.study_of_result import check_result_file
 from studyrunner.study.toml_text import NoTomlError, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
-from studyrunner.variables import ASKED, CERTIFICATE, COUNTS, KEPT, LOOPS, Variable
+from studyrunner.variables import (
+    ASKED,
+    CERTIFICATE,
+    COUNTS,
+    KEPT,
+    LOOPS,
+    OF_A_MISSION,
+    OF_A_MODE_POINT,
+    OF_MISSIONS,
+    OF_MODES,
+    Variable,
+)
 
 ENDED = "ended"
 """Coordinate of an opened result: `outcome` in words."""
@@ -39,9 +49,11 @@ _INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycl
 _LONGEST_NAME, _LONGEST_SENTENCE = 120, 400
 _REMEDY = "give a result file of run-study that is whole"
 
-_WITHOUT_AXES = SCENE["mesh"] | SCENE["natural_frequency"] | {"stuck_frequency": STUCK_FREQUENCY}
-_OF_CONTACTS = {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
-_TEXTS = ("scheme", "sweep", "response", "component", "block")
+_OF_SCENE = SCENE["mesh"] | SCENE["natural_frequency"] | {"stuck_frequency": STUCK_FREQUENCY}
+_OF_SCENE |= {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
+_WORDS = ("scheme", "sweep")
+_TEXTS = (*_WORDS, "response", "component", "block")
+_DRAWN_VALUES = Variable((), "1", "what the samples draw of an input")
 
 
 class _WrongError(Exception):
@@ -83,16 +95,6 @@ def open_result(path: str | Path) -> xr.Dataset:
     return kept
 
 
-def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
-    """How each point ended, as a word of the attribute `flag_meanings` of `outcome`."""
-    numbers = np.atleast_1d(outcome.attrs.get("flag_values", ())).tolist()
-    words = dict(zip(numbers, str(outcome.attrs.get("flag_meanings", "")).split(), strict=False))
-    named = [words.get(number, f"outcome_{number}") for number in outcome.values.ravel().tolist()]
-    values = np.array(named, dtype=np.str_).reshape(outcome.shape)
-    attributes = {"units": "1", "long_name": "how the computation of the point ended, in a word"}
-    return xr.DataArray(values, outcome.coords, outcome.dims, attrs=attributes)
-
-
 def open_known(path: str | Path) -> xr.Dataset:
     """What the report knows of a result file, with its texts cleaned, see `check_dataset`. Raises UserError."""
     return _open(path)[1]
@@ -127,44 +129,14 @@ def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
         raise
 
 
-def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
-    """Variables of a file that the report knows. Only coordinates, texts and the mesh are read.
-
-    source: name of the file for the user. Raises UserError where a needed variable is missing, or has a wrong shape or
-    type.
-    """
-    slow = "mission" if "mission" in dataset.dims else "cycle"
-    lacking = [name for name in ("outcome", slow, "contact") if name not in dataset.variables]
-    if lacking:
-        raise UserError(source, "OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
-    axes = tuple(map(str, dataset["outcome"].dims))
-    try:
-        _check_sizes(dataset, axes, slow)
-        others = (name for name, entry in COORDINATES.items() if not entry.dimensions and name in dataset.variables)
-        coordinates = {name: _checked_axis(dataset, name) for name in (*axes, *others) if name in dataset.dims}
-        drawn = [str(name) for name in dataset.variables if str(name).startswith(DRAWN)]
-        drawn += ["frequency"] * ("frequency_ratio" in axes and "frequency" in dataset.variables)
-        coordinates |= {name: _checked_draws(dataset.variables[name], name, axes) for name in drawn}
-        kept = _checked_variables(dataset, axes, slow)
-        coordinates |= {name: kept.pop(name) for name in _OF_CONTACTS if name in kept}
-        _check_values(coordinates | kept, axes, slow)
-    except _WrongError as wrong:
-        raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
-    checked = xr.Dataset(kept, coordinates, {str(name): _clean(name, value) for name, value in dataset.attrs.items()})
-    checked.set_close(dataset.close)
-    study_tables(checked.attrs, source)
-    return checked
-
-
-def check_numbers(dataset: xr.Dataset, source: str) -> None:
-    """Raises UserError where there are numbers that are too large to be drawn, but for variables of more than 16 MB."""
-    for name, variable in dataset.variables.items():
-        if variable.dtype.kind == "f" and variable.size * variable.dtype.itemsize <= _LARGEST_READ:
-            sizes = np.abs(variable.values)
-            may_be_infinite = str(name).endswith(_INFINITE)
-            wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (not may_be_infinite))]
-            if wrong.size:
-                raise UserError(source, str(name), Verbatim(f"{wrong[0]:g}"), _REMEDY)
+def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
+    """How each point ended, as a word of the attribute `flag_meanings` of `outcome`."""
+    numbers = np.atleast_1d(outcome.attrs.get("flag_values", ())).tolist()
+    words = dict(zip(numbers, str(outcome.attrs.get("flag_meanings", "")).split(), strict=False))
+    named = [words.get(number, f"outcome_{number}") for number in outcome.values.ravel().tolist()]
+    values = np.array(named, dtype=np.str_).reshape(outcome.shape)
+    attributes = {"units": "1", "long_name": "how the computation of the point ended, in a word"}
+    return xr.DataArray(values, outcome.coords, outcome.dims, attrs=attributes)
 
 
 def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str, dict[str, object]]:
@@ -179,6 +151,49 @@ def study_tables(attributes: Mapping[str, object], source: str = "") -> dict[str
     except UserError as error:
         raise UserError(source, "the attribute study", None, error.remedy) from None
     return {name: table for name, table in tables.items() if isinstance(table, dict)}
+
+
+def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
+    """Variables of a file that the report knows, their texts cleaned. Only coordinates, texts and the mesh are read.
+
+    source: name of the file for the user. Raises UserError where a needed variable is missing, or has a wrong shape or
+    type.
+    """
+    slow = "mission" if "mission" in dataset.dims else "cycle"
+    lacking = [name for name in ("outcome", slow, "contact") if name not in dataset.variables]
+    if lacking:
+        raise UserError(source, "OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
+    axes = tuple(map(str, dataset["outcome"].dims))
+    try:
+        _check_sizes(dataset, axes, slow)
+        known = _known_variables(dataset, axes, slow)
+        for name, (dimensions, entry) in known.items():
+            _check_variable(dataset.variables[name], name, dimensions, entry)
+        checked = dataset.drop_vars([name for name in dataset.variables if name not in known]).copy()
+        checked = checked.set_coords([name for name in known if name in COORDINATES or name.startswith(DRAWN)])
+        texts = {name: _texts(dataset.variables[name], name) for name in known if dataset[name].dtype.kind in "OSU"}
+        checked = checked.assign_coords({name: texts.pop(name) for name in list(texts) if name in checked.coords})
+        checked = checked.assign(texts)
+        _check_values(checked, axes, slow)
+    except _WrongError as wrong:
+        raise UserError(source, wrong.name, Verbatim(wrong.found), _REMEDY) from None
+    checked.attrs = _cleaned(checked.attrs)
+    for variable in checked.variables.values():
+        variable.attrs = _cleaned(variable.attrs)
+    checked.set_close(dataset.close)
+    study_tables(checked.attrs, source)
+    return checked
+
+
+def check_numbers(dataset: xr.Dataset, source: str) -> None:
+    """Raises UserError where there are numbers that are too large to be drawn, but for variables of more than 16 MB."""
+    for name, variable in dataset.variables.items():
+        if variable.dtype.kind == "f" and variable.size * variable.dtype.itemsize <= _LARGEST_READ:
+            sizes = np.abs(variable.values)
+            may_be_infinite = str(name).endswith(_INFINITE)
+            wrong = sizes[(sizes > _LARGEST_NUMBER) & (np.isfinite(sizes) | (not may_be_infinite))]
+            if wrong.size:
+                raise UserError(source, str(name), Verbatim(f"{wrong[0]:g}"), _REMEDY)
 
 
 def _need(right: object, name: str, found: str) -> None:
@@ -198,73 +213,62 @@ def _check_sizes(dataset: xr.Dataset, axes: Sequence[str], slow: str) -> None:
     _need(is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
 
 
-def _checked_axis(dataset: xr.Dataset, name: str) -> xr.Variable:
-    """Values along the dimension of this name: finite numbers, or texts."""
-    variable = dataset.variables[name] if name in dataset.variables else xr.Variable((), 0)
-    _need(variable.dims == (name,), name, "no values along the dimension of this name")
-    if variable.dtype.kind in "iuf":
-        _need(name not in ("scheme", "sweep"), name, "numbers in place of words")
-        _need(np.isfinite(variable.values).all(), name, "a value that is no finite number")
-        return xr.Variable((name,), variable.values, _attributes(variable))
-    texts = _texts(variable, name)
-    if name in COORDINATES and name not in _TEXTS:
-        _need(all(map(_is_choice, texts.values.tolist())), name, "texts in place of numbers")
-    return texts
-
-
-def _is_choice(text: str) -> bool:
-    """Whether a text stands for a number: the values of an axis with numbers and "auto" are texts."""
-    try:
-        return text == "auto" or math.isfinite(float(text))
-    except ValueError:
-        return False
-
-
-def _checked_draws(variable: xr.Variable, name: str, axes: Sequence[str]) -> xr.Variable:
-    """What the samples draw of an input, along axes in their order, and along the pairs where they differ in it.
-
-    Or excitation frequencies, Hz, where an axis gives their ratios.
-    """
-    along = [axis for axis in (*axes, "contact") if axis in variable.dims]
-    needed = "frequency_ratio" if name == "frequency" else SAMPLE
-    _need(list(variable.dims) == along and needed in along, name, f"dimensions {', '.join(map(str, variable.dims))}")
-    right_type = variable.dtype.kind == "f" and variable.size <= _MOST_VALUES and name.isidentifier()
-    _need(right_type and len(name) <= _LONGEST_NAME, name, f"type {variable.dtype} of shape {variable.shape}")
-    # NaN of pairs that a scene does not have
-    right = (np.abs(variable.values) < _LARGEST_NUMBER) | (np.isnan(variable.values) & ("contact" in along))
-    _need(right.all(), name, "a value that is no finite number")
-    return xr.Variable(variable.dims, variable.values, _attributes(variable))
-
-
-def _checked_variables(dataset: xr.Dataset, axes: Sequence[str], slow: str) -> dict[str, xr.Variable]:
-    """Those that the report knows, unread but for texts."""
+def _known_variables(
+    dataset: xr.Dataset, axes: Sequence[str], slow: str
+) -> dict[str, tuple[tuple[str, ...], Variable | None]]:
+    """Variables of a file that the report knows: their dimensions and what they are, None for the values of an axis."""
     with_axes = ASKED | KEPT | LOOPS | COUNTS | SCENE["exact"]
     if slow == "mission":
         with_axes = OF_MISSIONS | OF_A_MISSION
     elif "modal_amplitude" in axes:
         with_axes = OF_MODES | OF_A_MODE_POINT
-    kept = {}
-    for name, entry in (_WITHOUT_AXES | _OF_CONTACTS | with_axes).items():
-        if name in dataset.variables:
-            # what is of the scene has those axes along which scenes differ
-            along = tuple(axis for axis in axes if name in with_axes or axis in dataset.variables[name].dims)
-            kept[name] = _checked_variable(dataset.variables[name], name, entry, (*along, *entry.dimensions))
-    return kept
+    found: dict[str, tuple[tuple[str, ...], Variable | None]] = {}
+    for name, variable in ((str(name), variable) for name, variable in dataset.variables.items()):
+        # what is of the scene, or drawn, has those axes along which it differs
+        along = tuple(axis for axis in axes if axis in variable.dims)
+        if name in dataset.dims:
+            found[name] = (name,), None
+        elif name.startswith(DRAWN) or (name == "frequency" and "frequency_ratio" in axes):
+            found[name] = (*along, *(each for each in ("contact",) if each in variable.dims)), _DRAWN_VALUES
+            _need({SAMPLE, "frequency_ratio"} & set(along), name, f"dimensions {', '.join(map(str, variable.dims))}")
+        elif name in with_axes:
+            found[name] = (*axes, *with_axes[name].dimensions), with_axes[name]
+        elif name in _OF_SCENE:
+            found[name] = (*along, *_OF_SCENE[name].dimensions), _OF_SCENE[name]
+    for name in axes:
+        _need(name in found, name, "no values along the dimension of this name")
+    return found
 
 
-def _checked_variable(variable: xr.Variable, name: str, entry: Variable, dimensions: tuple[str, ...]) -> xr.Variable:
+def _check_variable(variable: xr.Variable, name: str, dimensions: tuple[str, ...], entry: Variable | None) -> None:
+    """Dimensions and type; entry None: of an axis, which has finite numbers or texts."""
     _need(variable.dims == dimensions, name, f"dimensions {', '.join(map(str, variable.dims))}")
     _need(not {"scale_factor", "add_offset"} & set(variable.encoding), name, "packed values")
-    if entry.is_text:
-        return _texts(variable, name)
-    numbers = "iuf" if entry.dtype.startswith("float") else "iu"
-    _need(variable.dtype.kind in numbers, name, f"type {variable.dtype}")
-    variable = variable.copy(deep=False)
-    variable.attrs = _attributes(variable)
-    return variable
+    kind = variable.dtype.kind
+    if entry is not None:
+        right = "OSU" if entry.is_text else "iuf" if entry.dtype.startswith("float") else "iu"
+        _need(kind in right, name, f"type {variable.dtype}")
+    elif kind in "iuf":
+        _need(name not in _WORDS, name, "numbers in place of words")
+        _need(np.isfinite(variable.values).all(), name, "a value that is no finite number")
+    elif name in COORDINATES and name not in _TEXTS:
+        _need(all(map(_is_choice, variable.values.tolist())), name, "texts in place of numbers")
+    if entry is _DRAWN_VALUES:
+        # NaN of pairs that a scene does not have
+        _need(variable.size <= _MOST_VALUES, name, f"shape {variable.shape}")
+        right = (np.abs(variable.values) < _LARGEST_NUMBER) | (np.isnan(variable.values) & ("contact" in dimensions))
+        _need(right.all(), name, "a value that is no finite number")
 
 
-def _check_values(kept: Mapping[str, xr.Variable], axes: Sequence[str], slow: str) -> None:
+def _is_choice(text: object) -> bool:
+    """Whether a text stands for a number: the values of an axis with numbers and "auto" are texts."""
+    try:
+        return text == "auto" or math.isfinite(float(str(text)))
+    except ValueError:
+        return False
+
+
+def _check_values(kept: xr.Dataset, axes: Sequence[str], slow: str) -> None:
     """Tests the values that lead to other values: cycles or missions, pairs, flags and mesh."""
     # worn joints whose modes are sought stand in any order
     counts = np.sort(kept[slow].values) if slow in axes else kept[slow].values
@@ -283,18 +287,14 @@ def _check_values(kept: Mapping[str, xr.Variable], axes: Sequence[str], slow: st
 
 
 def _texts(variable: xr.Variable, name: str) -> xr.Variable:
-    is_text = variable.dtype.kind in "OSU" and variable.size <= _MOST_NAMES
-    _need(is_text, name, f"type {variable.dtype} of shape {variable.shape}")
+    _need(variable.size <= _MOST_NAMES, name, f"shape {variable.shape}")
     longest = _LONGEST_SENTENCE if name == "message" else _LONGEST_NAME
     texts = [_line(each, longest) for each in variable.values.flat]
-    return xr.Variable(variable.dims, np.array(texts, dtype=np.str_).reshape(variable.shape), _attributes(variable))
+    return xr.Variable(variable.dims, np.array(texts, dtype=np.str_).reshape(variable.shape), variable.attrs)
 
 
-def _attributes(variable: xr.Variable) -> dict[str, object]:
-    """Attributes that the report reads."""
-    named = ("units", "long_name", "flag_meanings", "sentences")
-    kept: dict[str, object] = {name: _clean(name, variable.attrs[name]) for name in named if name in variable.attrs}
-    return kept | {name: variable.attrs[name] for name in ("flag_values",) if name in variable.attrs}
+def _cleaned(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value if name == "flag_values" else _clean(name, value) for name, value in attributes.items()}
 
 
 def _clean(name: object, value: object) -> str:

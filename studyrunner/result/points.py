@@ -80,10 +80,7 @@ class Points:
     def over_points(
         self, name: str, reduce: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     ) -> NDArray[np.float64]:
-        """A number of each point, read some points at a time.
-
-        reduce: from values (n_points, ...) of the variable to (n_points,).
-        """
+        """A number of each point, read some at a time. reduce: from values (n_points, ...) to (n_points,)."""
 
         def reduced(part: xr.DataArray) -> NDArray[np.float64]:
             values = np.asarray(part.transpose(*self.axes, ...).values, dtype=float)
@@ -92,8 +89,6 @@ class Points:
         # in a function of its own, so that no part is in memory while the next one is read; `map` holds none either
         parts = map(reduced, _in_slabs(self.dataset[name], self.axes))
         return np.concatenate(list(parts)).reshape(self.computed.shape)
-
-    # --- how points ended, and how well they are known ---
 
     @cached_property
     def endings(self) -> dict[int, Ending]:

@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
+import subprocess
+from datetime import UTC, date, datetime
 from importlib import metadata
+from pathlib import Path
 
 from studyrunner.kinds.task import solver_digest
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import format_study
+from studyrunner.user_error import UserError
 
 PACKAGES = ("fretwear", "numpy", "scipy", "numba", "xarray", "netCDF4", "h5py", "pydantic")
 
 POINTS_LEFT = "points_not_computed"
 """Attribute of a result file: number of points that are not computed, 0 in a finished result."""
 
+NOW = "now"
+"""Stands for the time at which the run begins."""
+
+CHANGED = " with local changes"
+"""End of the text of a commit with changed files."""
+
+_SECONDS_FOR_GIT = 5.0
 _REFERENCE = (
     "Salles et al.: Dynamic analysis of fretting-wear in joint interface by a multiscale harmonic"
     " balance method coupled with explicit or implicit integration schemes"
@@ -85,3 +97,53 @@ def compare_with_archived(study: Study, scene_sha256: str) -> tuple[str, ...]:
     if study.archived is None:
         return ()
     return study.archived.differences(scene_sha256, solver_digest(), describe_versions())
+
+
+def check_date(text: str, place: str, key: str) -> str:
+    """A date, or date and time, in the extended form of ISO 8601, from any of its forms; or `NOW`.
+
+    place, key: where the input was given, for the message. Raises UserError where the text is neither.
+    """
+    if text == NOW:
+        return NOW
+    for kind in (date, datetime):
+        try:
+            return kind.fromisoformat(text).isoformat().replace("+00:00", "Z")
+        except ValueError:
+            continue
+    remedy = f'give a date of ISO 8601, as 2026-11-23 or 2026-11-23T14:05:00Z, or "{NOW}"'
+    raise UserError(place, key, text, remedy)
+
+
+def describe_time_and_commit(checked: str | None) -> dict[str, str]:
+    """Attributes that equal runs may differ in: the date, only on request, and the commit of the checkout that runs.
+
+    checked: date as `check_date` gives it, in UTC for `NOW`; None for none.
+    """
+    commit = commit_of(Path(__file__).parents[2])
+    found = {"software_commit": commit} if commit else {}
+    if checked == NOW:
+        checked = datetime.now(UTC).replace(microsecond=0, tzinfo=None).isoformat() + "Z"
+    return found if checked is None else {**found, "date_created": checked}
+
+
+def commit_of(folder: Path) -> str:
+    """Commit that is checked out in a folder, with `CHANGED` where files were changed; empty where unknown.
+
+    The commit of a folder inside a checkout, such as an environment, is unknown. By hand: `setuptools-scm` knows the
+    commit of the installation, not of the checkout that runs.
+    """
+    if not (folder / ".git").exists():
+        return ""
+    # a hook or an alias of the caller's own repository, whose variables are set, is not meant; nothing is written
+    clean = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
+    command = ["git", "-C", str(folder), "describe", "--always", "--exclude=*", "--abbrev=40", "--dirty"]
+    clean |= {"GIT_OPTIONAL_LOCKS": "0"}
+    try:
+        said = subprocess.check_output(
+            command, text=True, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=_SECONDS_FOR_GIT, env=clean
+        )
+    except (OSError, ValueError, subprocess.SubprocessError):
+        return ""
+    commit = said.strip()
+    return commit.removesuffix("-dirty") + CHANGED if commit.endswith("-dirty") else commit

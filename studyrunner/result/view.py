@@ -40,13 +40,13 @@ Point = Mapping[str, int]
 
 @dataclass(frozen=True)
 class Result(Points):
-    """A result file. A point is one combination of the axes; arrays of points have the shape of the axes.
+    """A result file.
 
-    dataset: read lazily. A variable that was read as a whole stays in memory. fixed: axes of which this holds one value
-    of several, and how many the file has. blocks: of a result of missions what belongs to single blocks; in `dataset`
-    missions then have the name of the cycles that they replace. chosen: values of axes of the point that figures of a
-    single point show. measured: a worn profile to compare with. again: what was computed anew of the worn joint of the
-    shown point, see `studyrunner.worn_joint`. no_worn_response: why its response curve is not among them.
+    dataset: read lazily; a variable that was read as a whole stays in memory. fixed: axes of which this holds one value
+    of several, and how many the file has. blocks: of missions what belongs to single blocks; in `dataset` missions then
+    have the name of cycles. chosen: values of axes of the point that figures of a single point show. measured: a worn
+    profile to compare with. again: what was computed anew of the worn joint of the shown point, see
+    `studyrunner.worn_joint`. no_worn_response: why its response curve is not among them.
     """
 
     path: Path
@@ -57,8 +57,6 @@ class Result(Points):
     measured: Profile | None = None
     again: Mapping[str, xr.Dataset] = field(default_factory=dict)
     no_worn_response: str = ""
-
-    # --- the file ---
 
     @cached_property
     def title(self) -> str:
@@ -112,8 +110,6 @@ class Result(Points):
             where["cycle"] = cycle
         return values.isel(where)
 
-    # --- counts of cycles ---
-
     @cached_property
     def cycles(self) -> NDArray[np.float64]:
         """Cycle counts that the file holds; where each point has its own those of the shown point."""
@@ -143,13 +139,10 @@ class Result(Points):
         reached = np.flatnonzero(np.isfinite(counts) & (counts <= last * (1.0 + 1e-9)))
         return int(reached[-1]) if reached.size and not self.has("cycle_count") else len(counts) - 1
 
-    # --- points ---
-
     def shown_point(self) -> dict[str, int]:
-        """The point that figures of a single point show.
+        """The point that figures of a single point show: of `best_known` the one with the largest final worn volume.
 
-        Of `best_known` the one with the largest final worn volume. Where nothing is worn, or the file has no wear, the
-        one with the largest response at the first kept cycle count. Other points count only where there is none.
+        Where nothing is worn the one with the largest response at first. Other points count only where there is none.
         """
         return dict(self._shown)
 
@@ -187,8 +180,8 @@ class Result(Points):
 
     @cached_property
     def course_axis(self) -> str | None:
-        """The axis that figures over frequency are drawn over: the frequency, or the first other axis of several
-        numbers where the file has one frequency only; None where nothing but words and samples varies.
+        """The axis that figures are drawn over: the frequency, or where it does not vary the first other axis of
+        several numbers; None where nothing but words and samples varies.
         """
         numbers = [name for name in self.varying if self.dataset[name].dtype.kind in "iuf" and name != SAMPLE]
         of_first_rank = [name for name in ("frequency", "modal_amplitude") if name in numbers]
@@ -219,10 +212,9 @@ def as_sentences(*parts: str) -> str:
 
 
 def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
-    """The dataset with missions as cycles and without what belongs to single blocks, and these variables.
+    """The dataset with missions as cycles and without what belongs to single blocks, and these variables or None.
 
-    Of a result without missions the dataset as it is, and None. Responses with a unit of their own in their name, as
-    root stress [MPa], are left out: the others are displacements, which share a scale.
+    Responses with a unit of their own in their name, as root stress [MPa], are left out: the others share a scale.
     """
     if "response" in dataset.coords:
         own = np.char.endswith(dataset["response"].values.astype(str), "]")
@@ -241,10 +233,10 @@ def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
 
 
 def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None, measured: Path | None = None) -> Result:
-    """Open a result file as the report reads it; variables are read when they are needed.
+    """Open a result file as the report reads it.
 
     chosen: values of axes, as text, of the point that figures of a single point show. measured: CSV file of a worn
-    profile. Raises UserError where there is no such file, it is no result of `run-study`, or it has no such point.
+    profile. Raises UserError where it is no result of `run-study`, or has no such point.
     """
     profile = None if measured is None else read_profile(measured)
     dataset, blocks = as_history(open_known(path))

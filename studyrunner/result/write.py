@@ -21,14 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.checkpoint.records import variable_sizes
+from studyrunner.checkpoint.completion_index import CompletionIndex, variable_sizes
 from studyrunner.checkpoint.store import RESULTS
 from studyrunner.result.arrays import SmallArray, attributes
 from studyrunner.result.provenance import POINTS_LEFT
-from studyrunner.result.scene_group import write_scene_group
+from studyrunner.result.target import Target
 from studyrunner.scene.scene import KeptScene, SceneFacts
 from studyrunner.study.study import Study
+from studyrunner.study.study_of_result import SCENE_GROUP
 from studyrunner.system.files import find_fault, replacing
 from studyrunner.user_error import StorageError
 from studyrunner.variables import COUNTS, LOOPS, Variable
@@ -36,38 +36,60 @@ from studyrunner.variables import COUNTS, LOOPS, Variable
 _BYTES_A_SLAB = 16e6
 _BYTES_OF_CACHE = 2**16
 _KEY_TYPE = "S32"
+_COMPLEX = np.dtype([("r", "f8"), ("i", "f8")])
+_PACKED: Any = {"compression": "zlib", "complevel": 1, "shuffle": True}
+
+_OF_SCENE = {
+    "contact/dofs": "closing, first and second tangential relative displacement of each pair; -1 where there is none",
+    "contact/area": "weight of the pair, m2",
+    "contact/gap": "initial gap, m",
+    "contact/normal_load": "constant normal force of pairs without a closing displacement, N, compression positive",
+    "contact/friction_coefficient": "friction coefficient of the pair",
+    "contact/position": "position of the pair, m",
+    "contact/edge": "1 where the bodies go on beyond the pair without pairs, 0 elsewhere",
+    "contact/surface": "label of the surface of the pair",
+    "mass": "mass matrix, kg",
+    "damping": "viscous damping matrix, N s/m",
+    "stiffness": "stiffness matrix, N/m",
+    "load/static": "static load, N",
+    "load/harmonic": "harmonic load, N for an excitation amplitude of 1",
+    "response/dofs": "rows that give the responses from the displacements",
+    "response/names": "name of each response",
+    "mesh/x": "position of the node, x, m",
+    "mesh/y": "position of the node, y, m",
+    "mesh/z": "position of the node, z, m",
+    "mesh/quad": "nodes of the outer face, anticlockwise from outside",
+    "mesh/part": "part that the face belongs to",
+}
 
 Region = tuple[slice, ...]
-Slab = tuple[Region, NDArray[np.void]]
 
 
 def write_result(
     study: Study,
     facts: SceneFacts,
     completion: CompletionIndex,
-    path: Path,
+    target: Target,
     arrays: Sequence[SmallArray],
     origin: Mapping[str, object],
     scene: KeptScene | None = None,
-    *,
-    keep_finished: bool = False,
 ) -> Counter[int]:
     """Writes the result of a study: axes in the order of the study, then cycle or mission, then others.
 
-    Points that are not computed yet have the outcome `not_computed`. completion: the finished histories. path: is
-    replaced as a whole or not at all. arrays: coordinates, and variables that no task computes. origin: attributes of
-    the file. scene: contents of its group. keep_finished: whether `path` holds a finished result, which is kept where
-    points of the new one are missing. Returns the number of points of each outcome. Raises StorageError.
+    Points that are not computed yet have the outcome `not_computed`; with such points a finished result stays.
+    completion: the finished histories. target: is replaced as a whole or not at all. arrays: coordinates, and variables
+    that no task computes. origin: attributes of the file. scene: contents of its group. Returns the number of points of
+    each outcome. Raises StorageError.
     """
     shape = tuple(len(values) for values in study.dimensions.values())
     slab = _slab_shape(shape, completion.kind.itemsize)
     keys, outcomes = _keys(shape, completion), Counter[int]()
-    if keep_finished and not keys.all():
+    if target.finished and not keys.all():
         for _, records in _slabs(shape, slab, completion, keys):
             outcomes.update(records["outcome"].tolist())
         return outcomes
     try:
-        with replacing(path) as temporary, _writing(temporary) as file:
+        with replacing(target.path) as temporary, _writing(temporary) as file:
             file.setncatts(origin)
             variables = _create_all(file, study, facts, slab, arrays)
             for region, records in _slabs(shape, slab, completion, keys):
@@ -75,11 +97,11 @@ def write_result(
                 outcomes.update(records["outcome"].tolist())
             file.setncattr(POINTS_LEFT, np.int32(outcomes[Outcome.NOT_COMPUTED]))
             for array in arrays:
-                _write_array(file, study, slab, array)
+                _write_array(file, shape, slab, array)
             if scene is not None:
-                write_scene_group(file, scene)
+                _write_scene(file.createGroup(SCENE_GROUP), scene)
     except OSError as error:
-        raise StorageError(path, error) from error
+        raise StorageError(target.path, error) from error
     return outcomes
 
 
@@ -105,6 +127,42 @@ def _keys(shape: Sequence[int], completion: CompletionIndex) -> NDArray[np.bytes
             if key in there:
                 keys[np.ravel_multi_index(np.transpose(task.points(place)), shape)] = key.encode()
     return keys
+
+
+def _slab_shape(shape: Sequence[int], bytes_a_point: int) -> tuple[int, ...]:
+    """Points along each axis that are written at once and make a compressed chunk."""
+    left = max(1, int(_BYTES_A_SLAB // bytes_a_point))
+    lengths = []
+    for size in reversed(shape):
+        lengths.append(min(size, left))
+        # Points that are next to each other in the file: an axis that does not fit ends the slab.
+        left = left // size if left >= size else 1
+    return tuple(reversed(lengths))
+
+
+def _regions(shape: Sequence[int], slab: Sequence[int]) -> Iterator[Region]:
+    """Regions of the axes, in the order of the file."""
+    for corner in itertools.product(*(range(0, size, length) for size, length in zip(shape, slab, strict=True))):
+        yield tuple(
+            slice(start, min(start + length, size)) for start, length, size in zip(corner, slab, shape, strict=True)
+        )
+
+
+def _slabs(
+    shape: Sequence[int], slab: Sequence[int], completion: CompletionIndex, keys: NDArray[np.bytes_]
+) -> Iterator[tuple[Region, NDArray[np.void]]]:
+    """Regions of the axes, each with the records of its points. Raises StorageError."""
+    first = 0
+    for region in _regions(shape, slab):
+        last = first + math.prod(at.stop - at.start for at in region)
+        names = keys[first:last]
+        records, there = completion.read_results([name.decode() for name in names.tolist()])
+        if not (there | (names == b"")).all():
+            raise StorageError(completion.store.path, ValueError("a result is damaged"), "give the command again")
+        records["outcome"][~there] = Outcome.NOT_COMPUTED
+        yield region, records
+        del records
+        first = last
 
 
 def _create_all(
@@ -147,8 +205,7 @@ def _create(
         variable = file.createVariable(name, str, dimensions)
     else:
         fill = math.nan if entry.dtype.startswith("float") else None
-        options: Any = {"compression": "zlib", "complevel": 1, "shuffle": True, "chunksizes": chunks}
-        variable = file.createVariable(name, entry.dtype, dimensions, fill_value=fill, **options)
+        variable = file.createVariable(name, entry.dtype, dimensions, fill_value=fill, chunksizes=chunks, **_PACKED)
         # a chunk is written once and not looked at again, where the library would keep megabytes of each variable
         variable.set_var_chunk_cache(size=_BYTES_OF_CACHE, nelems=1)
     variable.setncatts(attributes(name, entry, of_modes))
@@ -173,51 +230,13 @@ def _write_slab(
             file[name][(*region, slice(None), pair)] = values[..., place, :, :]
 
 
-def _slab_shape(shape: Sequence[int], bytes_a_point: int) -> tuple[int, ...]:
-    """Points along each axis that are written at once and make a compressed chunk."""
-    left = max(1, int(_BYTES_A_SLAB // bytes_a_point))
-    lengths = []
-    for size in reversed(shape):
-        lengths.append(min(size, left))
-        # Points that are next to each other in the file: an axis that does not fit ends the slab.
-        left = left // size if left >= size else 1
-    return tuple(reversed(lengths))
-
-
-def _regions(shape: Sequence[int], slab: Sequence[int]) -> Iterator[Region]:
-    """Regions of the axes, in the order of the file."""
-    starts = (range(0, size, length) for size, length in zip(shape, slab, strict=True))
-    for corner in itertools.product(*starts):
-        yield tuple(
-            slice(start, min(start + length, size)) for start, length, size in zip(corner, slab, shape, strict=True)
-        )
-
-
-def _slabs(
-    shape: Sequence[int], slab: Sequence[int], completion: CompletionIndex, keys: NDArray[np.bytes_]
-) -> Iterator[Slab]:
-    """Regions of the axes, each with the records of its points. Raises StorageError."""
-    first = 0
-    for region in _regions(shape, slab):
-        last = first + math.prod(at.stop - at.start for at in region)
-        names = keys[first:last]
-        records, there = completion.read_results([name.decode() for name in names.tolist()])
-        if not (there | (names == b"")).all():
-            raise StorageError(completion.store.path, ValueError("a result is damaged"), "give the command again")
-        records["outcome"][~there] = Outcome.NOT_COMPUTED
-        yield region, records
-        del records
-        first = last
-
-
-def _write_array(file: netCDF4.Dataset, study: Study, slab: Sequence[int], array: SmallArray) -> None:
-    """Writes a coordinate or another small array; an exact answer, with the axes of the study, in slabs."""
+def _write_array(file: netCDF4.Dataset, shape: Sequence[int], slab: Sequence[int], array: SmallArray) -> None:
+    """Writes a coordinate or another small array; one with the axes of the study in slabs."""
     values = array.values
     for dimension, size in zip(array.dimensions, values.shape, strict=True):
         if dimension not in file.dimensions:
             file.createDimension(dimension, size)
     if array.over_axes:
-        shape = tuple(len(axis) for axis in study.dimensions.values())
         own = values.shape[len(shape) :]
         variable = _create(file, array.name, array.entry, array.dimensions, (*slab, *own))
         values = np.broadcast_to(values, (*shape, *own))
@@ -228,3 +247,26 @@ def _write_array(file: netCDF4.Dataset, study: Study, slab: Sequence[int], array
     variable = file.createVariable(array.name, str if is_text else values.dtype, array.dimensions)
     variable.setncatts(attributes(array.name, array.entry))
     variable[:] = values.astype(object) if is_text else values
+
+
+def _write_scene(root: netCDF4.Group, scene: KeptScene) -> None:
+    """Writes the group with the contents of a scene file, under the same names; complex numbers are pairs {r, i}."""
+    root.setncattr("comment", "The reduced model that the study was computed with, in the layout of scene files.")
+    root.setncatts({name: np.int64(value) for name, value in scene.attributes.items()})
+    pair: Any = None
+    for key, values in scene.datasets:
+        *groups, name = key.split("/")
+        group = root.createGroup("/".join(groups)) if groups else root
+        dimensions = tuple(f"length_{length}" for length in values.shape)  # a scene file has no names
+        for dimension, length in zip(dimensions, values.shape, strict=True):
+            if dimension not in root.dimensions:
+                root.createDimension(dimension, length)
+        kind: Any = values.dtype
+        if kind.kind == "U":
+            kind, values = str, values.astype(object)
+        elif kind.kind == "c":
+            pair = pair or root.createCompoundType(_COMPLEX, "complex")
+            kind, values = pair, np.ascontiguousarray(values, np.complex128).view(_COMPLEX)
+        variable = group.createVariable(name, kind, dimensions, fill_value=False, **({} if kind is str else _PACKED))
+        variable.setncattr("long_name", _OF_SCENE[key.split("/", 2)[-1] if key.startswith("nd/") else key])
+        variable[:] = values

@@ -14,7 +14,7 @@ from studies.scene_answers import NaturalFrequencies
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, scene_frequencies, scene_has
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
-from studyrunner.system.source_digest import package_digest
+from studyrunner.system.machine import package_digest
 
 if TYPE_CHECKING:
     from solver.model import ReducedModel

@@ -15,8 +15,7 @@ from studyrunner.study.mission import MissionBlock
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.sections import SECTIONS, SOLVER_AXES, StudySection
-from studyrunner.study.toml_text import toml_value
-from studyrunner.user_error import UserError
+from studyrunner.user_error import UserError, toml_value
 from studyrunner.values import Section
 
 Given = dict[str, tuple[object, str]]
@@ -137,7 +136,9 @@ def _keys(table: str, kind: type[Section]) -> Iterator[tuple[str, str, str]]:
         value = None if field.is_required() else field.default
         if table in ("axes", "solver") and isinstance(value, tuple):
             value = value[0]
-        words = "".join(f'"{each}", ' for each in _words(field.annotation)).removesuffix(", ")
+        words = ", ".join(f'"{each}"' for each in _words(field.annotation))
+        if words and _is_number(field.annotation):
+            words = f"a number, or {words}"
         if field.description:
             default = "" if value is None else toml_value(value)
             yield key, default, f"{words}: {field.description}" if words else field.description
@@ -147,6 +148,10 @@ def _words(annotation: object) -> list[str]:
     if get_origin(annotation) is Literal:
         return [each for each in get_args(annotation) if isinstance(each, str)]
     return [word for each in get_args(annotation) for word in _words(each)]
+
+
+def _is_number(annotation: object) -> bool:
+    return annotation in (int, float) or any(map(_is_number, get_args(annotation)))
 
 
 if __name__ == "__main__":

@@ -117,7 +117,7 @@ def read_blocks(
 
 def _read_block(table: Mapping[str, Any], place: str, scene: type[BaseModel], found: Mistakes) -> MissionBlock:
     """A block; its parameters are looked at with those of the scene. Raises UserError."""
-    of_scene = [name for name in scene.model_fields if name not in _NO_KEYS]
+    of_scene = {name: name for name in scene.model_fields if name not in _NO_KEYS}
     own: dict[str, Any] = {"begin": "sweep"} if isinstance(table.get("frequency"), dict) else {}
     parameters = {}
     for key, value in table.items():

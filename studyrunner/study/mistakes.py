@@ -64,16 +64,21 @@ def scene_errors(source: str, path: Path | None) -> Iterator[None]:
     try:
         yield
     except SceneError as error:
-        prefix = "" if path is not None else "outputs." if error.key == "variables" else "scene."
-        raise UserError(place, prefix + error.key, Verbatim(error.value), error.remedy) from None
+        table = "" if path is not None else "outputs." if error.key == "variables" else "scene."
+        raise UserError(place, table + error.key, Verbatim(error.value), error.remedy) from None
     except OSError as error:
         raise UserError(place, "the scene file", None, f"give a file that can be read: {error.strerror}") from None
 
 
 def check_table(
-    kind: type[Checked], table: Mapping[str, object], source: str, prefix: str, others: Sequence[str] = ()
+    kind: type[Checked],
+    table: Mapping[str, object],
+    source: str,
+    prefix: str,
+    others: Mapping[str, str] | None = None,
 ) -> Checked:
-    """`kind` from the table, whose keys stand under `prefix`. others: known keys that are looked at elsewhere.
+    """`kind` from the table, whose keys stand under `prefix`. others: keys that are looked at elsewhere, and their
+    names there: a key itself where it stands in this table, "axes.step" in another one.
 
     Raises UserError with all that is wrong in the table.
     """
@@ -84,7 +89,7 @@ def check_table(
         checked = kind.model_validate(table, strict=None if issubclass(kind, Section) else True)
         wrong = checked.rules() if isinstance(checked, Section) else wrong
     except ValidationError as error:
-        wrong = _wrong_keys(error, kind, table, others)
+        wrong = _wrong_keys(error, kind, table, others or {})
     for key, value, remedy in wrong:
         found.add(f"{prefix}.{key}" if key else prefix, value, remedy)
     found.raise_any()
@@ -92,7 +97,7 @@ def check_table(
 
 
 def _wrong_keys(
-    error: ValidationError, kind: type[BaseModel], table: Mapping[str, object], others: Sequence[str]
+    error: ValidationError, kind: type[BaseModel], table: Mapping[str, object], others: Mapping[str, str]
 ) -> Iterator[Wrong]:
     """What is wrong in a table, once for each key; the keys are those below the table."""
     of_keys: dict[str, list[dict[str, Any]]] = {}
@@ -111,7 +116,7 @@ def _wrong_keys(
             yield _wrong(kind, key, [each for each in found if len(each["loc"]) == deepest], others)
 
 
-def _wrong(kind: type[BaseModel], key: str, found: Sequence[Mapping[str, Any]], others: Sequence[str]) -> Wrong:
+def _wrong(kind: type[BaseModel], key: str, found: Sequence[Mapping[str, Any]], others: Mapping[str, str]) -> Wrong:
     details, names = found[0], found[0]["names"]
     # a key without a description of its own is part of one with a description
     described = [_fields(kind, names[:depth]).get(each) for depth, each in enumerate(names)]
@@ -182,9 +187,14 @@ def tables_in(annotation: object) -> list[type[BaseModel]]:
     return [found for each in get_args(annotation) for found in tables_in(each)]
 
 
-def _nearest(kind: type[BaseModel], names: Sequence[str], others: Sequence[str]) -> str:
+def _nearest(kind: type[BaseModel], names: Sequence[str], others: Mapping[str, str]) -> str:
     """What is meant by an unknown key, the last of the names; the others are those of the tables around it."""
-    return nearest_name(names[-1], [*_fields(kind, names[:-1]), *(others if len(names) == 1 else ())])
+    known = [*_fields(kind, names[:-1])]
+    if len(names) > 1:
+        return nearest_name(names[-1], known)
+    known += [name for name, shown in others.items() if name == shown]
+    elsewhere = close_name(names[-1], list(others)) if not close_name(names[-1], known) else ""
+    return others.get(elsewhere) or nearest_name(names[-1], known)
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:

@@ -1,10 +1,11 @@
 """A study in parts that have one scene and one sample each: along the axes that are keys of [scene] or [wear], and
-along the samples of [scatter].
+along the samples of [scatter]; and how wide the scene of a part has to be for what it wears.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -12,16 +13,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel
 
+from studies.scenes import scene_with_room
+from studies.scenes.half_space import ExpectedWear
 from studyrunner.scatter.draws import Drawn, ScatteredPairs, drawn
 from studyrunner.scatter.section import OF_PAIRS, Scattered
-from studyrunner.study.kinds import NUMBERS
 from studyrunner.study.mission import MissionBlock
-from studyrunner.study.room_for_wear import with_room_for_wear
-from studyrunner.study.study import Study
+from studyrunner.study.study import NUMBERS, Study
 from studyrunner.user_error import UserError, WrongValueError
 
 _NO_PAIRS = ScatteredPairs(("",), np.zeros((1, 3)))
 """Stands for the pairs where inputs are drawn that do not belong to pairs."""
+
+_FAR = 3.1
+"""Standard deviations of each input up to which a scene has room for the wear of its samples: 999 of 1000 lie below.
+
+The largest of the samples themselves would give another scene, and other results, to each number of samples."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +49,9 @@ def realise(study: Study) -> tuple[Realisation, ...]:
     sample draws a value that is none.
     """
     places = itertools.product(*(range(len(axis.values)) for axis in study.scene_axes))
-    variants = zip(study.variants or (study,), places, strict=True)
     return tuple(
         Realisation(part, (*place, *([] if study.scatter is None else [sample])))
-        for variant, place in variants
+        for variant, place in zip(study.variants or (study,), places, strict=True)
         for sample, part in enumerate(_samples(variant))
     )
 
@@ -158,3 +163,65 @@ def _with_parameters(study: Study, values: Mapping[str, float]) -> BaseModel:
         name = next((each for each in values if each in str(error)), next(iter(values)))
         remedy = "give less width: a sample draws a value that the scene cannot have"
         raise UserError(study.source, f"scatter.{name}", values[name], remedy) from None
+
+
+def with_room_for_wear(study: Study) -> Study:
+    """The study with a scene that has room for what it wears; the same where its scene needs none, or says itself.
+
+    Of a study with samples the scene has room for nearly all of them. Where parameters of the scene scatter, each
+    sample has a scene of its own (`realise`); the study is then the same. Blocks of a mission have room for the wear of
+    all of them, in equal pairs.
+    """
+    scene = study.scene
+    if study.mission:
+        return _with_room_in_blocks(study)
+    own_scenes = study.scatter is not None and study.scatter.inputs.keys() & dict(scene.parameters).keys()
+    # what a result file holds was built with the parameters that stand beside it
+    if own_scenes or not scene.is_bundled or scene.path is not None:
+        return study
+    return _with_parameters_of_scene(study, scene_with_room(scene.model, scene.parameters, expected_wear(study)))
+
+
+def _with_parameters_of_scene(study: Study, parameters: BaseModel) -> Study:
+    return study.model_copy(update={"scene": study.scene.model_copy(update={"parameters": parameters})})
+
+
+def _with_room_in_blocks(study: Study) -> Study:
+    cycles = study.cycles_kept[-1] * sum(
+        block.cycles_at(max(of_block.axes.frequency))
+        for block, of_block in zip(study.mission, study.block_studies, strict=True)
+    )
+    ends = {"cycles": cycles, "until": study.slow_time.until}
+    wearing = [
+        with_room_for_wear(each.model_copy(update={"slow_time": each.slow_time.model_copy(update=ends)}))
+        for each in study.block_studies
+    ]
+    parameters = [each.scene.parameters for each in wearing]
+    widths = [width for each in parameters if isinstance(width := dict(each).get("half_width"), float)]
+    if len(set(widths)) > 1:
+        parameters = [each.model_copy(update={"half_width": max(widths)}) for each in parameters]
+    found = tuple(map(_with_parameters_of_scene, wearing, parameters))
+    return study.model_copy(update={"block_studies": found})
+
+
+def expected_wear(study: Study) -> ExpectedWear:
+    """The most that any of its points wears, of samples up to `_FAR`."""
+
+    def largest(name: str, own: float) -> float:
+        scattered = None if study.scatter is None else study.scatter.inputs.get(name)
+        return own if scattered is None else float(scattered.distribution.at(np.array(own), np.array(_FAR)))
+
+    law, until = study.wear_law, study.slow_time.until or {}
+    factor = sum(largest(f"surfaces_{label}", value) for label, value in law.surfaces) if law.surfaces else 1.0
+    if law.name == "energy":
+        factor *= study.friction_coefficient or 0.0
+    if law.table is not None:
+        factor *= max(max(row) for row in law.table.factor)
+    cycles = math.inf if study.to_the_end else study.cycles_kept[-1]
+    wear = largest("wear_coefficient", max(study.axes.wear_coefficient)) * factor
+    return ExpectedWear(
+        amplitude=largest("excitation_amplitude", max(study.axes.excitation_amplitude)),
+        per_slip_work=wear * cycles if wear > 0.0 else 0.0,
+        volume=until.get("worn_volume", math.inf),
+        depth=until.get("wear_depth", math.inf),
+    )

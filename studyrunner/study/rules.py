@@ -11,11 +11,10 @@ from typing import Any, get_args
 from solver.settings import FIRST_HARMONICS
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter.section import OF_PAIRS
-from studyrunner.study.kinds import MISSIONS, MODES, NUMBERS, WEAR
 from studyrunner.study.mistakes import Mistakes, nearest_name
 from studyrunner.study.realisation import is_of_pairs
 from studyrunner.study.sections import AUTO, DEFAULT, SOLVER_AXES
-from studyrunner.study.study import Study
+from studyrunner.study.study import MISSIONS, MODES, NUMBERS, WEAR, Study
 from studyrunner.values import Wrong
 from studyrunner.variables import KEPT
 
@@ -24,7 +23,7 @@ _MOST_POINTS = 1_000_000
 
 def check_rules(study: Study, found: Mistakes, *, complete: bool) -> None:
     """Notes what breaks a rule. complete: whether the study has all tables; it has none that are wrong themselves."""
-    for rule in (_kind, _slow_time, _frequency, _variables, size_of_result, _solver, _end, wrong_scatter):
+    for rule in (_kind, _frequency, _variables, size_of_result, _solver, _end, wrong_scatter):
         try:
             for wrong in rule(study):
                 found.add(*wrong)
@@ -34,7 +33,7 @@ def check_rules(study: Study, found: Mistakes, *, complete: bool) -> None:
 
 
 def _kind(study: Study) -> Iterator[Wrong]:
-    """Keys have a use in a study of this kind."""
+    """Keys have a use in a study of this kind; missions are counted where there are blocks."""
     kind, axes = study.kind, study.axes
     for name, keys in kind.unused.items():
         table = getattr(study, name)
@@ -44,17 +43,12 @@ def _kind(study: Study) -> Iterator[Wrong]:
     if kind is MODES and "ramp" in axes.sweep:
         yield Wrong("axes.sweep", "ramp", 'give "up" or "down": the modal amplitude is raised or lowered')
     if kind is not MODES and axes.mode != (1,):
-        remedy = "give axes.modal_amplitude as well: mode is that of a nonlinear mode"
-        yield Wrong("axes.mode", axes.mode, remedy)
-
-
-def _slow_time(study: Study) -> Iterator[Wrong]:
-    """Missions are counted where there are blocks."""
+        yield Wrong("axes.mode", axes.mode, "give axes.modal_amplitude as well: mode is that of a nonlinear mode")
     missions = study.slow_time.missions
-    if study.kind is MISSIONS and missions is None:
+    if kind is MISSIONS and missions is None:
         remedy = "missing: give the number of missions, how often the blocks are repeated"
         yield Wrong("slow_time.missions", None, remedy)
-    elif study.kind is WEAR and missions is not None:
+    elif kind is WEAR and missions is not None:
         remedy = "give blocks under [[mission]], which are repeated so often, or slow_time.cycles in its place"
         yield Wrong("slow_time.missions", missions, remedy)
 
@@ -67,10 +61,10 @@ def _frequency(study: Study) -> Iterator[Wrong]:
         yield Wrong("axes.frequency", None, "missing: give it, in Hz, or frequency_ratio")
     if len(given) > 1:
         yield Wrong("axes.frequency", frequency, "leave it out, or frequency_ratio: give one of both")
-    if word is None and study.loading is not None:
-        remedy = 'leave it out, or give axes.frequency = "resonance" or "peak", which is followed in this range'
-        yield Wrong("loading", study.loading.model_dump(), remedy)
     if word is None:
+        if study.loading is not None:
+            remedy = 'leave it out, or give axes.frequency = "resonance" or "peak", which is followed in this range'
+            yield Wrong("loading", study.loading.model_dump(), remedy)
         return
     followed = f'axes.frequency = "{word}" changes'
     if study.kind is MISSIONS:
@@ -107,7 +101,8 @@ def size_of_result(study: Study) -> Iterator[Wrong]:
 
 def _variables(study: Study) -> Iterator[Wrong]:
     """Variables are of the kind of study and of the scene."""
-    known = dict.fromkeys((*study.variables, *(name for name in SCENE if name != "exact" or study.kind is WEAR)))
+    of_scene = (name for name in SCENE if name != "exact" or study.kind is WEAR)
+    known = dict.fromkeys((*study.kind.asked, *of_scene))
     for name in study.outputs.variables:
         if name not in (DEFAULT, *KEPT, *known):
             remedy = f"give names out of {', '.join(known)}: {study.kind.name} do not have it"
@@ -140,15 +135,16 @@ def _solver(study: Study) -> Iterator[Wrong]:
 
 def _end(study: Study) -> Iterator[Wrong]:
     """Schemes and the end of the histories fit together."""
-    if study.to_the_end and "explicit" in study.axes.scheme:
+    schemes, slow_time = study.axes.scheme, study.slow_time
+    if study.to_the_end and "explicit" in schemes:
         remedy = 'give "adaptive" or "implicit": explicit steps cannot grow, as slow_time.cycles = inf asks for'
         yield Wrong("axes.scheme", "explicit", remedy)
-    if "final" in study.axes.scheme and not study.to_the_end:
+    if "final" in schemes and not study.to_the_end:
         remedy = 'give inf: the scheme "final" finds the state at which nothing wears any more'
-        yield Wrong("slow_time.cycles", study.slow_time.cycles, remedy)
-    if "final" in study.axes.scheme and study.slow_time.until is not None:
+        yield Wrong("slow_time.cycles", slow_time.cycles, remedy)
+    if "final" in schemes and slow_time.until is not None:
         remedy = 'leave it out: the scheme "final" has no way on which it could be reached'
-        yield Wrong("slow_time.until", study.slow_time.until, remedy)
+        yield Wrong("slow_time.until", slow_time.until, remedy)
 
 
 def wrong_scatter(study: Study) -> Iterator[Wrong]:
@@ -165,7 +161,8 @@ def wrong_scatter(study: Study) -> Iterator[Wrong]:
     floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
     known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *floats, *study.wear.numbers]
     for name, scattered in section.inputs.items():
-        key, given, absolute = f"scatter.{name}", scattered.distribution, scattered.distribution.is_absolute
+        key, absolute = f"scatter.{name}", scattered.distribution.is_absolute
+        shown = scattered.distribution.model_dump(exclude_none=True)
         if name not in known:
             yield Wrong(key, None, f"unknown input, give {nearest_name(name, known)}")
         if name == "frequency" and (_followed(study) or study.axes.frequency_ratio):
@@ -173,9 +170,8 @@ def wrong_scatter(study: Study) -> Iterator[Wrong]:
         several = name in NUMBERS and len(getattr(study.axes, name) or ()) > 1
         if absolute and (several or any(axis.name == name for axis in study.scene_axes)):
             remedy = f"give one value of axes.{name}, or a distribution around the study's own values, as {{std = ...}}"
-            yield Wrong(key, given.model_dump(exclude_none=True), remedy)
+            yield Wrong(key, shown, remedy)
         for block in study.mission:
             if block.gives(name) and (absolute or name == "frequency"):
                 other = "leave it out" if name == "frequency" else "give a distribution around own values"
-                remedy = f"{other}: the block {block.name} gives a {name} of its own"
-                yield Wrong(key, given.model_dump(exclude_none=True), remedy)
+                yield Wrong(key, shown, f"{other}: the block {block.name} gives a {name} of its own")

@@ -30,8 +30,7 @@ _UNITS |= {name: name for name in ("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N
 class SceneAxis:
     """An axis of a study whose values belong to a key of [scene] or [wear].
 
-    name: of the dimension. table, key: the key whose values these are. A second name in `key` is that of a surface or
-        of a key in a table.
+    name: of the dimension. table, key: the key; a second name in `key` is that of a surface or of a key in a table.
     values: in the order of the study file. units, meaning: as in the description of the key.
     """
 
@@ -96,9 +95,9 @@ def _wrong_place(table: Mapping[str, Any], name: str, key: Sequence[str], values
     """What is wrong with an axis of this key, where its table has the key, or no place for it."""
     first, dotted = table.get(key[0]), ".".join(key)
     inner = only_table(first)
-    if first is not None and (len(key) == 1 or not isinstance(inner, Mapping) or key[1] in inner):
-        given = inner[key[1]] if len(key) > 1 and isinstance(inner, Mapping) else first
-        where = dotted if given is not first else key[0]
+    in_table = len(key) > 1 and isinstance(inner, Mapping)
+    if first is not None and not (in_table and key[1] not in inner):
+        where, given = (dotted, inner[key[1]]) if in_table else (key[0], first)
         return Wrong(f"{name}.{where}", given, f"give it once, here or as axes.{dotted}")
     if not "_".join(key).isidentifier():
         remedy = "give a surface whose name consists of letters, digits and _: a dimension has the name"
@@ -125,14 +124,13 @@ def combinations(tables: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> 
     for values in itertools.product(*(axis.values for axis in scene_axes)):
         changed = {**tables, "scene": dict(tables["scene"]), "wear": dict(tables["wear"])}
         for axis, value in zip(scene_axes, values, strict=True):
-            table, name = changed[axis.table], axis.key[0]
+            table, (name, *inner) = changed[axis.table], axis.key
             if name == "worn":
                 # one state of several
-                states = table["worn"]
-                depth = states["depth"][axis.values.index(value)]
-                table["worn"] = {"depth": [depth], "result": states.get("result", "")}
+                depth = table["worn"]["depth"][axis.values.index(value)]
+                table["worn"] = {"depth": [depth], "result": table["worn"].get("result", "")}
             else:
-                table[name] = value if len(axis.key) == 1 else _with(table.get(name, {}), axis.key[1], value)
+                table[name] = _with(table.get(name, {}), inner[0], value) if inner else value
         yield changed
 
 
@@ -155,8 +153,7 @@ def as_checked(scene_axes: Sequence[SceneAxis], study: Any) -> tuple[SceneAxis, 
     checked = []
     for axis in scene_axes:
         given = only_table(getattr(study.scene.parameters if axis.table == "scene" else study.wear, axis.key[0], None))
-        first = given if len(axis.key) == 1 else dict(given)[axis.key[1]]
-        is_float = isinstance(first, float)
+        is_float = isinstance(given if len(axis.key) == 1 else dict(given)[axis.key[1]], float)
         values = (float(each) if is_float and isinstance(each, int) else each for each in axis.values)
         checked.append(replace(axis, values=tuple(values)))
     return tuple(checked)

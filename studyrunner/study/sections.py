@@ -11,8 +11,6 @@ from pydantic import AfterValidator, BeforeValidator, Field
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.settings import TARGETS, Followed
 from studyrunner.coordinates import SCENE
-from studyrunner.mission_variables import OF_MISSIONS
-from studyrunner.mode_variables import OF_MODES
 from studyrunner.scatter.section import ScatterSection
 from studyrunner.study.mistakes import nearest_name
 from studyrunner.user_error import WrongValueError
@@ -35,7 +33,7 @@ from studyrunner.values import (
     listed,
     once,
 )
-from studyrunner.variables import ASKED, KEPT
+from studyrunner.variables import ASKED, KEPT, OF_MISSIONS, OF_MODES
 
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
@@ -94,7 +92,8 @@ class AxesSection(Section):
 
     frequency: _Frequencies = Field(
         cast("Any", None),
-        description="Hz; a word is followed in the range of [loading]; needed for wear histories, or frequency_ratio",
+        description="Hz; with a word the excitation follows this resonance in the range of [loading]; a study of wear"
+        " has frequency or frequency_ratio",
     )
     frequency_ratio: Axis[Positive] | None = Field(
         None, description="in place of frequency: over the first natural frequency of the same scene, all pairs stuck"
@@ -228,10 +227,8 @@ class SlowTimeSection(Section):
 class SolverSection(Section):
     """[solver]: resolution and accuracy. Several values of the first keys are an axis, as under [axes]."""
 
-    harmonics: Axis[Harmonics] = Field((AUTO,), description="or number of harmonics above the static one")
-    samples: Axis[Samples] = Field(
-        (AUTO,), description="or number of time samples in a period, more than twice the harmonics"
-    )
+    harmonics: Axis[Harmonics] = Field((AUTO,), description="harmonics above the static one")
+    samples: Axis[Samples] = Field((AUTO,), description="time samples in a period, more than twice the harmonics")
     tolerance: Axis[Fraction] = Field((1e-8,), description="of the scaled residual")
     rtol: Axis[Fraction] = Field((1e-2,), description="aim for the relative error of worn volume and response")
     shortcuts: bool = Field(True, description="whether points with the same history share one")
@@ -270,3 +267,6 @@ SECTIONS: dict[str, type[Section]] = {
     "scatter": ScatterSection,
     "loading": LoadingSection,
 }
+
+ELSEWHERE = {key: f"{table}.{key}" for table, kind in reversed(SECTIONS.items()) for key in kind.model_fields}
+"""Where a key stands that is not known in another table."""

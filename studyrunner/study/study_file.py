@@ -13,11 +13,10 @@ from pydantic import BaseModel
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.scatter.section import flat_table
-from studyrunner.study.kinds import MODES
 from studyrunner.study.mission import OWN_AXES, MissionBlock, check_used_axes, engine_frequency, read_blocks
 from studyrunner.study.mistakes import Mistakes, check_table, close_name, nearest_name
 from studyrunner.study.overrides import override
-from studyrunner.study.room_for_wear import with_room_for_wear
+from studyrunner.study.realisation import with_room_for_wear
 from studyrunner.study.rules import check_rules, size_of_result, wrong_scatter
 from studyrunner.study.scene_axes import (
     SceneAxis,
@@ -28,9 +27,10 @@ from studyrunner.study.scene_axes import (
     scene_with_axes,
     take_scene_axes,
 )
-from studyrunner.study.scene_section import Origin, check_scene, parameters_of
+from studyrunner.study.scene_section import WORN_AXIS, Origin, check_scene, parameters_of, read_worn, worn_axis
 from studyrunner.study.sections import (
     DEFAULT,
+    ELSEWHERE,
     SECTIONS,
     SOLVER_AXES,
     VARIABLES,
@@ -38,11 +38,9 @@ from studyrunner.study.sections import (
     SlowTimeSection,
     WearSection,
 )
-from studyrunner.study.study import Study
+from studyrunner.study.study import MODES, Study
 from studyrunner.study.study_of_result import read_archived
 from studyrunner.study.toml_text import format_toml, read_toml, read_toml_file
-from studyrunner.study.worn import AXIS as WORN_AXIS
-from studyrunner.study.worn import read_worn, worn_axis
 from studyrunner.user_error import UserError
 from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
@@ -111,8 +109,12 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     found = Mistakes(origin.source)
     tables = _known_tables(table, found)
     _take_worn(tables, origin, found)
-    axes, blocks = _axes_and_blocks(tables, origin, found)
-    sections = _check_sections(tables, origin, found)
+    try:
+        scene = parameters_of(tables["scene"].get("model"), origin.source)
+    except UserError:
+        scene = None  # a mistake where the scene is checked
+    axes, blocks = _axes_and_blocks(tables, scene, found)
+    sections = _check_sections(tables, scene, found)
     if blocks or "mission" not in tables:
         sections["mission"] = blocks
     parts, renamed = [], keys_below_axes(axes)
@@ -166,44 +168,39 @@ def _take_worn(tables: Tables, origin: Origin, found: Mistakes) -> None:
             found.add("scene.worn.cycle", None, remedy)
 
 
-def _scene_kind(tables: Tables, origin: Origin) -> type[BaseModel] | None:
-    """What [scene] consists of; None where its model is wrong, which is a mistake where the scene is checked."""
-    try:
-        return parameters_of(tables["scene"].get("model"), origin.source)
-    except UserError:
-        return None
-
-
 def _axes_and_blocks(
-    tables: Tables, origin: Origin, found: Mistakes
+    tables: Tables, scene: type[BaseModel] | None, found: Mistakes
 ) -> tuple[tuple[SceneAxis, ...], tuple[MissionBlock, ...]]:
-    """Axes that are keys of [scene] or [wear], taken out of the tables, and the blocks of a study of missions."""
-    kind = _scene_kind(tables, origin)
-    if kind is None:
+    """Axes that are keys of [scene] or [wear], taken out of the tables, and the blocks of a study of missions.
+
+    scene: what [scene] consists of; None where its model is wrong.
+    """
+    if scene is None:
         # of other names, which may be keys of the scene, nothing is known
         for name in [name for name in tables["axes"] if not close_name(name, [*AxesSection.model_fields])]:
             del tables["axes"][name]
         return (), ()
     own = [name for name in tables["axes"] if name in OWN_AXES]
-    axes = take_scene_axes(tables, kind, found)
+    axes = take_scene_axes(tables, scene, found)
     blocks: tuple[MissionBlock, ...] = ()
     if "mission" in tables:
-        blocks = read_blocks(tables["mission"], tables["axes"], kind, found)
+        blocks = read_blocks(tables["mission"], tables["axes"], scene, found)
         check_used_axes([*own, *(axis.name for axis in axes)], blocks, found)
     name = "cycle" if "modal_amplitude" in tables["axes"] else WORN_AXIS
     return (*axes, *worn_axis(tables["scene"].get("worn", {}), name)), blocks
 
 
-def _check_sections(tables: Tables, origin: Origin, found: Mistakes) -> dict[str, Any]:
+def _check_sections(tables: Tables, scene: type[BaseModel] | None, found: Mistakes) -> dict[str, Any]:
     """The tables but [scene] and [wear], which differ along axes: those that are right."""
+    sections: dict[str, Any] = {}
     if any(each in FOLLOWED for each in listed(tables["axes"].get("frequency"))):
         tables.setdefault("loading", {})
-    scene, sections = _scene_kind(tables, origin), {}
     for name, kind in SECTIONS.items():
         if name in tables and name not in found and name != "wear":
-            others = (*scene.model_fields, *WearSection.AXES) if scene and name == "axes" else ()
+            of_parts = (*scene.model_fields, *WearSection.AXES) if scene and name == "axes" else ()
+            others = {**ELSEWHERE, **{key: key for key in of_parts}}
             with found.collecting():
-                sections[name] = check_table(kind, tables[name], origin.source, name, others)
+                sections[name] = check_table(kind, tables[name], found.source, name, others)
     return sections
 
 
@@ -219,9 +216,9 @@ def _check_part(tables: Tables, sections: Mapping[str, Any], origin: Origin, bef
     with found.collecting():
         parts["wear"] = check_table(WearSection, tables["wear"], origin.source, "wear")
     study = Study.model_construct(**parts, source=origin.source, folder=origin.path.parent, archived=origin.archived)
+    # a rule that asks for a table that is wrong is left out
     wrong = [name for name in (*tables, "mission") if name not in parts]
     for name in wrong:
-        # a rule that asks for it is left out
         vars(study).pop(name, None)
     check_rules(study, found, complete=not wrong)
     if sections.get("mission") and "axes" in parts:

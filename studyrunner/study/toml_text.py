@@ -5,17 +5,13 @@ By hand: `tomli_w` gives each value of a list a line of its own, and axes have u
 
 from __future__ import annotations
 
-import json
-import math
-import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from studyrunner.user_error import UserError
+from studyrunner.user_error import UserError, toml_key, toml_value
 
-_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _LARGEST = 5 * 2**19  # bytes: an axis of 100 000 values
 
 
@@ -58,20 +54,5 @@ def format_toml(tables: Mapping[str, Any]) -> str:
     for name, section in tables.items():
         for table in section if isinstance(section, list | tuple) else [section] if section else []:
             lines.append(f"[[{name}]]" if table is not section else f"[{name}]")
-            lines += [f"{_key(key)} = {toml_value(value)}" for key, value in table.items() if value is not None]
+            lines += [f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items() if value is not None]
     return "\n".join(lines) + "\n"
-
-
-def _key(key: str) -> str:
-    """A key, in quotes where it is no bare one: labels of surfaces are any text."""
-    return key if _BARE_KEY.fullmatch(key) else json.dumps(key, ensure_ascii=False)
-
-
-def toml_value(value: object) -> str:
-    """A value on one line, as TOML."""
-    if isinstance(value, dict):
-        items = (f"{_key(key)} = {toml_value(item)}" for key, item in value.items() if item is not None)
-        return "{" + ", ".join(items) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(toml_value(item) for item in value) + "]"
-    return "inf" if value == math.inf else json.dumps(value, ensure_ascii=False)

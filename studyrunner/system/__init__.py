@@ -1,1 +1,1 @@
-"""What the operating system does: files and their locks, streams, signals, faults of the machine."""
+"""What the operating system does: files, the process with its signals and streams, the machine, progress on stderr."""

@@ -1,4 +1,4 @@
-"""Files as a run opens them: no link is followed, nothing is waited for, and what is written can be put on the disk.
+"""Files as a run writes them: no link is followed, and what is written is put on the disk.
 
 A folder of results may hold anything: what somebody has put there, a link for one, is neither written through nor read.
 
@@ -7,11 +7,12 @@ By hand: `tempfile` and `os.replace` are used, but neither of them refuses links
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+import re
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -49,7 +50,17 @@ def new_partial(path: Path) -> Path:
     return path.with_name(f".{path.name}.{secrets.token_hex(6)}.partial")
 
 
-@contextmanager
+def remove_leftovers(path: Path) -> None:
+    """Removes the files of `new_partial` that killed runs have left beside `path`, where no other run is at work."""
+    name = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]*\.partial")
+    for found in path.parent.iterdir():
+        if name.fullmatch(found.name) and found.is_file() and not found.is_symlink():
+            # one that stays is no harm
+            with contextlib.suppress(OSError):
+                found.unlink()
+
+
+@contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Gives the name of an empty new file beside `path`, which takes its place at the end, whole and on the disk.
 
@@ -76,17 +87,3 @@ def find_fault(path: Path) -> OSError | None:
     except OSError as error:
         return error
     return None
-
-
-def leftovers(path: Path) -> list[Path]:
-    """What runs have left beside `path` that were killed while they wrote it, or are about to write it."""
-    begin, end = f".{path.name}.", ".partial"
-    return sorted(
-        found
-        for found in path.parent.iterdir()
-        if found.name.startswith(begin)
-        and found.name.endswith(end)
-        and set(found.name[len(begin) : -len(end)]) <= set("0123456789abcdef")
-        and found.is_file()
-        and not found.is_symlink()
-    )

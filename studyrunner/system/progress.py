@@ -1,7 +1,4 @@
-"""Progress of a run on stderr: a bar with the time left on a terminal, a plain line now and then elsewhere.
-
-By hand are the words alone: `rich` draws the bar.
-"""
+"""Progress of a run on stderr: a bar with the time left on a terminal, a plain line now and then elsewhere."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
@@ -21,10 +17,11 @@ FIRST_LINE = 2.0
 LONGEST_SILENCE = 30.0
 """Seconds between two plain lines, at most."""
 
-_GROWTH = 1.5
+_GROWTH = 0.5  # of the time since the start: later lines are rarer
 _SECONDS_A_PICTURE = 0.1
 _MOST_NAMED = 3
 _MOST_SHOWN = 0.99  # before every point is done
+_YEAR = 8766.0 * 3600.0  # s
 
 
 @dataclass(frozen=True)
@@ -41,28 +38,18 @@ class Standing:
     seconds_left: float
     running: tuple[str, ...]
 
-    def describe(self, share: float) -> str:
-        """Points and percent that are done, the time left, and what runs, in one line; share: that is shown."""
-        parts = [f"{self.n_done} of {count(self.n_points, 'point')}", f"{100.0 * share:.0f} %"]
-        if self.n_done < self.n_points:
-            parts.append(f"about {format_seconds(self.seconds_left)} left")
-        if self.running:
-            named = ", ".join(self.running[:_MOST_NAMED])
-            more = f" and {len(self.running) - _MOST_NAMED} more" if len(self.running) > _MOST_NAMED else ""
-            parts.append(f"running: {named}{more}")
-        return ", ".join(parts)
-
 
 class ProgressDisplay:
-    """What the user sees while a study runs. Only rank 0 has one."""
+    """What the user sees while a study runs. Only rank 0 has one. quiet: nothing is shown."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, quiet: bool = False) -> None:
         self._began = time.monotonic()
-        self._next_line = FIRST_LINE
-        self._next_picture = 0.0
+        self._quiet = quiet
+        self._next = FIRST_LINE  # seconds
         self._share = 0.0
-        self._bar = _new_bar() if sys.stderr.isatty() else None
+        self._bar = _new_bar() if sys.stderr.isatty() and not quiet else None
         if self._bar is not None:
+            self._next = 0.0
             self._bar_task = self._bar.add_task("", total=1.0)
 
     def __enter__(self) -> Self:
@@ -70,25 +57,16 @@ class ProgressDisplay:
             self._bar.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._bar is not None:
             self._bar.stop()
 
-    def say(self, doing: str) -> None:
-        """What is done from now on."""
-        if self._bar is None:
-            print(f"{self._clock()} {doing}", file=sys.stderr, flush=True)
-        else:
-            self._bar.update(self._bar_task, description=doing)
-
-    def note(self, happened: str) -> None:
-        """Something that the user has to know; what is done stays the same."""
-        if self._bar is None:
-            print(f"{self._clock()} {happened}", file=sys.stderr, flush=True)
-        else:
-            self._bar.console.print(happened)
+    def say(self, text: str) -> None:
+        """Shows a line: what is done from now on, or what the user has to know."""
+        if self._bar is not None:
+            self._bar.console.print(text, markup=False, highlight=False)
+        elif not self._quiet:
+            print(f"[{format_seconds(self.seconds):>7}] {text}", file=sys.stderr, flush=True)
 
     def tick(self, look: Callable[[], Standing]) -> None:
         """Called many times a second: shows how far the tasks are where that is due, and only then looks.
@@ -96,45 +74,33 @@ class ProgressDisplay:
         On a terminal the bar moves; elsewhere a plain line is printed, often at first, then every half minute.
         """
         elapsed = self.seconds
+        if elapsed < self._next or self._quiet:
+            return
+        text = self._describe(look())
         if self._bar is not None:
-            if elapsed >= self._next_picture:
-                self._next_picture = elapsed + _SECONDS_A_PICTURE
-                text = self._describe(look())
-                self._bar.update(self._bar_task, completed=self._share, description=text)
-        elif elapsed >= self._next_line:
-            self._next_line = elapsed + min(max(FIRST_LINE, (_GROWTH - 1.0) * elapsed), LONGEST_SILENCE)
-            print(f"{self._clock()} {self._describe(look())}", file=sys.stderr, flush=True)
+            self._next = elapsed + _SECONDS_A_PICTURE
+            self._bar.update(self._bar_task, completed=self._share, description=text)
+        else:
+            self._next = elapsed + min(max(FIRST_LINE, _GROWTH * elapsed), LONGEST_SILENCE)
+            self.say(text)
 
-    def _describe(self, standing: Standing) -> str:
-        """The line that is shown. What is done never falls, be it that more is left than was expected before."""
-        done = standing.n_done == standing.n_points
-        self._share = 1.0 if done else max(self._share, min(standing.share, _MOST_SHOWN))
-        return standing.describe(self._share)
+    def _describe(self, found: Standing) -> str:
+        """Points and percent that are done, the time left, and what runs. The percentage never falls."""
+        done = found.n_done == found.n_points
+        self._share = 1.0 if done else max(self._share, min(found.share, _MOST_SHOWN))
+        parts = [f"{found.n_done} of {count(found.n_points, 'point')}", f"{100.0 * self._share:.0f} %"]
+        if not done:
+            parts.append(f"about {format_seconds(found.seconds_left)} left")
+        if found.running:
+            more = len(found.running) - _MOST_NAMED
+            named = ", ".join(found.running[:_MOST_NAMED])
+            parts.append(f"running: {named}" + (f" and {more} more" if more > 0 else ""))
+        return ", ".join(parts)
 
     @property
     def seconds(self) -> float:
         """Time since the start."""
         return time.monotonic() - self._began
-
-    def _clock(self) -> str:
-        return f"[{format_seconds(self.seconds):>7}]"
-
-
-class SilentProgress(ProgressDisplay):
-    """Nobody sees how far it is."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._bar = None
-
-    def say(self, doing: str) -> None:
-        """Nothing."""
-
-    def note(self, happened: str) -> None:
-        """Nothing."""
-
-    def tick(self, look: Callable[[], Standing]) -> None:
-        """Nothing."""
 
 
 def _new_bar() -> Progress | None:
@@ -144,11 +110,8 @@ def _new_bar() -> Progress | None:
 
     console = Console(stderr=True)
     # the text comes last: it is cut where the terminal is narrow
-    columns = (SpinnerColumn(), BarColumn(20), TaskProgressColumn(), TextColumn("{task.description}"))
+    columns = (SpinnerColumn(), BarColumn(20), TaskProgressColumn(), TextColumn("{task.description}", markup=False))
     return Progress(*columns, console=console, transient=True) if console.is_terminal else None
-
-
-_YEAR = 8766.0 * 3600.0  # s
 
 
 def format_seconds(seconds: float) -> str:

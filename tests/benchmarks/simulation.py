@@ -1,7 +1,7 @@
 """Ranks with a simulated clock that work on the tasks of a study under the real scheduling code.
 
 Only the computing and the messages are simulated. Which rank gets which task, what is learnt of costs and which tasks a
-result makes possible is decided by `studyrunner.mpi.dispatch`, `cost_model` and `task_progress`.
+result makes possible is decided by `studyrunner.mpi.dispatch`, `cost_model` and `studyrunner.task_runs`.
 """
 
 import heapq
@@ -15,7 +15,7 @@ from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskP
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi.cost_model import CostKeys, CostModel, Measurement
 from studyrunner.mpi.dispatch import Assignment, Dispatcher
-from studyrunner.task_progress import TaskProgress
+from studyrunner.task_runs import TaskProgress
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class KnownCosts(CostModel):
 
     def learn(self, cost_keys: CostKeys, estimated: float, measured: float) -> Measurement:  # noqa: ARG002
         """Learns nothing."""
-        return Measurement(())
+        return ()
 
     def correction(self, cost_keys: CostKeys) -> float:  # noqa: ARG002
         """1."""
@@ -115,7 +115,7 @@ def replay(
     clock = 0.0
     index = MemoryIndex(plan)
     plan, progress = index.plan, TaskProgress(index)  # type: ignore[arg-type]
-    dispatcher: Dispatcher[Task] = Dispatcher(n_ranks, KnownCosts() if known else progress.costs, lambda: clock)
+    dispatcher: Dispatcher = Dispatcher(n_ranks, KnownCosts() if known else progress.costs, lambda: clock)
 
     def foreseen(tasks: Iterable[Task]) -> list[Task]:
         return [replace(task, cost=_longest_way(task)) for task in tasks] if known else list(tasks)
@@ -128,7 +128,7 @@ def replay(
 
     ticket = itertools.count()
     arrivals: list[tuple[float, int, int, int, float, Result]] = []
-    queues: list[list[tuple[float, Assignment[Task]]]] = [[] for _ in range(n_ranks)]
+    queues: list[list[tuple[float, Assignment]]] = [[] for _ in range(n_ranks)]
     free_at = [0.0] * n_ranks
     computing = [False] * n_ranks
     work = longest_way = last_end = 0.0

@@ -110,16 +110,14 @@ class Running:
             time.sleep(2e-3)
         return True
 
-    def wait_for(self, words: str) -> None:
-        """Waits until it has said so."""
-        assert self.reaches(lambda: words in self.said), self.said
-
     def processes(self) -> dict[int, dict[bytes, bytes]]:
         """Its processes that are alive, the one that was started included, with their environments."""
         found = {}
-        for path in Path("/proc").iterdir():
-            if path.name.isdecimal() and self._mark in (variables := _environment(path)):
-                found[int(path.name)] = dict(each.split(b"=", 1) for each in variables if b"=" in each)
+        for path in Path("/proc").glob("[0-9]*/environ"):
+            with contextlib.suppress(OSError):  # one that has ended
+                variables = path.read_bytes().split(b"\0")
+                if self._mark in variables:
+                    found[int(path.parent.name)] = dict(each.split(b"=", 1) for each in variables if b"=" in each)
         return found
 
     def shared_memory(self) -> dict[str, bool]:
@@ -196,14 +194,6 @@ def results(path: Path | str = "out.nc") -> xr.Dataset:
     """A result file without what depends on the machine."""
     with xr.open_dataset(path) as opened:
         return opened.load().drop_vars("run_time")
-
-
-def _environment(process: Path) -> list[bytes]:
-    """Nothing of a process that has ended."""
-    try:
-        return (process / "environ").read_bytes().split(b"\0")
-    except OSError:
-        return []
 
 
 def count_entries(kind: str, result: Path = Path("out.nc")) -> int:

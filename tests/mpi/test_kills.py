@@ -160,24 +160,32 @@ def test_a_run_that_is_killed_goes_on_to_the_same_result(tmp_path):
     assert "history" in {line.split()[0] for line in resumed}
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """The result of the stand-in where it is not disturbed."""
-    folder = tmp_path_factory.mktemp("whole")
-    arguments = [*FAKED_STUDY.arguments, "-o", "whole.nc"]
-    assert fake_here(arguments, folder, FAKED_STUDY.environment) == 0
-    return results(folder / "whole.nc")
+ENDED_BY = {
+    "an interrupt": (0, signal.SIGINT, (None,)),
+    "the launcher": (2, signal.SIGTERM, (None,)),
+    "one rank": (2, signal.SIGTERM, (1,)),
+    "one rank first": (2, signal.SIGTERM, (1, 0)),
+}
+"""Number of ranks, signal, and who gets it one after the other: ranks, or the process that was started."""
 
 
-@pytest.mark.parametrize(("n_ranks", "number"), [(0, signal.SIGINT), (2, signal.SIGTERM)])
-def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks, number, whole, tmp_path):
-    study = FAKED_STUDY
+@pytest.mark.parametrize("case", ENDED_BY)
+def test_a_run_that_is_ended_leaves_a_result_and_goes_on(case, tmp_path):
+    """The launcher tells all ranks, some earlier than others: rank 0 may be writing by then."""
+    study, (n_ranks, number, victims) = FAKED_STUDY, ENDED_BY[case]
     arguments = [*study.arguments, "-o", "out.nc"]
+    (tmp_path / "whole").mkdir()
+    assert fake_here(arguments, tmp_path / "whole", study.environment) == 0
+    whole = results(tmp_path / "whole" / "out.nc")
 
     def end(running):
         # about half of the points are there
         assert running.reaches(lambda: count_steps(tmp_path) >= study.n_steps // 2), running.said
-        running.process.send_signal(number)
+        ranks = running.ranks()
+        for victim in victims:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(running.process.pid if victim is None else ranks[victim], number)
+            time.sleep(0.1)
 
     ended = run_to_end(n_ranks, arguments, tmp_path, study.environment, end)
     assert ended.status == 130, ended.said
@@ -198,8 +206,8 @@ def test_a_run_that_is_ended_leaves_a_result_and_goes_on(n_ranks, number, whole,
 STUCK = """
 import sys, time
 from studyrunner.checkpoint.store import Store
-from studyrunner.system import endings
-endings.SECONDS_OF_GRACE = 1.0
+from studyrunner.system import process
+process.SECONDS_OF_GRACE = 1.0
 
 def hang(*_, **__):
     print("hangs", file=sys.stderr, flush=True)
@@ -218,33 +226,10 @@ def test_one_more_signal_ends_a_run_that_cannot_end(tmp_path):
     script.write_text(STUCK, encoding="utf-8")
 
     def end_twice(running):
+        assert running.reaches(lambda: "hangs" in running.said), running.said
         for seconds in (0.0, 0.2, 2.0):
-            running.wait_for("hangs")
             time.sleep(seconds)
             running.process.send_signal(signal.SIGTERM)
 
     ended = run_to_end(0, [str(script), "two_masses", "-o", "out.nc"], tmp_path, {}, end_twice)
     assert (ended.status, ended.seconds < SOON) == (130, True)
-    assert "run-study: ended at once: the same command goes on where it was" in ended.said
-
-
-@pytest.mark.parametrize("rank_0_too", [False, True])
-def test_a_rank_that_is_ended_ends_the_run_in_good_order(rank_0_too, tmp_path):
-    """The launcher tells all ranks, some earlier than others: rank 0 may be writing by then. Some other program may
-    tell one."""
-    study = FAKED_STUDY
-
-    def terminate(running):
-        assert running.reaches(lambda: count_steps(tmp_path) >= study.n_steps // 4), running.said
-        ranks = running.ranks()
-        os.kill(ranks[1], signal.SIGTERM)
-        if rank_0_too:
-            time.sleep(0.1)
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(ranks[0], signal.SIGTERM)
-
-    ended = run_to_end(2, [*study.arguments, "-o", "out.nc"], tmp_path, study.environment, terminate)
-    assert ended.status == 130
-    assert ended.said.count("run-study: interrupted: out.nc holds ") == 1
-    assert ended.seconds < SOON
-    assert (results(tmp_path / "out.nc").outcome == Outcome.NOT_COMPUTED).any()

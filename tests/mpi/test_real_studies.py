@@ -82,7 +82,6 @@ cycles = 2000
         (MISSIONS, []),
         (ROOT, []),
     ],
-    ids=["scenes", "modes", "missions", "root"],
 )
 def test_a_study_ends_with_the_result_of_one_process(study, kills, tmp_path):
     """On two ranks; after kills on three, of which one has nothing to do. kills: (kind, entries to wait for, rank)."""

@@ -21,7 +21,7 @@ from solver.results.history import PeriodicState, StartState, WearHistory
 from solver.results.state_report import periodic_state
 from solver.settings import Resolution, Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.structure.joint import Case, Joint, build_case
-from solver.wear.history import integrate_wear
+from solver.wear.history import integrate_together
 from solver.wear.integrate import SlowTime
 from solver.wear.step import steps_of
 from studies.scenes import build_scene, scene_parameters
@@ -242,7 +242,7 @@ def march_wear(
 ) -> WearHistory:
     """The history from a start state; asked: what else `SlowTime` has."""
     wanted = SlowTime(wear_coefficient, steps_of(scheme, step, settings.rtol, largest_depth), cycles, **asked)
-    return integrate_wear(model, friction_coefficient, settings, start, wanted, keep, resume)
+    return next(integrate_together(model, friction_coefficient, settings, start, (wanted,), keep, resume))
 
 
 def glued_frequency(model: ReducedModel) -> float:

@@ -9,11 +9,6 @@ import pytest
 from numba import njit
 
 from solver.clock import computing_time
-from solver.loading_history.start_states import follow_branch
-from solver.outcome import Outcome
-from solver.results import state_report
-from solver.settings import SolverSettings
-from tests.solver.models import march_wear, scene
 
 
 def test_compiling_takes_no_computing_time():
@@ -30,29 +25,6 @@ def test_compiling_takes_no_computing_time():
     cpu, computing = time.thread_time() - cpu, computing_time() - computing
     assert cpu > 0.05
     assert 0.0 <= computing < 0.2 * cpu
-
-
-@pytest.mark.slow
-def test_run_time_leaves_out_compiling(monkeypatch):
-    settings = SolverSettings(harmonics=3, samples=64)
-    model = scene("sdof_slider", 3)
-    _, start = next(follow_branch(model, 0.5, 10.0, np.array([160.0]), "up", settings))
-
-    def march():
-        """CPU time of a march and what it says that it took."""
-        began = time.thread_time()
-        history = march_wear(model, 0.5, start, 1e-11, 1e4, "explicit", np.array([0.0, 1e4]), settings)
-        assert history.outcome is Outcome.CONVERGED
-        return time.thread_time() - began, history.run_time - start.run_time
-
-    march()
-    compiled, says = march()
-    assert 0.5 * compiled < says <= compiled
-    monkeypatch.setattr(state_report, "largest_distance", njit(state_report.largest_distance.py_func))
-    fresh, says = march()
-    assert fresh > 0.1 + compiled
-    # at most half of what compiling took
-    assert says < 0.5 * (compiled + fresh)
 
 
 @pytest.mark.slow

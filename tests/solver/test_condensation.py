@@ -5,7 +5,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from solver.model import ContactInterface, LinearModel, ReducedModel, needed_nodal_diameters
+from solver import build_model
+from solver.model import needed_nodal_diameters
 from solver.structure import condensation
 from solver.structure.condensation import build_structure, frequency_slope, relative_indices
 from solver.structure.fourier import change_orders, from_complex, to_complex
@@ -110,27 +111,11 @@ def test_a_sector_moves_like_its_whole_ring_in_every_harmonic():
         matrix = own[name] + tie[name] * turn + tie[name].T / turn
         return matrix.real if k == 0 else matrix
 
-    contact = ContactInterface(
-        dofs=np.array([[-1, 0, -1]]),
-        area=np.ones(1),
-        gap=np.zeros(1),
-        normal_load=np.ones(1),
-        position=np.full((1, 3), np.nan),
-        surface=("ring",),
-    )
     load = np.array([0.0, 1.0 - 0.5j])
-    linear = {
-        k: LinearModel(
-            mass=sector("m", k),
-            damping=sector("c", k),
-            stiffness=sector("k", k),
-            load_static=np.zeros(2),
-            load_harmonic=load * (k == wave),
-            response=np.array([[0.0, 1.0]]),
-        )
-        for k in needed_nodal_diameters(wave, n_sectors, n_harmonics)
-    }
-    model = ReducedModel(linear, contact, ("free",), n_sectors, wave)
+    waves = needed_nodal_diameters(wave, n_sectors, n_harmonics)
+    matrices = [{k: sector(name, k) for k in waves} for name in ("m", "c", "k")]
+    given = {"load_harmonic": load, "response": [1], "normal_load": 1.0, "n_sectors": n_sectors, "nodal_diameter": wave}
+    model = build_model(*matrices, [[-1, 0, -1]], 1.0, **given)
     structure = build_structure(model, OMEGA, AMPLITUDE, tuple(range(1, n_harmonics + 1)))
     for n in range(1, n_harmonics + 1):
         rate = n * OMEGA
@@ -161,13 +146,10 @@ def test_needed_nodal_diameters_are_folded():
 
 def test_a_structure_that_nothing_holds_is_singular():
     model = random_model(8)
-    linear = model.linear[0]
-    free = {name: np.zeros_like(linear.mass) for name in ("mass", "damping", "stiffness")}
-    loose = LinearModel(
-        **free, load_static=linear.load_static, load_harmonic=linear.load_harmonic, response=linear.response
-    )
+    free = {name: 0.0 * getattr(model.linear[0], name) for name in ("mass", "damping", "stiffness")}
+    loose = replace(model, linear={0: replace(model.linear[0], **free)})
     with pytest.raises(np.linalg.LinAlgError):
-        build_structure(ReducedModel({0: loose}, model.contact, model.response_names), OMEGA, 1.0, (1,))
+        build_structure(loose, OMEGA, 1.0, (1,))
 
 
 def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(monkeypatch):

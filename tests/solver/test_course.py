@@ -23,7 +23,7 @@ def report(depth, value, resolution=RESOLUTIONS[0], **more):
         "response": np.full(1, value * 1j),
         **dict.fromkeys(("response_mean", "response_peak"), np.full(1, value)),
     }
-    certificate = Certificate(*([value] * 8), stable=value < 2.5)
+    certificate = Certificate(*([value] * 8))
     return StateReport(
         wear_depth=np.array(depth, float), certificate=certificate, resolution=resolution, **numbers, **more
     )
@@ -55,7 +55,6 @@ def test_what_holds_at_both_ends_of_a_step_holds_between():
     # and what has no value between those of both ends is that of the later one
     assert found["harmonics_used"].tolist() == [3, 3, 3, 5]
     assert found["samples_used"].tolist() == [64, 64, 64, 128]
-    assert found["stable"].tolist() == [True, True, True, False]
     # local errors add up from step to step, and along a step
     assert found["local"].tolist() == [0.5, 0.7, 1.0, 1.75]
 

@@ -45,11 +45,6 @@ def test_load_or_wear_at_the_edge_is_found_at_its_first_count():
     assert math.isnan(first_cut_off(contact, cycles, gone, middle))
 
 
-def test_it_is_said_from_which_count_on():
-    assert describe_cut_off(2000.0).endswith("at cycle 2000 already")
-    assert describe_cut_off(0.0).endswith("at cycle 0")
-
-
 @pytest.mark.parametrize(
     ("name", "values"),
     [

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from solver import build_model
 from solver.accuracy.certificate import certify
 from solver.loading_history.start_states import follow_branch
-from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.model import ReducedModel
 from solver.outcome import COMPLETE as COMPLETE_OUTCOMES
 from solver.outcome import Outcome
-from solver.results.history import StartState, WearHistory
 from solver.results.state_report import evaluated
 from solver.settings import Scheme, SolverSettings
 from solver.structure.joint import build_case
@@ -46,14 +46,6 @@ class Case:
     settings: SolverSettings = SETTINGS
 
 
-@dataclass(frozen=True)
-class Ended:
-    """How it ended."""
-
-    start: StartState
-    history: WearHistory
-
-
 def elastic(n_pairs=3):
     return Case(random_model(1, ("3d",) * n_pairs), OMEGA)
 
@@ -74,23 +66,13 @@ def block(stiffness=(1e7, 2e7), *, ground=1e5, damping=0.02, preload=100.0, area
             tie = np.zeros(n)
             tie[component], tie[3 + 3 * pair + component] = 1.0, -1.0
             k += spring * np.outer(tie, tie)
-    mass = np.zeros((n, n))
+    mass, load_static, load_harmonic = np.zeros((n, n)), np.zeros(n), np.zeros(n, complex)
     mass[:3, :3] = np.eye(3)
-    load_static = np.zeros(n)
     load_static[0] = preload
-    load_harmonic = np.zeros(n, complex)
     load_harmonic[:3] = lift, 1.0, 0.5j
-    contact = ContactInterface(
-        dofs=3 + np.arange(3 * n_pairs).reshape(n_pairs, 3),
-        area=np.full(n_pairs, 1e-4) if area is None else np.array(area),
-        gap=np.full(n_pairs, gap),
-        normal_load=np.zeros(n_pairs),
-        position=np.full((n_pairs, 3), np.nan),
-        surface=("plane",) * n_pairs,
-    )
-    c = 2.0 * damping / np.sqrt(max(stiffness)) * k
-    linear = LinearModel(mass, c, k, load_static, load_harmonic, np.eye(2, n, 1))
-    return Case(ReducedModel({0: linear}, contact, ("along", "across")), BLOCK)
+    c, dofs = 2.0 * damping / np.sqrt(max(stiffness)) * k, 3 + np.arange(3 * n_pairs).reshape(n_pairs, 3)
+    loads = {"load_static": load_static, "load_harmonic": load_harmonic, "response": [1, 2], "gap": gap}
+    return Case(build_model(mass, c, k, dofs, 1e-4 if area is None else area, **loads), BLOCK)
 
 
 def slider(stiffness=1e5, damping=0.0, force=10.0, omega=2 * np.pi * 160.0):
@@ -109,7 +91,7 @@ def run(case):
     assert time.process_time() - started < BOUND
     judge_start(case, start)
     judge_history(case, start, history)
-    return Ended(start, history)
+    return start, history
 
 
 def judge_start(case, start):
@@ -143,10 +125,10 @@ def judge_history(case, start, history):
 
 def run_converged(case):
     """A case whose states exist."""
-    ended = run(case)
-    assert ended.start.outcome is Outcome.CONVERGED, ended.start.outcome.sentence
-    assert ended.history.outcome.complete, ended.history.outcome.sentence
-    return ended.history
+    start, history = run(case)
+    assert start.outcome is Outcome.CONVERGED, start.outcome.sentence
+    assert history.outcome.complete, history.outcome.sentence
+    return history
 
 
 BASES = {"elastic": elastic(), "block": block(), "slider": slider()}
@@ -203,10 +185,10 @@ EXTREMES = {name: (case, outcomes) for name, case, outcomes in extreme_cases()}
 @pytest.mark.parametrize("name", EXTREMES)
 def test_extreme_cases_end_honestly(name):
     case, outcomes = EXTREMES[name]
-    ended = run(case)
-    assert outcomes is ANY or ended.start.outcome is Outcome.CONVERGED, ended.start.outcome.sentence
-    assert outcomes is ANY or ended.history.outcome in outcomes, ended.history.outcome.sentence
-    assert name != "a block that bounces" or ended.start.outcome is Outcome.CONVERGED
+    start, history = run(case)
+    assert outcomes is ANY or start.outcome is Outcome.CONVERGED, start.outcome.sentence
+    assert outcomes is ANY or history.outcome in outcomes, history.outcome.sentence
+    assert name != "a block that bounces" or start.outcome is Outcome.CONVERGED
 
 
 @pytest.mark.slow
@@ -236,10 +218,10 @@ def test_friction_alone_bounds_an_undamped_resonance(friction_force):
 @pytest.mark.parametrize("friction_force", [0.0, 3.0, 7.0])
 def test_an_undamped_resonance_that_nothing_bounds_is_no_result(friction_force):
     case = slider(0.0, 0.0, 10.0, float(np.sqrt(1.6e6)))
-    ended = run(replace(case, friction=friction_force / 10.0))
-    if ended.start.outcome is Outcome.CONVERGED:
+    start, history = run(replace(case, friction=friction_force / 10.0))
+    if start.outcome is Outcome.CONVERGED:
         # round-off in the frequency is a detuning: then the motion is beyond all bounds that matter
-        assert ended.history.response_peak.max() > 1e3 * 10.0 / 1.6e5
+        assert history.response_peak.max() > 1e3 * 10.0 / 1.6e5
 
 
 @pytest.mark.parametrize("base", [elastic(), block()], ids=["elastic", "block"])
@@ -262,9 +244,9 @@ def test_500_pairs():
 
 def test_a_pair_that_is_worn_through_at_once_asks_for_shorter_steps():
     # 33 N on 1e-9 m2 wear 4 cm in 200 cycles: many times what takes the pair out of reach
-    ended = run(block((1e7, 1e7, 1e7), area=(1e-9, 1e-6, 1e-3)))
-    assert ended.history.outcome is Outcome.STEP_TOO_LONG
-    assert ended.history.last_cycle == 0.0
+    _, history = run(block((1e7, 1e7, 1e7), area=(1e-9, 1e-6, 1e-3)))
+    assert history.outcome is Outcome.STEP_TOO_LONG
+    assert history.last_cycle == 0.0
 
 
 def test_a_single_step_beyond_the_limit_is_told_by_the_limit_alone():

@@ -1,23 +1,27 @@
-"""Floquet multipliers of states against those of exact motions, and what becomes of unstable states."""
+"""Stability: signs of determinants, Floquet multipliers against those of exact motions, and unstable states."""
 
 from dataclasses import replace
 from functools import lru_cache
+from itertools import islice
 
 import numpy as np
 import pytest
 
 from solver.contact.coulomb import SEPARATED
+from solver.continuation.arc_length import Arc
+from solver.harmonic_balance.dlft import Balance
+from solver.harmonic_balance.state import State
 from solver.loading_history import frequency_sweep
 from solver.loading_history.start_states import follow_branch
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
-from solver.stability.floquet import find_instability, multipliers_of
-from solver.stability.monodromy import build_monodromy, switching_pairs
+from solver.stability.disturbances import build_monodromy, switching_pairs
+from solver.stability.floquet import find_instability, is_stable, multipliers_of
 from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import build_case
-from tests.solver.models import cyclic_model, march_wear, random_balance, random_model
+from tests.solver.models import converged_state, crossings, cyclic_model, march_wear, random_balance, random_model
 from tests.solver.models import scene as bundled
 from tests.solver.random_orbits import drawn
 
@@ -219,12 +223,37 @@ def test_it_is_not_looked_for_in_a_travelling_wave():
     balance, predicted = random_balance(cyclic_model(3, ("3d",), 7, 1), SolverSettings(3, 24), 3, wear=False)
     at = balance.evaluate(predicted)
     assert switching_pairs(at)[0].any()
-    assert (
-        find_instability(
-            build_case(balance.joint.model, 0.5, 1.0, SolverSettings(3, 24)),
-            balance.joint,
-            at,
-            Run(1e-8),
-        )
-        is None
-    )
+    case = build_case(balance.joint.model, 0.5, 1.0, SolverSettings(3, 24))
+    assert find_instability(case, balance.joint, at, Run(1e-8)) is None
+
+
+# --- the sign of the determinant ---
+
+
+def wall_at(omega, history):
+    case = build_case(bundled("vibro_impact"), 0.0, 1.55, SolverSettings(21, 256))
+    return Balance(case.joint(omega, 0.02), history, np.zeros(1))
+
+
+@pytest.mark.slow
+def test_the_branches_of_a_mass_at_a_wall_have_alternating_stability():
+    """States at 1.55 rad/s of the branch from there through both folds."""
+    state = converged_state(bundled("vibro_impact"), 0.0, 0.02, 1.55, SolverSettings(21, 256))
+    start = wall_at(1.55, state.start_history)
+    at = start.evaluate(start.predict(state.displacement_h, state.contact_force_h))
+    upper = State(at, state.start_history, 1.55)
+    middle, lower = islice(crossings(Arc(wall_at, upper, 0.08, Run(1e-8)), 1.55, 1.0), 2)
+    stable = [is_stable(wall_at(1.55, one.history), one.evaluation, Run(1e-8)) for one in (upper, middle, lower)]
+    assert stable == [True, False, True]
+    sizes = [np.abs(point.evaluation.displacement_h).max() for point in (upper, middle)]
+    assert sizes[0] > sizes[1] > 0
+    assert not lower.evaluation.force_h.any()
+
+
+def test_a_joint_that_is_open_or_stuck_all_over_is_stable():
+    for seed, level in ((1, -1e6), (2, 1e6)):
+        balance, predicted = random_balance(random_model(seed), SolverSettings(3, 24), seed, wear=False)
+        predicted[balance.joint.component_index % 3 == 0, 0] = level
+        at = balance.evaluate(predicted)
+        assert (at.status_t == (0 if level < 0 else 1)).all()
+        assert is_stable(balance, at, Run(1e-8))

@@ -12,7 +12,6 @@ from solver.loading_history.start_states import follow_branch
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import FollowedFrequency, Scheme, SolverSettings
-from tests.followed_states import at_maximum, followed_states, in_quadrature, responses_around
 from tests.references import slider_orbit
 from tests.solver.models import march_wear as march_from
 from tests.solver.models import scene
@@ -65,25 +64,6 @@ def test_the_largest_amplitude_is_that_of_the_exact_motion():
         expected = brentq(curve.deriv(), 193.0, 201.0)
         assert abs(found - expected) < error < 2.0
         assert abs(response) == pytest.approx(curve(expected), rel=2e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("word", ["resonance", "peak"])
-def test_the_responses_around_a_worn_state_have_the_frequency_of_the_history(word):
-    """Brute force: from the state of the history the frequency moves away, its depth and friction history kept."""
-    model = scene("sdof_slider", damping=DAMPING)
-    history = followed_states(model, FollowedFrequency(word, *BETWEEN), 10.0, WEAR, CYCLES)
-    assert [state.cycle for state in history.states] == pytest.approx(list(CYCLES))
-    for state, error in zip(history.states, history.errors, strict=True):
-        width = (4.0 if word == "resonance" else 2.0) * error
-        frequencies, (products, responses) = responses_around(history.work, state, width, 4)
-        assert len(frequencies) == 9
-        quadrature, largest = in_quadrature(frequencies, products), at_maximum(frequencies, responses)
-        here, other = (quadrature, largest) if word == "resonance" else (largest, quadrature)
-        found = state.omega / (2.0 * math.pi)
-        assert abs(found - here) < (1e-3 if word == "resonance" else 1.0) * error
-        # both differ by more than the error of phase resonance: the test tells them apart
-        assert not abs(found - other) < 0.02
 
 
 @pytest.mark.slow

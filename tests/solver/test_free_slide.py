@@ -7,11 +7,11 @@ import pytest
 
 from solver.contact.coulomb import SLIP, STICK
 from solver.harmonic_balance.dlft import Balance
+from solver.histories import march_wear
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings
 from solver.structure.joint import build_case
 from solver.wear.jump import creeps, free_slide
-from solver.wear_history import march_wear
 from studies import build_scene
 
 

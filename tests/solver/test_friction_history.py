@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from solver.histories import march_wear
 from solver.outcome import Outcome
 from solver.results.history import StartState
 from solver.settings import SolverSettings
 from solver.structure.joint import build_case
 from solver.wear import step
-from solver.wear.integrate import Integration, SlowTime
+from solver.wear.integrate import Integrations, SlowTime
 from solver.wear.step import Adaptive
-from solver.wear_history import march_wear
 from tests.solver.models import branch_states, scene
 from tests.solver.worn_slider import WEAR, exact_depths_of_motion
 
@@ -19,8 +19,7 @@ def steps_and_volume(scene_name: str, start: StartState, settings: SolverSetting
     """Number of steps and worn volume, m3, of an adaptive history without its reference solution."""
     model = scene(scene_name, 13, **({"mesh": 1} if scene_name == "dovetail_sector" else {}))
     case = build_case(model, 0.5, start.penalty_omega, settings, start.resolution)
-    integration = Integration(case, start, SlowTime(WEAR, Adaptive(settings.rtol), np.array([0.0, cycles])))
-    ended = integration.history()
+    ended = Integrations(case, start).history(SlowTime(WEAR, Adaptive(settings.rtol), np.array([0.0, cycles])))
     depth = ended.course.read(np.array([cycles]))["wear_depth"]
     return len(ended.course.ends), float((depth @ model.contact.area)[0])
 

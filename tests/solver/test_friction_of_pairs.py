@@ -8,10 +8,7 @@ import pytest
 from solver import frequency_response
 from solver import march_wear as march_from_unworn
 from solver.settings import SolverSettings
-from solver.structure.joint import friction_of_pairs
 from tests.solver.models import OMEGA, random_model
-
-KINDS = ("3d", "one_tangent", "constant_load")
 
 
 def with_own_friction(model, friction):
@@ -23,22 +20,6 @@ def assert_same_bits(one, other, but=()):
         values, others = getattr(one, field.name), getattr(other, field.name)
         if field.name not in but:
             np.testing.assert_array_equal(values, others, err_msg=field.name)
-
-
-@pytest.mark.parametrize(
-    ("own", "given", "message"),
-    [
-        (None, None, "missing"),
-        ([0.1, 0.2, 0.3], 0.5, "given twice"),
-        (None, np.full(2, 0.5), r"shape \(2,\).* shape \(3,\)"),
-        (None, np.full((3, 1), 0.5), r"shape \(3, 1\)"),
-    ],
-)
-def test_coefficients_that_are_not_one_of_each_pair_are_refused(own, given, message):
-    model = random_model(3, KINDS)
-    model = model if own is None else with_own_friction(model, own)
-    with pytest.raises(ValueError, match=message):
-        friction_of_pairs(model, given)
 
 
 @pytest.mark.slow

@@ -68,8 +68,7 @@ def integrate(blocks, missions, **more):
 @pytest.mark.parametrize(("missions", "n_blocks", "begin"), [(1, 1, "up"), (4, 1, "continue"), (1, 2, "continue")])
 def test_a_mission_is_a_wear_history_in_parts(missions, n_blocks, begin):
     cycles = 4e4 / (missions * n_blocks)
-    block = Block(slider(), 160.0, 10.0, FRICTION, cycles, begin)
-    history = integrate((block,) * n_blocks, np.arange(missions + 1))
+    history = integrate((Block(slider(), 160.0, 10.0, FRICTION, cycles, begin),) * n_blocks, np.arange(missions + 1))
     counts = cycles * np.arange(missions * n_blocks + 1.0)
     whole = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, counts, settings=SETTINGS)
     assert history.outcome is whole.outcome is Outcome.CONVERGED
@@ -82,25 +81,19 @@ def test_a_mission_is_a_wear_history_in_parts(missions, n_blocks, begin):
     np.testing.assert_array_equal(history.response_begin[0, 0], whole.response[0])
 
 
-# --- exact volumes ---
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("order", [1, -1])
-def test_gross_slip_wears_by_the_stroke_times_the_load_in_any_order(order):
-    """V = k_w N s with the slip path s of a period: no wear acts back on a constant normal force."""
-    model = scene("sdof_slider", normal_stiffness=0.0)
-    amplitudes, cycles = ((10.0, 14.0), (3e3, 5e3))
-    blocks = tuple(Block(model, 160.0, *of, "continue") for of in zip(amplitudes, (FRICTION,) * 2, cycles, strict=True))
-    history = integrate(blocks[::order], 6)
-    once = [march_wear(model, 160.0, load, FRICTION, WEAR, 1.0, settings=SETTINGS) for load in amplitudes]
-    exact = np.array([6.0 * n * one.wear_rate[0] for n, one in zip(cycles, once, strict=True)])[::order]
-    np.testing.assert_allclose(history.block_volume[-1], exact, rtol=1e-6)
-    # the slip path is four amplitudes
-    amplitude = float(np.abs(history.response_end[-1, 0, 0]))
-    assert exact[0] / (6.0 * cycles[::order][0]) == pytest.approx(WEAR * 10.0 * 4.0 * amplitude, rel=0.05)
-    assert history.outcome is Outcome.CONVERGED
-    assert history.steps.tolist() == [1, 1, 2, 2]
+def test_depths_of_a_table_count_from_the_unworn_joint():
+    law = WearLaw("table", table=WearTable((0.0,), (0.0, 2e-5, 4e-5), ((1.0, 0.2, 0.0),)))
+    half = Block(slider(), 160.0, 10.0, FRICTION, 2e4, "up")
+    history = integrate((half, half), 1, law=law)
+    whole = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, [2e4, 4e4], settings=SETTINGS, law=law)
+    bars = history.wear_depth_error[-1] + whole.wear_depth_error[-1]
+    assert (np.abs(history.wear_depth[-1] - whole.wear_depth[-1]) < bars).all()
+    assert (bars < 0.05 * whole.wear_depth[-1]).all()
+    assert history.block_volume[-1, 1] < 0.8 * history.block_volume[-1, 0]
+
+
+# --- exact volumes ---
 
 
 def exact_growth(blocks, missions):
@@ -141,15 +134,13 @@ EXACT = SolverSettings(harmonics=25, samples=512, rtol=0.05)
 @pytest.mark.parametrize(
     ("blocks", "missions", "settings"),
     [
-        ((("ramp", 160.0, 10.0, 1e3),), 3, EXACT),
         ((("ramp", 160.0, 10.0, 1e3),), 20, EXACT),
-        ((("ramp", 160.0, 10.0, 1e3),), 20, SolverSettings()),
         ((("up", 160.0, 10.0, 3e3),), 3, EXACT),
         ((("up", 160.0, 10.0, 4e4),), 3, SolverSettings()),
         ((("continue", 160.0, 10.0, 2e3), ("continue", 150.0, 14.0, 4e3)), 3, SolverSettings()),
         (((None, Passage(150.0, 165.0, 0.2), 10.0, None),), 3, SolverSettings()),
     ],
-    ids=["ramp", "many", "automatic", "sweep", "long", "continue", "passage"],
+    ids=["many", "sweep", "long", "continue", "passage"],
 )
 def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, monkeypatch):
     """Against the exact differential equation: at least the true error, and not many times more."""
@@ -167,10 +158,6 @@ def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, mo
 # --- states that keep nothing of their way ---
 
 
-def slipping(begin):
-    return Block(slider(), 160.0, 10.0, FRICTION, 500.0, begin)
-
-
 def begun_again(block, depth):
     """A block at an even depth by its own way, and as at the depth 0 before."""
     mission, pairs = Mission((block,), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
@@ -181,17 +168,16 @@ def begun_again(block, depth):
 @pytest.mark.slow
 def test_a_way_is_gone_again_only_where_the_state_depends_on_it():
     """Not where the pair slips; where a pair sticks through the same nodes; where much changes by another way."""
-    for begin in ("ramp", "up"):
-        own, again = begun_again(slipping(begin), 8e-6)
-        np.testing.assert_allclose(again.growth, own.growth, rtol=1e-6)
-        np.testing.assert_allclose(again.response, own.response, rtol=1e-6)
-        assert again.iterations < 20 < own.iterations
-        assert again.begun is not None
-    dovetail = Block(scene("dovetail_sector", mesh=1), 212.6, 0.5, FRICTION, 10.0, "up")
-    own, again = begun_again(dovetail, 5e-9)
+    slipping = Block(slider(), 160.0, 10.0, FRICTION, 500.0, "up")
+    own, again = begun_again(slipping, 8e-6)
+    np.testing.assert_allclose(again.growth, own.growth, rtol=1e-6)
+    np.testing.assert_allclose(again.response, own.response, rtol=1e-6)
+    assert again.iterations < 20 < own.iterations
+    assert again.begun is not None
+    own, again = begun_again(Block(scene("dovetail_sector", mesh=1), 212.6, 0.5, FRICTION, 10.0, "up"), 5e-9)
     np.testing.assert_allclose(again.response, own.response, rtol=5e-3)
     assert again.iterations < 0.8 * own.iterations
-    own, again = begun_again(slipping("up"), 6e-5)
+    own, again = begun_again(slipping, 6e-5)
     assert again.iterations >= own.iterations
     np.testing.assert_array_equal(again.growth, own.growth)
 
@@ -232,7 +218,7 @@ def exact_run(case):
     growth = vectors @ (decay * (vectors.T @ (rate - loss @ case.depth)))
     response = np.array([[complex(depth.sum())] for depth in (case.depth, case.depth + growth)])
     slope = slope if case.with_slope else None
-    return BlockRun(growth, response, np.abs(response), slope, like=Like((), 1.0, 1))
+    return BlockRun(growth, response, np.abs(response), slope, like=Like((), 1.0))
 
 
 @pytest.fixture
@@ -258,8 +244,17 @@ def exactly_known(missions, cycles=1.0, **more):
     return integrate_missions(known_blocks(missions, cycles, **more))
 
 
+def equal(one, other):
+    """Whether two histories are equal to the last bit, but for their run time."""
+    names = [field.name for field in fields(MissionHistory) if field.name != "run_time"]
+    return all(
+        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=name not in ("message", "outcome"))
+        for name in names
+    )
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(("cycles", "limit"), [(0.1, 20), (3.0, 30), (30.0, 30)])
+@pytest.mark.parametrize(("cycles", "limit"), [(0.1, 20), (30.0, 30)])
 def test_two_thousand_missions_agree_with_missions_one_by_one(exact_blocks, cycles, limit):
     """The longer the blocks, the more they adapt the pressures against each other within few missions."""
     rows = (0, 1, 7, 200, 1000, 2000)
@@ -312,27 +307,6 @@ def test_a_step_is_of_second_order_and_its_error_is_known(monkeypatch):
     assert 6.0 < errors[4] / errors[3] < 8.5
 
 
-def test_an_interrupted_mission_goes_on_to_the_last_bit(exact_blocks):
-    mission, kept = known_blocks((0, 100, 301), 3.0), list[Packed]()
-    whole = integrate_missions(mission, keep=kept.append)
-    left = len(exact_blocks)
-    for place in (0, 1, 5, len(kept) // 2, len(kept) - 2, len(kept) - 1):
-        exact_blocks.clear()
-        assert equal(integrate_missions(mission, resume=kept[place]), whole)
-        assert len(exact_blocks) < left
-        left = len(exact_blocks)
-    assert left == 0
-
-
-def equal(one, other):
-    """Whether two histories are equal to the last bit, but for their run time."""
-    names = [field.name for field in fields(MissionHistory) if field.name != "run_time"]
-    return all(
-        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=name not in ("message", "outcome"))
-        for name in names
-    )
-
-
 def test_a_target_ends_the_missions(exact_blocks):
     rows = tuple(range(0, 2001, 50))
     whole = exactly_known(rows, 0.3)
@@ -369,39 +343,21 @@ def test_a_block_that_fails_at_once_is_computed_in_shorter_steps(monkeypatch):
     assert np.isnan(history.worn_volume[-1])
 
 
-# --- with the solver ---
-
-
 @pytest.mark.slow
 def test_missions_of_the_slider_agree_with_missions_one_by_one():
     """Amplitude and frequency change from block to block."""
-    many = integrate(two_blocks(cycles=300.0), [3, 6])
-    once = integrate(two_blocks(cycles=300.0), [3, 6], largest_step=1)
+    many, once = (integrate(two_blocks(cycles=300.0), [3, 6], largest_step=most) for most in (None, 1))
     assert many.outcome is once.outcome is Outcome.CONVERGED
     assert many.steps.tolist() == [1, 1, 2, 2]
     assert (np.abs(many.wear_depth - once.wear_depth) <= many.wear_depth_error + once.wear_depth_error).all()
     assert (np.abs(many.block_volume - once.block_volume) <= many.block_volume_error * many.block_volume).all()
     assert many.error_estimate < 2.0 * SETTINGS.rtol
-    # of missions that both have computed
-    np.testing.assert_allclose(many.response_end[[0, 2]], once.response_end[[0, 2]], rtol=0.03)
     for name in ("response_begin", "response_end", "response_peak_begin", "response_peak_end"):
         one, other = (np.linalg.norm(getattr(of, name), axis=2) for of in (many, once))
         assert (np.abs(one - other) <= many.response_error * one + once.response_error * other).all()
     assert (many.response_error < 0.1).all()
     # less load, less friction: the vibration grows
     assert (np.diff(np.abs(once.response_end[:, :, 0]), axis=0)[1:] > 0.0).all()
-
-
-@pytest.mark.slow
-def test_depths_of_a_table_count_from_the_unworn_joint():
-    law = WearLaw("table", table=WearTable((0.0,), (0.0, 2e-5, 4e-5), ((1.0, 0.2, 0.0),)))
-    half = Block(slider(), 160.0, 10.0, FRICTION, 2e4, "up")
-    history = integrate((half, half), 1, law=law)
-    whole = march_wear(slider(), 160.0, 10.0, FRICTION, WEAR, [2e4, 4e4], settings=SETTINGS, law=law)
-    bars = history.wear_depth_error[-1] + whole.wear_depth_error[-1]
-    assert (np.abs(history.wear_depth[-1] - whole.wear_depth[-1]) < bars).all()
-    assert (bars < 0.05 * whole.wear_depth[-1]).all()
-    assert history.block_volume[-1, 1] < 0.8 * history.block_volume[-1, 0]
 
 
 # --- passages ---
@@ -457,7 +413,7 @@ def passing(passage, wear=WEAR, settings=SETTINGS):
 def test_a_vibration_is_late_by_its_decay_time():
     """The free slider with 6 N s/m and 0.1 kg decays by exp(-30 t): at 7 Hz/s it is late by 7/30 Hz."""
 
-    undamped = Mission((replace(slipping("up"), frequency=Passage(180.0, 220.0, 7.0)),), WEAR, (0, 1), SETTINGS)
+    undamped = Mission((Block(slider(), Passage(180.0, 220.0, 7.0), 10.0, FRICTION),), WEAR, (0, 1), SETTINGS)
 
     def case(rate):
         # too little wear to change the pressures on the way
@@ -543,41 +499,41 @@ PASSAGE = {"frequency": Passage(2.0, 3.0, 1.0), "cycles": None}
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "key"),
     [
-        ({"begin": "sweep"}, r"blocks\[1\]: begin: give one of"),
-        ({"cycles": 0.0}, r"blocks\[1\]: cycles: give values above 0"),
-        ({"cycles": None}, r"blocks.*: cycles: missing"),
-        ({"frequency": Passage(2.0, 2.0, 1.0), "cycles": None}, r"blocks.*: frequency.stop"),
-        ({"frequency": Passage(2.0, 3.0, -1.0), "cycles": None}, r"blocks.*: frequency.rate"),
-        ({**PASSAGE, "cycles": 1.0}, r"blocks.*: cycles"),
-        ({**PASSAGE, "begin": "down"}, r'blocks.*: begin: .* give "up"'),
-        ({"frequency": np.nan}, r"blocks\[1\]: frequency: give finite numbers"),
-        ({"excitation_amplitude": 0.0}, r"blocks\[1\]: excitation_amplitude: give values above 0"),
-        ({"friction_coefficient": [0.1, 0.2]}, r"blocks\[1\]: friction_coefficient has shape"),
-        ({"friction_coefficient": 0.4}, r"begin: continue goes with the model and friction"),
-        ({"model": scene("sdof_slider", area=2e-4)}, r"blocks.*: model: give equal contact pairs"),
+        ({"begin": "sweep"}, "begin"),
+        ({"cycles": 0.0}, "cycles"),
+        ({"cycles": None}, "cycles"),
+        ({"frequency": Passage(2.0, 2.0, 1.0), "cycles": None}, "frequency.stop"),
+        ({"frequency": Passage(2.0, 3.0, -1.0), "cycles": None}, "frequency.rate"),
+        ({**PASSAGE, "cycles": 1.0}, "cycles"),
+        ({**PASSAGE, "begin": "down"}, "begin"),
+        ({"frequency": np.nan}, "frequency"),
+        ({"excitation_amplitude": 0.0}, "excitation_amplitude"),
+        ({"friction_coefficient": [0.1, 0.2]}, "friction_coefficient"),
+        ({"friction_coefficient": 0.4}, "begin"),
+        ({"model": scene("sdof_slider", area=2e-4)}, "model"),
     ],
 )
-def test_a_wrong_block_is_named(changed, said):
+def test_a_wrong_block_is_named(changed, key):
     one, other = two_blocks()
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=rf"blocks\[[01]\].*: {key}"):
         integrate((one, replace(other, **changed)), 10)
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    "wrong",
     [
-        ({"missions": [1.5]}, "missions: give ascending whole numbers"),
-        ({"missions": 0}, "missions: give ascending whole numbers, the last of at least 1"),
-        ({"blocks": ()}, "blocks: give at least one block"),
-        ({"largest_step": 1.5}, "largest_step: give a whole number"),
-        ({"until": WearTarget("frequency_shift", 0.1)}, "until.quantity: give one of wear_depth, worn_volume"),
-        ({"sweep": "continue"}, "sweep: give one of up, down, ramp"),
+        {"missions": [1.5]},
+        {"missions": 0},
+        {"blocks": ()},
+        {"largest_step": 1.5},
+        {"until": WearTarget("frequency_shift", 0.1)},
+        {"sweep": "continue"},
     ],
 )
-def test_a_wrong_mission_is_a_sentence(wrong, said):
-    with pytest.raises(ValueError, match=said):
+def test_a_wrong_mission_is_a_sentence(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong))):
         integrate(**{"blocks": two_blocks(), "missions": 10, **wrong})
 
 

@@ -111,12 +111,6 @@ def test_small_and_large_amplitudes_have_the_linear_modes_and_their_damping():
     np.testing.assert_allclose(found.response[:, 0], found.shape[:, 2], rtol=1e-6)
 
 
-def test_a_joint_without_damping_and_slip_has_none():
-    found = backbone(foot(0.0), [1e-6], 0.5)
-    assert found.outcome == (Outcome.CONVERGED,)
-    assert abs(found.damping_ratio[0]) < 1e-12
-
-
 @pytest.mark.slow
 def test_an_oscillator_with_a_wall_has_the_period_of_its_two_springs():
     """Without damping the mode is the free motion: a spring of 1 N/m, and from the gap on one of 100 N/m beside it."""
@@ -291,14 +285,3 @@ def test_the_dovetail_softens_and_damps_and_its_forced_resonance_agrees():
     # the response in quadrature with the modal force, within the errors of both and of single-mode theory
     expected = -1j * share / abs(share) * found.response[at, 0]
     assert abs(forced.response[0, 0] - expected) < 0.01 * abs(expected)
-
-
-@pytest.mark.slow
-def test_a_travelling_wave_of_the_dovetail_damps_as_it_slips():
-    model = dovetail(3, 20)
-    found = backbone(model, [1e-6, 1e-3], 0.5, settings=SolverSettings(harmonics=3, samples=64))
-    assert found.frequency[0] == pytest.approx(215.031, abs=2e-3)
-    assert all(outcome.complete for outcome in found.outcome)
-    assert found.frequency[1] < found.frequency[0]
-    assert found.damping_ratio[1] > 2.0 * found.damping_ratio[0]
-    assert found.slip_fraction[1].max() > 0.1

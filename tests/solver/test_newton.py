@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from solver.newton.iteration import solve_newton
+from solver.newton.run import solve_newton
 
 
 @dataclass(frozen=True)

@@ -68,18 +68,13 @@ def from_every_stop(model, friction, start, wear, step, scheme, end, settings):
     whole = march_wear(model, friction, start, wear, step, scheme, cycles, settings, keep=kept.append)
     places = [unpack(progress) for progress in kept]
     # within the history itself, one that it is compared with, and the reference solution: from the last one backwards
-    stages = {stage_of(at): [n for n, other in enumerate(places) if stage_of(other) == stage_of(at)] for at in places}
+    stages = {len(at.done): [n for n, other in enumerate(places) if len(other.done) == len(at.done)] for at in places}
     for found in stages.values():
         for n in found[:: -max(1, len(found) // MOST_STOPS)][:MOST_STOPS]:
             again = march_wear(model, friction, start, wear, step, scheme, cycles, settings, resume=kept[n])
             assert_same(again, whole)
-    own = [at.saved.state.cycle for at in places if stage_of(at) == (0, True)]
+    own = [at.state.cycle for at in places if not at.done]
     return whole, own, len(stages)
-
-
-def stage_of(progress):
-    """Histories that are complete, and whether the present one itself is integrated, not its reference solution."""
-    return len(progress.done), progress.saved.fine is None
 
 
 @pytest.mark.slow

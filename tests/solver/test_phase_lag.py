@@ -14,8 +14,7 @@ from solver.continuation.phase_lag import (
     solve_at_lag,
 )
 from solver.harmonic_balance.dlft import Balance
-from solver.newton.bordering import Bordered
-from solver.newton.run import Run
+from solver.newton.run import Bordered, Run
 from solver.settings import SolverSettings
 from solver.structure.fourier import to_complex
 from solver.structure.joint import build_case

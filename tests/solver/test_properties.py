@@ -54,15 +54,13 @@ def state(seed):
 
 
 @lru_cache(maxsize=64)
-def history(seed, scheme, factor=1.0):
-    """A march of three steps; wear coefficient times `factor`, cycles and step over it."""
+def history(seed, scheme):
+    """Three steps."""
     scene, joint, _ = state(seed)
     result = found(seed)
     start = start_state(joint, result[2])
-    step = scene.step / factor
-    cycles = np.linspace(0.0, 3.0 * step, 4)
-    wear = factor * scene.wear_coefficient
-    return march_wear(scene.model, scene.friction, start, wear, step, scheme, cycles, SETTINGS)
+    cycles, wear = np.linspace(0.0, 3.0 * scene.step, 4), scene.wear_coefficient
+    return march_wear(scene.model, scene.friction, start, wear, scene.step, scheme, cycles, SETTINGS)
 
 
 def largest_force(evaluation):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solver.accuracy.period_events import shortest_contact
+from solver.accuracy.harmonic_levels import shortest_contact
 from solver.contact.coulomb import SEPARATED, SLIP, STICK
 from solver.outcome import Outcome
 from tests.references import coulomb_orbit, vibro_impact_orbit

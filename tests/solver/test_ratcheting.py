@@ -8,12 +8,12 @@ from solver.accuracy.resolved_state import ResolvedState
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
-from solver.loading_history.start_states import follow_branch
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.joint import Joint, build_case
 from tests.random_scenes import random_scene
+from tests.solver.models import branch_states
 
 SHAKEN_DOWN = 160  # seed: the vibration lets the mass slip until it sticks
 SLIDING_ON = 178  # seed: it goes on slipping to and fro
@@ -22,10 +22,8 @@ TOLERANCE = SolverSettings().tolerance
 
 def started(seed, **settings):
     scene = random_scene(seed)
-    frequencies = np.array([scene.frequency_hz])
-    return next(
-        follow_branch(scene.model, scene.friction, scene.amplitude, frequencies, "up", SolverSettings(**settings))
-    )[1]
+    omegas = [2.0 * np.pi * scene.frequency_hz]
+    return branch_states(scene.model, scene.friction, scene.amplitude, omegas, SolverSettings(**settings))[0]
 
 
 def ratcheting(seed, monkeypatch):
@@ -41,7 +39,7 @@ def ratcheting(seed, monkeypatch):
         # few samples: with many the last work falls slowly from one shakedown to the next
         started(seed, harmonics=3, samples=64)
     omega = 2 * np.pi * random_scene(seed).frequency_hz
-    return next((joint, point) for joint, point in seen if joint.omega == omega)
+    return next((joint, point) for joint, point in seen if np.isclose(joint.omega, omega, rtol=1e-12))
 
 
 @pytest.mark.slow

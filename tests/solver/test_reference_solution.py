@@ -21,7 +21,7 @@ from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import Scheme, SolverSettings
 from solver.wear import integrate
-from solver.wear.history import integrate_together, integrate_wear
+from solver.wear.history import integrate_together
 from solver.wear.integrate import SlowTime
 from solver.wear.step import Adaptive, Given, WearLine
 from tests.solver.models import branch_states, dovetail, march_wear, scene
@@ -109,12 +109,11 @@ def test_what_was_computed_of_a_history_that_ends_is_kept(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("step", [500.0, 2000.0])
-def test_where_euler_steps_let_a_pair_stick_again_the_error_says_so(step):
+def test_where_euler_steps_let_a_pair_stick_again_the_error_says_so():
     """2.026 mm3 by time integration; implicit steps, as adaptive ones with fewer harmonics, lead to 1.8 to 1.9 mm3."""
     model, settings = scene("dovetail_sector", 13, mesh=1), SolverSettings()
     (found,) = branch_states(model, 0.5, 0.5, [2.0 * np.pi * 212.5], settings)
-    history = march_wear(model, 0.5, found, WEAR, step, "implicit", np.array([0.0, 1e5]), settings)
+    history = march_wear(model, 0.5, found, WEAR, 2000.0, "implicit", np.array([0.0, 1e5]), settings)
     true = abs(2.026e-9 / history.worn_volume[-1] - 1.0)
     assert true > 0.05
     assert true < history.error_estimate < 0.5
@@ -247,7 +246,7 @@ def test_histories_that_are_integrated_together_are_those_alone(monkeypatch):
     asked = [SlowTime(WEAR, rule, CYCLES) for rule in (Given(4000.0), Adaptive(1e-2), Given(2000.0, "explicit"))]
     saved: list[Packed] = []
     together = list(integrate_together(model, 0.5, GIVEN, found, asked, saved.append))
-    alone = [integrate_wear(model, 0.5, GIVEN, found, each) for each in asked]
+    alone = [next(integrate_together(model, 0.5, GIVEN, found, (each,))) for each in asked]
     assert len(saved) > 5
     resumed = [list(integrate_together(model, 0.5, GIVEN, found, asked, resume=each)) for each in saved[1::3]]
     for other in (alone, *resumed):

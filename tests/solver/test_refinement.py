@@ -8,12 +8,9 @@ import pytest
 from solver.accuracy import refinement
 from solver.accuracy.certificate import certify
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.harmonic_levels import MOST_UNKNOWNS, n_unknowns, room_for
 from solver.accuracy.refinement import refine
 from solver.contact.coulomb import SLIP, STICK
-from solver.harmonic_balance.prolongation import transfer
-from solver.harmonic_balance.response_peak import largest_responses
-from solver.harmonic_balance.state import State, final_history
+from solver.harmonic_balance.state import State, final_history, largest_responses, transfer
 from solver.newton.run import Run
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import to_complex
@@ -113,12 +110,6 @@ def test_a_state_far_better_than_needed_goes_down_to_fewer():
     exact = response(case, SLIDER_OMEGA, 10.0, point)
     error = abs(response(refined.case, SLIDER_OMEGA, 10.0, refined.point) / exact - 1.0).max()
     assert 0.5 * error <= refined.estimate.response <= 0.5 * settings.rtol
-
-
-def test_a_large_joint_may_have_as_many_harmonics_as_that_of_48_pairs():
-    assert n_unknowns(Resolution(all_orders(27), 128), 144) <= MOST_UNKNOWNS
-    for n_pairs in (1, 48, 160, 2000):
-        assert n_unknowns(Resolution(all_orders(27), 128), 3 * n_pairs) <= room_for(MOST_UNKNOWNS, 3 * n_pairs)
 
 
 # constant normal loads: with impacts as well, states of a random model have too many neighbours to be told apart

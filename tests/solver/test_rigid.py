@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from solver.accuracy.resolved_state import ResolvedState
-from solver.harmonic_balance.prolongation import carried_history
-from solver.harmonic_balance.response_peak import largest_responses, tail_orders
+from solver.harmonic_balance.state import carried_history, largest_responses, tail_orders
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, SolverSettings

@@ -13,7 +13,7 @@ from solver.results.state_report import periodic_state, report_state
 from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
 from solver.structure.joint import build_case
-from tests.solver.contact_twin import pair_period, status
+from tests.solver.contact_twin import pair_period
 from tests.solver.models import OMEGA, first_point, random_model
 from tests.solver.reconstruction import contact_work, full_motion, series
 
@@ -124,17 +124,6 @@ def test_the_excitation_works_as_much_as_damping_and_friction_take(kinds, seed):
     work, viscous, friction = motion.excitation_work(), motion.viscous_work(), contact_work(state, forces)
     assert friction > 0.01 * work
     assert work == pytest.approx(viscous + friction, rel=1e-6, abs=0.0)
-
-
-@pytest.mark.parametrize("kinds", KINDS)
-@pytest.mark.parametrize("seed", [1, 2])
-def test_every_sample_of_a_periodic_state_is_what_the_plain_law_says(kinds, seed):
-    """That samples obey Signorini and Coulomb is in `test_properties`."""
-    at = periodic(kinds, seed)[1].evaluation
-    assert at.periodicity_error <= 1e-9 * max(float(at.force_t[:, 0].max()), 1.0)
-    for pair in range(len(at.force_t)):
-        expected = status(at.predicted_t[pair], FRICTION, at.state_t[pair, :, :-1])
-        assert np.array_equal(at.status_t[pair], expected)
 
 
 @pytest.mark.parametrize("kinds", KINDS)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from solver.accuracy.error_estimate import Estimate
-from solver.accuracy.period_events import left_out
+from solver.accuracy.harmonic_levels import left_out
+from solver.continuation.natural import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.harmonic_balance.state import Failure
-from solver.march.steps import LARGEST_STEP_RATIO, SMALLEST_STEP_RATIO
 from solver.outcome import Outcome
-from solver.packing import in_rows, pack, unpack
 from solver.settings import Scheme, SolverSettings
 from solver.wear import step as control
 from solver.wear.check import chosen_for_another
@@ -157,23 +156,6 @@ def test_a_step_of_second_order_solves_its_own_equation(monkeypatch):
     w, grown = h[1:] / h[:-1], np.diff(depth)
     expected = w**2 / (1 + 2 * w) * grown[:-1] + (1 + w) / (1 + 2 * w) * h[1:] * rate[2:]
     assert grown[1:] == pytest.approx(expected, rel=1e-9)
-
-
-@pytest.mark.parametrize("rule", [Given(4000.0, "explicit"), Given(4000.0), Adaptive(1e-2)])
-def test_a_state_is_data_that_survives_being_kept(rule):
-    """The step from an unpacked state is equal to the last bit, in a joint that has computed nothing before."""
-    kept = in_rows(steps_of(rule, 3)[0][-1])
-
-    def next_of(state):
-        work, _ = begun()
-        work.drop_factor()
-        step = WearLine(work, rule, np.inf).step(state)
-        assert isinstance(step, Step)
-        return step.state
-
-    one, other = (pack(next_of(state)) for state in (kept, unpack(pack(kept))))
-    assert one.text == other.text
-    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one.arrays, other.arrays, strict=True))
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.results.state_report import periodic_state
 from solver.settings import SolverSettings
-from solver.stability.hill import is_stable
+from solver.stability.floquet import is_stable
 from solver.structure.joint import build_case
 from tests.references import coulomb_orbit
 from tests.solver.models import converged_state, crossings, first_point, scene
@@ -33,7 +33,7 @@ def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
     case, idle = build_case(scene("two_masses"), 0.5, omega, SolverSettings(21, 256)), np.zeros(1)
     rest = first_point(case, omega, 0.0, idle)
     quiet, joint = case.joint(omega, 0.0), case.joint(omega, 20.0)
-    found = relax_to_periodic(case, joint, idle, rest.evaluation, quiet, rest.history, Run(1e-8))
+    found = relax_to_periodic(case, joint, idle, rest, quiet, Run(1e-8))
     moved = np.abs(full_motion(case.model, periodic_state(joint, found)).displacement[1])
     assert moved == pytest.approx([abs(orbit.harmonic(dof)) for dof in (0, 1)], rel=0.02, abs=0.0)
 
@@ -57,9 +57,7 @@ def test_behind_the_fold_the_mass_falls_on_the_branch_without_impacts(omega):
     before, joint = case.joint(1.55, FORCE), case.joint(omega, FORCE)
     start = upper_state(case, 1.55)
     budget = Budget()
-    found = relax_to_periodic(
-        case, joint, np.zeros(1), start.evaluation, before, start.history, Run(case.settings.tolerance, budget)
-    )
+    found = relax_to_periodic(case, joint, np.zeros(1), start, before, Run(case.settings.tolerance, budget))
     assert found is not None
     moved = full_motion(case.model, periodic_state(joint, found)).displacement[1][1]
     assert abs(moved) == pytest.approx(FORCE / abs(1 - omega**2 + 0.05j * omega), rel=1e-6, abs=0.0)
@@ -78,9 +76,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
     middle = next(filter(grows, crossings(Arc(balance_at, start, 0.03, Run(1e-9)), 0.03, 1.0)))
     case = build_case(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
-    found = relax_to_periodic(
-        case, joint, np.zeros(1), middle.evaluation, before, middle.history, Run(case.settings.tolerance)
-    )
+    found = relax_to_periodic(case, joint, np.zeros(1), middle, before, Run(case.settings.tolerance))
     assert isinstance(found, State)
     assert found is not None
     landed = replace(found, parameter=0.03 * (1.0 + change))
@@ -129,9 +125,7 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_told_so(monkeypatch)
     for most in (transient.SEARCH_ITERATIONS, 10):
         monkeypatch.setattr(transient, "SEARCH_ITERATIONS", most)
         budget = Budget()
-        outcome = relax_to_periodic(
-            case, joint, idle, rest.evaluation, quiet, rest.history, Run(case.settings.tolerance, budget)
-        )
+        outcome = relax_to_periodic(case, joint, idle, rest, quiet, Run(case.settings.tolerance, budget))
         outcomes.append(Outcome.CONVERGED if isinstance(outcome, State) else outcome)
         # one step and one search for the periodic state may be under way
         assert budget.iterations <= most + 2 * NEAR_ITERATIONS

@@ -70,9 +70,7 @@ def test_the_structure_settles_to_the_state_that_the_balance_has():
     joint, quiet = case.joint(omega, 0.5), case.joint(omega, 0.0)
     rest = solve_first_state(case, omega, 1e-6, np.zeros(16), Run(case.settings.tolerance))
     assert isinstance(rest, State)
-    settled = relax_to_periodic(
-        case, joint, np.zeros(16), rest.evaluation, quiet, rest.history, Run(case.settings.tolerance)
-    )
+    settled = relax_to_periodic(case, joint, np.zeros(16), rest, quiet, Run(case.settings.tolerance))
     assert isinstance(settled, State)
     one, other = (
         joint.structure.response_h(joint.to_relative(at.evaluation.displacement_h))[0, 1:3] for at in (point, settled)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.outcome import Outcome, in_digits
+from solver.outcome import Outcome
 from solver.results.verdict import judge
 from tests.studyrunner.histories import history
 
@@ -54,25 +54,3 @@ def test_the_outcome_is_that_of_the_counts_that_are_judged(rows, changed, outcom
     assert bool(found[1]) is bool(said)
     if {"held_from", "inaccurate_from"} <= set(changed):
         assert "; from cycle 8 on every pair slips" in found[1]
-
-
-@pytest.mark.parametrize(
-    ("other", "error", "said"),
-    [
-        (1e-9, 0.6, "worn volume 2 mm3, but 1 mm3 with longer steps, fewer harmonics and a coarser sweep: known"),
-        (1.8e-9, 3.0, "worn volume 2 mm3, not known: 1.8 mm3 with longer steps, fewer harmonics and a coarser"),
-        (np.nan, 0.6, "worn volume 2 mm3, known to 60 % only: with longer steps, fewer harmonics and a coarser"),
-        (np.nan, np.inf, "worn volume 2 mm3, not known: with longer steps"),
-    ],
-)
-def test_an_unknown_volume_stands_beside_that_of_the_reference_solution(other, error, said):
-    errors = {"worn_volume_error": np.array([0.0, 0.1, error]), "reference_volume": np.array([0.0, 1e-9, other])}
-    assert judged(**{**UNKNOWN, **errors})[1].startswith(said)
-
-
-@pytest.mark.parametrize(
-    ("value", "digits", "text"),
-    [(2000.0, 2, "2000"), (123456.0, 3, "123000"), (0.35, 3, "0.35"), (np.inf, 3, "inf"), (0.0, 6, "0")],
-)
-def test_counts_have_no_exponent(value, digits, text):
-    assert in_digits(value, digits) == text

@@ -22,7 +22,6 @@ WEAR = 1.1e-11  # 1/Pa
 AREA = 1e-4
 END = 8e4
 COARSE = SolverSettings(harmonics=5, samples=64, tolerance=1e-11)
-FINE = SolverSettings(harmonics=21, samples=256)
 CYCLES = np.linspace(0.0, END, 9)
 
 

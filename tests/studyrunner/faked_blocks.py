@@ -67,7 +67,7 @@ class FakedBlocks:
             return Failure(self.fails[block.name])
         slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
         return BlockRun(
-            cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, like=Like((), 1.0, 1), iterations=7
+            cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, like=Like((), 1.0), iterations=7
         )  # fmt: skip
 
 

@@ -38,5 +38,14 @@ class Solver:
             self.disturb(task, self.n_results)
             yield result
 
+    def end_at(self, number: int) -> None:
+        """The run is interrupted at its result of this number, counted from the last beginning on."""
+
+        def interrupt(_: Task, n_results: int) -> None:
+            if n_results >= number:
+                raise KeyboardInterrupt
+
+        self.disturb = interrupt
+
     def begin_again(self) -> None:
         self.__dict__.update(tasks=[], n_results=0, disturb=lambda *_: None)

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from solver.packing import Packed
-from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.checkpoint.records import record_type
+from studyrunner.checkpoint.completion_index import CompletionIndex, record_type
 from studyrunner.checkpoint.store import Store
 from studyrunner.kinds.task import Identity, Index, Keep, PointResult, Result, StartResult, Task, TaskPlan, digest
 from studyrunner.kinds.wear import History, Sweep
@@ -70,8 +69,6 @@ def fake_history(task: History, facts: SceneFacts = FACTS, seconds: float = 0.0,
             continue
         shape = tuple({"cycle": len(task.cycles), **sizes}[dimension] for dimension in ASKED[name].dimensions)
         values[name] = fingerprint + np.arange(float(np.prod(shape))).reshape(shape)
-        if ASKED[name].flags:
-            values[name] = values[name] >= 0.0
         values[name] = values[name].astype(ASKED[name].dtype)
     totals = dict.fromkeys(("outcome", "branch"), 0)
     totals |= dict.fromkeys(("jump_cycle", "cycles_to_target", "cycles_to_target_error", "fold_frequency"), np.nan)

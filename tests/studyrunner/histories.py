@@ -25,7 +25,6 @@ def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED, loops: np
         "wear_rate_error": np.full(n, np.nan),
         "harmonics_used": np.arange(n) + 3,
         "samples_used": np.full(n, 64),
-        "stable": np.arange(n) < 2,
         "worn_volume_error": 0.03 * line,
         "wear_depth_error": 0.1 * pair,
         "reference_volume": 1.5 * line,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm, qmc
 
 from solver.outcome import Outcome
-from studyrunner.checkpoint.records import variable_sizes
+from studyrunner.checkpoint.completion_index import variable_sizes
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.kinds.task import Index, PointResult
 from studyrunner.result.arrays import attributes, coordinates, scene_arrays
@@ -158,7 +158,7 @@ def make_result(
     axes = {"frequency": frequency, "wear_coefficient": wear_coefficient, "excitation_amplitude": (0.5,)}
     axes |= {"step": (1000.0,), "scheme": scheme, "sweep": sweep}
     names = ("worn_volume", "wear_rate", "wear_depth", "mean_pressure", "response_amplitude", "response_phase")
-    names += ("response_error", "wear_rate_error", "energy_error", "stable", "worn_volume_error")
+    names += ("response_error", "wear_rate_error", "energy_error", "worn_volume_error")
     dataset = build_file(
         axes, cycles, positions=_positions(pairs), surfaces=["left"] * 6 + ["right"] * 6, variables=names
     )
@@ -192,7 +192,7 @@ def make_result(
     dataset["contact_area"].values[...] = 2e-6
     for flat in failed:
         fail(dataset, flat, failing)
-    kept = dataset[[*data, "stable", "outcome", "last_cycle"]].drop_vars(without)
+    kept = dataset[[*data, "outcome", "last_cycle"]].drop_vars(without)
     study = '[study]\nname = "s"\n[scene]\nnodal_diameter = 0\n[solver]\nrtol = 0.01\n[slow_time]\ncycles = 1\n'
     return Result(Path("made.nc"), kept.assign_attrs(title="Made up", study=study))
 
@@ -341,8 +341,6 @@ def made_result(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Inde
             values[...] = np.nan if name in UNKNOWN else 0.0
         if name in ("last_cycle", "last_mission"):
             values[...] = study.cycles_kept[-1]
-        if name == "stable":
-            values[...] = 1
         for point in np.ndindex(dataset["outcome"].shape) if name in given else ():
             values[point] = given[name](point)
     return dataset

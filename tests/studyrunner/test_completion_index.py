@@ -12,13 +12,13 @@ import pytest
 import solver
 from solver.outcome import COMPLETE, Outcome
 from solver.packing import Packed
-from studyrunner.checkpoint.completion_index import MOST_CRASHES, MOST_OF_OTHERS
+from studyrunner.checkpoint.completion_index import MOST_CRASHES
 from studyrunner.checkpoint.store import RESULTS, STARTS
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import Identity, solver_digest
 from studyrunner.kinds.wear import Sweep
 from studyrunner.study.study_file import read_study
-from studyrunner.task_progress import TaskProgress
+from studyrunner.task_runs import TaskProgress
 from tests.studyrunner.fakes import FACTS, changed, fake_evaluate, fake_sweep, open_completion, without_values
 
 BASE = (
@@ -208,19 +208,6 @@ def test_only_states_from_which_something_begins_are_asked_for(finished):
         assert left == replace(sweep, known=frozenset({0, 2}))
         assert left.n_results == 1
         assert compute(completion) == (1, 1)
-
-
-@pytest.mark.parametrize(("most", "expected"), [(MOST_OF_OTHERS, (0, 0)), (0.0, (6, 12)), (1.0, (6, 12))])
-def test_what_another_study_has_left_stays_up_to_a_size(most, expected, finished):
-    other = "axes.excitation_amplitude=11"
-    with completion_of(finished, other) as completion:
-        assert compute(completion) == (6, 12)
-        completion.prune(most)
-        assert completion.n_points_finished == 12
-    with completion_of(finished, other) as completion:
-        assert compute(completion) == (0, 0)
-    with completion_of(finished) as completion:
-        assert compute(completion) == expected
 
 
 def test_a_start_state_that_failed_is_tried_again_and_no_other_one(folder):

@@ -1,6 +1,8 @@
 """A run that is ended at any point leaves a result that opens, and the next one ends with the same numbers."""
 
 import contextlib
+import os
+import signal
 import sqlite3
 import time
 from dataclasses import replace
@@ -14,6 +16,7 @@ from solver.packing import Packed
 from studyrunner.cli import main
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.mpi import schedule
+from studyrunner.result import write
 from tests.mpi.launching import count_entries, results
 from tests.studyrunner.faked_runs import SMALL
 from tests.studyrunner.fakes import fake_sweep
@@ -24,9 +27,9 @@ N_POINTS, N_RESULTS = 8, 4 + 8
 TWO_WAYS = [*SMALL[:-2], "--set", "axes.sweep=['up', 'down']", *SMALL[-2:]]
 
 
-def whole(solver):
+def whole(solver, study=TWO_WAYS):
     """The result of a run that nothing disturbs."""
-    assert main([*TWO_WAYS[:-1], "whole.nc"]) == 0
+    assert main([*study[:-1], "whole.nc"]) == 0
     solver.begin_again()
     return results("whole.nc")
 
@@ -46,12 +49,7 @@ def assert_partial(found, expected):
 @pytest.mark.parametrize("at", [1, 8])
 def test_an_interrupt_in_any_task(at, solver, capsys):
     expected = whole(solver)
-
-    def interrupt(_, n_results):
-        if n_results == at:
-            raise KeyboardInterrupt
-
-    solver.disturb = interrupt
+    solver.end_at(at)
     capsys.readouterr()
     assert main(TWO_WAYS) == 130
     n_there = assert_partial(results(), expected)
@@ -64,6 +62,19 @@ def test_an_interrupt_in_any_task(at, solver, capsys):
     xr.testing.assert_identical(results(), expected)
     again = capsys.readouterr().err
     assert (f"{n_there} of {N_POINTS} points are there from an earlier run" in again) == (n_there > 0)
+
+
+def test_a_signal_while_the_whole_result_is_written_changes_nothing(solver, monkeypatch, capsys):
+    own = write.write_result
+
+    def end(*given, **more):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return own(*given, **more)
+
+    monkeypatch.setattr(write, "write_result", end)
+    assert main(SMALL) == 0
+    assert (results().outcome == 0).all()
+    assert "interrupted" not in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -140,7 +151,8 @@ def test_progress_is_gone_on_from(solver, monkeypatch):
 
 def test_progress_beyond_states_that_are_lost_is_no_harm(solver, monkeypatch):
     """Start states may be damaged while the progress of their branch is not."""
-    expected = whole(solver)
+    study = [arg.replace("[100, 110]", "[100, 110, 120]") for arg in TWO_WAYS]
+    expected = whole(solver, study)
     monkeypatch.setattr(schedule, "SECONDS_TO_PROGRESS", -1.0)
     own, ended = solver.evaluate, False
 
@@ -161,11 +173,11 @@ def test_progress_beyond_states_that_are_lost_is_no_harm(solver, monkeypatch):
         "evaluate",
         lambda model, task, keep: task.compute({}, keep) if task.gives_starts else own(model, task, keep),
     )
-    assert main(TWO_WAYS) == 130
+    assert main(study) == 130
     assert count_entries("progress") > 0
     with contextlib.closing(sqlite3.connect("out.nc.progress")) as database, database:
         database.execute("DELETE FROM entries WHERE kind = 'start'")
-    assert main(TWO_WAYS) == 0
+    assert main(study) == 0
     xr.testing.assert_identical(results(), expected)
 
 

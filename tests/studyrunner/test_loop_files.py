@@ -10,6 +10,7 @@ from solver.results.state_report import LOOP_PHASES
 from studyrunner import variables
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result.arrays import coordinates
+from studyrunner.result.target import Target
 from studyrunner.result.write import write_result
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
@@ -44,7 +45,9 @@ def write(tmp_path):
         completion.store.flush()
         path = tmp_path / f"{n_contact}.nc"
         with contextlib.closing(completion.store):
-            write_result(study, facts, completion, path, [*coordinates(study, facts, pair_arrays(study, [facts]))], {})
+            write_result(
+                study, facts, completion, Target(path), [*coordinates(study, facts, pair_arrays(study, [facts]))], {}
+            )
         return path
 
     return write_file

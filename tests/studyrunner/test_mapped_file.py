@@ -13,12 +13,9 @@ THINGS["part"] = np.arange(10.0)[::2]
 
 
 def test_a_scene_is_the_same_with_its_arrays_in_a_file(tmp_path):
-    model = build_scene("dovetail_sector", mesh=1, nodal_diameter=3, n_harmonics=3)
+    model = build_scene("sdof_slider")
     other = open_mapped(write_mapped(model, tmp_path / "model"))
     assert describe_scene(other).digest == describe_scene(model).digest
-    stiffness = other.linear[0].stiffness
-    assert stiffness.flags.writeable
-    assert stiffness.flags.aligned
 
 
 def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path):
@@ -29,12 +26,13 @@ def test_what_one_writes_is_not_seen_by_others_and_all_layouts_are_kept(tmp_path
     written.remove()
     for name in ("f", "none", "part"):
         np.testing.assert_array_equal(other[name], THINGS[name])
+    assert other["c"].flags.aligned
     assert other["f"].flags.f_contiguous
     assert other["n"] is None
 
 
 class Blind:
-    """Ranks of which some do not see a file. full: the disk of rank 0 is."""
+    """Ranks of which some do not see a file."""
 
     rank = 0
 
@@ -50,16 +48,14 @@ class Blind:
 
 
 @pytest.mark.parametrize(("size", "blind", "expected"), [(1, (), ()), (3, (), (1, 2)), (4, (1, 3), (2,))])
-def test_ranks_that_see_a_file_are_found_and_the_file_goes(size, blind, expected, tmp_path):
+def test_ranks_that_see_a_file_are_found_and_the_file_goes(size, blind, expected, tmp_path, monkeypatch):
     assert ranks_that_see(Blind(size, blind), tmp_path / "file") == frozenset(expected)
     assert list(tmp_path.iterdir()) == []
 
-
-def test_on_a_full_disk_no_file_is_seen_and_none_is_left(tmp_path, monkeypatch):
     def create(path):
         path.touch()
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(mapped_file, "create", create)
-    assert ranks_that_see(Blind(2, ()), tmp_path / "file") == frozenset()
+    assert ranks_that_see(Blind(size, ()), tmp_path / "file") == frozenset()
     assert list(tmp_path.iterdir()) == []

@@ -5,6 +5,7 @@ import itertools
 import re
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -12,12 +13,11 @@ from studyrunner import task_runs
 from studyrunner.cli import main
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.kinds.task import StartResult
-from studyrunner.scene.scene import describe_scene
 from studyrunner.study.study_file import read_study
 from studyrunner.system.progress import ProgressDisplay, Standing
-from studyrunner.task_progress import TaskProgress
+from studyrunner.task_runs import TaskProgress
 from tests.benchmarks.simulation import MemoryIndex, Overheads, replay
-from tests.studyrunner.fakes import fake_evaluate, fake_history, fake_sweep
+from tests.studyrunner.fakes import fake_history, fake_sweep
 
 LINE = re.compile(
     r"\[ *[\d.]+ (?:s|min|h)\] (?P<done>\d+) of (?P<all>\d+) points?, (?P<percent>\d+) %"
@@ -25,20 +25,11 @@ LINE = re.compile(
 )
 
 
-class Clock:
-    """Stands for `time.monotonic`."""
-
-    def __init__(self):
-        self.now = 1000.0
-
-    def __call__(self):
-        return self.now
-
-
 @pytest.fixture
 def clock(monkeypatch):
-    found = Clock()
-    monkeypatch.setattr("studyrunner.system.progress.time.monotonic", found)
+    """Stands for `time.monotonic`."""
+    found = SimpleNamespace(now=1000.0)
+    monkeypatch.setattr("studyrunner.system.progress.time.monotonic", lambda: found.now)
     return found
 
 
@@ -64,15 +55,9 @@ def test_a_line_every_half_minute_at_least(clock, capsys):
     assert len(lines) < 3600 / 30 + 12
 
 
-class Screen(io.StringIO):
-    """Stands for a terminal."""
-
-    def isatty(self):
-        return True
-
-
 def test_a_bar_on_a_terminal(clock, monkeypatch):
-    screen = Screen()
+    screen = io.StringIO()
+    screen.isatty = lambda: True
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "160")
@@ -96,16 +81,9 @@ def test_a_bar_on_a_terminal(clock, monkeypatch):
     assert 90 <= len(looks) <= 101
 
 
-def compute_slowly(task, models, keep):
-    """The stand-in for the solver; each start state and each history takes a while."""
-    for result in fake_evaluate(task, keep, describe_scene(models[0])):
-        time.sleep(0.15)
-        yield result
-
-
 @pytest.mark.parametrize("compiles", [True, False])
-def test_a_run_that_has_to_compile_says_so_once(compiles, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(task_runs, "compute_task", compute_slowly)
+def test_a_run_that_has_to_compile_says_so_once(compiles, solver, tmp_path, monkeypatch, capsys):
+    solver.disturb = lambda *_: time.sleep(0.05)
     numbers = itertools.count(3) if compiles else itertools.repeat(3)
     monkeypatch.setattr(task_runs, "n_compiled", lambda: next(numbers))
     assert main(["sdof_slider", "--set", "axes.frequency=100", "-o", str(tmp_path / "out.nc")]) == 0
@@ -153,9 +131,10 @@ def test_tasks_that_run_count_for_the_time_left_and_are_named():
     assert half.running == ("1 Hz implicit",)
     # a sweep down that has given two states is on the way to the third
     assert both.running[1] == f"sweep down to {down.frequencies[-3]:.6g} Hz"
-    # what is late is not over at once, and takes less than once more what it has taken
+    # what is late is not over at once; what is far behind may take as long again
     alone = TaskProgress(MemoryIndex(plan))
-    assert 0.2e6 <= alone.look([(history, 1, 1e6)]).seconds_left <= 0.5e6
+    for late, least, most in ((1.1, 0.2, 0.5), (1e6, 0.9, 1.0)):
+        assert least <= alone._still(history, expected, late * expected) / (late * expected) <= most
 
 
 def test_the_time_left_of_a_task_follows_the_share_of_it_that_is_done():
@@ -172,7 +151,7 @@ def test_the_time_left_of_a_task_follows_the_share_of_it_that_is_done():
     assert left[10:] == pytest.approx([0.01 * (100 - percent) * true for percent in range(50, 100, 5)])
 
 
-@pytest.mark.parametrize("n_ranks", [1, 3, 1000])
+@pytest.mark.parametrize("n_ranks", [1, 1000])
 def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks):
     """Equal costs and no overheads: the time is that of the work, or of a sweep and a history."""
     plan = plan_of()
@@ -186,6 +165,4 @@ def test_a_replay_takes_as_long_as_its_tasks_allow(n_ranks):
     assert found.work == pytest.approx(n_starts + 10.0 * n_histories)
     assert found.longest_way == pytest.approx(8.0 + 10.0)
     shortest = max(found.longest_way, found.work / n_ranks)
-    assert shortest - 1e-9 <= found.makespan <= shortest + 10.0
-    if n_ranks in (1, 1000):
-        assert found.makespan == pytest.approx(shortest)
+    assert found.makespan == pytest.approx(shortest)

@@ -8,8 +8,7 @@ import pytest
 
 from studyrunner.api import run_study
 from studyrunner.cli import main
-from studyrunner.result.creation_date import check_date
-from studyrunner.result.software import CHANGED, commit_of
+from studyrunner.result.provenance import CHANGED, check_date, commit_of
 from studyrunner.user_error import UserError
 from tests.studyrunner.faked_runs import SMALL
 
@@ -67,12 +66,12 @@ def test_a_wrong_date_is_bad_input(wrong, capsys):
 @pytest.mark.usefixtures("folder")
 def test_date_and_software_stand_in_the_result_and_change_nothing_else(solver, monkeypatch):
     there = {"software_commit": "b" * 40}
-    monkeypatch.setattr("studyrunner.run.describe_software", dict)
+    monkeypatch.setattr("studyrunner.result.provenance.commit_of", lambda _: "")
     assert main(SMALL) == 0
     without, n_results = attributes(), solver.n_results
     solver.begin_again()
     # what is finished is known by the same hashes whatever the date and the commit
-    monkeypatch.setattr("studyrunner.run.describe_software", lambda: there)
+    monkeypatch.setattr("studyrunner.result.provenance.commit_of", lambda _: "b" * 40)
     assert main([*SMALL, "--date=2026-11-23"]) == 0
     assert attributes() == without | there | {"date_created": "2026-11-23"}
     assert main([*SMALL, "--date"]) == 0

@@ -7,9 +7,17 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from studyrunner.coordinates import SCENE, STUCK_FREQUENCY
-from studyrunner.mission_variables import OF_A_MISSION, OF_MISSIONS
-from studyrunner.mode_variables import OF_A_MODE_POINT, OF_MODES
-from studyrunner.variables import ASKED, COUNTS, KEPT, LOOPS, Variable
+from studyrunner.variables import (
+    ASKED,
+    COUNTS,
+    KEPT,
+    LOOPS,
+    OF_A_MISSION,
+    OF_A_MODE_POINT,
+    OF_MISSIONS,
+    OF_MODES,
+    Variable,
+)
 
 PAGE = Path(__file__).parents[2] / "studyrunner/RESULT_FILE.md"
 OF_SCENE = SCENE["exact"] | SCENE["natural_frequency"] | {"stuck_frequency": STUCK_FREQUENCY}

@@ -12,8 +12,7 @@ from studyrunner import read_study
 from studyrunner.cli import main
 from studyrunner.scene.scene import build_study_scene, describe_scene, write_study_scene
 from studyrunner.scene.scene_set import find_scenes
-from studyrunner.study.realisation import realise
-from studyrunner.study.room_for_wear import expected_wear
+from studyrunner.study.realisation import expected_wear, realise
 from studyrunner.study.study_file import format_study
 
 STUDY = """

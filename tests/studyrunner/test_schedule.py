@@ -3,6 +3,7 @@
 import sys
 import threading
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 
@@ -13,14 +14,10 @@ from studyrunner.mpi.ranks import LauncherError, Ranks, launcher_rank, launcher_
 from studyrunner.mpi.schedule import Office, serve_tasks
 
 
-class Tasks(Office):
-    def __init__(self, tasks, take):
-        self.begin = lambda: tasks
-        self.take = take
-
-
 def serve(tasks, run, take=lambda *_: []):
-    serve_tasks(Ranks(), Tasks(tasks, take), lambda job, _: run(job))
+    office = Office()
+    office.begin, office.take = lambda: tasks, take
+    serve_tasks(Ranks(), office, lambda job, _: run(job))
 
 
 def test_long_tasks_go_first_and_results_make_new_ones():
@@ -99,17 +96,9 @@ class Job:
         return (("all", self.kind),)
 
 
-class Clock:
-    def __init__(self):
-        self.now = 0.0
-
-    def __call__(self):
-        return self.now
-
-
 def make(n_ranks, *jobs):
-    clock = Clock()
-    dispatcher: Dispatcher[Job] = Dispatcher(n_ranks, CostModel(), clock)
+    clock = SimpleNamespace(now=0.0)
+    dispatcher = Dispatcher(n_ranks, CostModel(), lambda: clock.now)
     dispatcher.add(jobs)
     return dispatcher, clock
 
@@ -124,18 +113,18 @@ def test_what_waits_is_bounded(monkeypatch):
     monkeypatch.setattr(dispatch, "_WAITING_A_RANK", 0)
     branches = [Job("branch", 1.0, 4, True)] * 50
     dispatcher, _ = make(1, *branches)
-    most, n_done, held = 0, 0, 0
+    most, n_done, waiting = 0, 0, 0
     while not dispatcher.done:
         ((rank, assignment),) = dispatcher.assign()
         for _ in range(assignment.task.n_results):
             dispatcher.deliver(rank, assignment.number, 1.0)
             if assignment.task.gives_starts:
                 dispatcher.add([Job("march", 1.0)])
-                held += 1
+                waiting += 1
         if not assignment.task.gives_starts:
-            n_done, held = n_done + 1, held - 1
-        most = max(most, held)
-    assert (n_done, held) == (200, 0)
+            n_done, waiting = n_done + 1, waiting - 1
+        most = max(most, waiting)
+    assert (n_done, waiting) == (200, 0)
     assert most < 10 + 4
 
 

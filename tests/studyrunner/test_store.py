@@ -1,27 +1,15 @@
 """The file of a study: what was written is there later; damage, other runs, and faults of the disk."""
 
 import contextlib
-import errno
 import os
 import sqlite3
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from solver.packing import Packed
 from studyrunner.checkpoint import store
-from studyrunner.checkpoint.store import (
-    COMPUTED,
-    PROGRESS,
-    RESULTS,
-    STARTS,
-    Store,
-    StoreInUseError,
-    read_study,
-)
+from studyrunner.checkpoint.store import COMPUTED, PROGRESS, RESULTS, STARTS, Store, StoreInUseError, read_study
 from studyrunner.user_error import StorageError
 
 KINDS = (STARTS, PROGRESS, RESULTS, COMPUTED)
@@ -104,15 +92,12 @@ ARRAYS = [
 ]
 
 
-@pytest.mark.parametrize("array", ARRAYS, ids=lambda array: f"{array.dtype}{array.shape}")
-def test_arrays_are_kept_to_the_last_bit(array):
-    found = store.from_blob(store.to_blob(Packed('{"text": "\udce9"}', (array, array))))
-    assert found.text == '{"text": "\udce9"}'
-    for one in found.arrays:
+def test_arrays_are_kept_to_the_last_bit():
+    given = Packed('{"text": "\udce9"}', tuple(ARRAYS))
+    found = store.from_blob(store.to_blob(given))
+    assert found.text == given.text
+    for one, array in zip(found.arrays, ARRAYS, strict=True):
         assert (one.dtype, one.shape, one.tobytes()) == (array.dtype, array.shape, array.tobytes())
-
-
-def test_objects_are_not_kept():
     with pytest.raises(TypeError, match="arrays of objects"):
         store.to_blob(Packed("", (np.array([{}], dtype=object),)))
 
@@ -120,6 +105,10 @@ def test_objects_are_not_kept():
 def test_a_transaction_is_there_as_a_whole_or_not_at_all(path):
     """On a disk without room for all of it."""
     fill(path, range(2))
+
+    def there(opened):
+        return {kind for (kind,) in opened._database.execute("SELECT kind FROM entries WHERE key=?", [key(7)])}
+
     with contextlib.closing(Store(path)) as opened:
         (n_pages,) = opened._database.execute("PRAGMA page_count").fetchone()
         opened._database.execute(f"PRAGMA max_page_count={n_pages + 1}").fetchall()
@@ -128,18 +117,11 @@ def test_a_transaction_is_there_as_a_whole_or_not_at_all(path):
         for _ in range(2):
             with pytest.raises(StorageError, match=r"No space left on device: make room there"):
                 opened.flush()
-            assert (7,) not in rows(opened, RESULTS)
+            assert there(opened) == set()
         # what could not be written waits until there is room
-        assert opened.has(STARTS, key(7))
         opened._database.execute("PRAGMA max_page_count=100000").fetchall()
         opened.flush()
-        assert {(kind,) for kind in (RESULTS, STARTS)} <= set(
-            opened._database.execute("SELECT kind FROM entries WHERE key=?", [key(7)])
-        )
-
-
-def rows(opened, kind):
-    return {(int(name, 16),) for (name,) in opened._database.execute("SELECT key FROM entries WHERE kind=?", [kind])}
+        assert there(opened) == {RESULTS, STARTS}
 
 
 def test_what_is_forgotten_is_gone_later_or_replaced_by_what_comes(path):
@@ -147,25 +129,11 @@ def test_what_is_forgotten_is_gone_later_or_replaced_by_what_comes(path):
     with contextlib.closing(Store(path)) as opened:
         opened.forget(RESULTS, key(1))
         opened.forget(STARTS, key(2))
-        assert not opened.has(RESULTS, key(1))
         assert opened.read(RESULTS, key(1)) is None
         opened.put(RESULTS, key(1), kept(77))
     with contextlib.closing(Store(path)) as opened:
         assert_same(opened.read(RESULTS, key(1)), kept(77))
-        assert not opened.has(STARTS, key(2))
-
-
-def test_what_is_computed_once_is_there_for_a_later_run_and_goes_when_none_asks_for_it(path):
-    with contextlib.closing(Store(path)) as opened:
-        assert opened.read_computed("natural frequencies") is None
-        opened.keep_computed("natural frequencies", kept(1))
-        opened.keep_computed("scene", kept(2))
-        opened.prune({}, 0.0)
-    with contextlib.closing(Store(path)) as opened:
-        assert_same(opened.read_computed("natural frequencies"), kept(1))
-        opened.prune({}, 0.0)
-    with contextlib.closing(Store(path)) as opened:
-        assert opened.keys(COMPUTED) == {"natural frequencies"}
+        assert key(2) not in opened.keys(STARTS)
 
 
 def test_tasks_under_way_are_counted_where_a_run_ended_hard(path):
@@ -173,7 +141,7 @@ def test_tasks_under_way_are_counted_where_a_run_ended_hard(path):
 
     def end_hard(*keys, alive=()):
         opened = Store(path)
-        opened.note_study("joint", "sdof_slider")
+        opened.note_study("of a joint")
         for each in keys:
             opened.note_begin(each)
         opened.flush()
@@ -199,13 +167,9 @@ def test_tasks_under_way_are_counted_where_a_run_ended_hard(path):
         assert opened.crashes == {}
 
 
-# what is damaged
-
-
-def change_tables(path, *commands):
+def change_tables(path, command):
     with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as changed:
-        for command in commands:
-            changed.execute(command).fetchall()
+        changed.execute(command).fetchall()
 
 
 def write_over(path):
@@ -218,8 +182,7 @@ DAMAGES = {
     "cut off": lambda path: os.truncate(path, path.stat().st_size // 2),
     "a page": write_over,
     "another file": lambda path: path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(1000)),
-    "another table": lambda path: change_tables(path, "CREATE TABLE spam (egg)"),
-    "a view": lambda path: change_tables(path, "CREATE VIEW spam AS SELECT load_extension('egg')"),
+    "another table": lambda path: change_tables(path, "CREATE VIEW spam AS SELECT load_extension('egg')"),
     "another version": lambda path: change_tables(path, "PRAGMA user_version=1"),
 }
 
@@ -232,8 +195,7 @@ def test_a_damaged_file_or_that_of_another_version_is_kept_aside_and_the_study_b
     with contextlib.closing(Store(path)) as opened:
         (note,) = opened.notes
         assert note.startswith("out.nc.progress is ")
-        assert note.endswith(": it is kept as out.nc.progress.old, and the study begins anew")
-        assert ("of another version" in note) == (damage == "another version")
+        assert "kept as out.nc.progress.old" in note
         assert entries_of(opened) == {}
         opened.put(RESULTS, key(8), kept(8))
         assert path.with_name("out.nc.progress.old").read_bytes() == before
@@ -250,26 +212,10 @@ def test_a_damaged_entry_is_forgotten_and_nothing_else(path):
         assert opened.keys(RESULTS) == {key(0), key(2), key(3)}
 
 
-# faults of the disk
-
-
-@pytest.mark.parametrize(
-    ("error", "words"),
-    [
-        (OSError(errno.EDQUOT, "Disk quota exceeded"), "Disk quota exceeded: make room there or give another result"),
-        (OSError(errno.EROFS, "Read-only file system"), "Read-only file system: see that it may be written or give"),
-        (OSError(errno.ESTALE, "Stale file"), "Stale file: mend that or give another result file with -o"),
-    ],
-)
-def test_what_there_is_to_do_depends_on_the_fault(error, words):
-    assert words in str(StorageError(Path("out.nc"), error))
-
-
 @pytest.mark.parametrize(
     ("code", "said"),
     [
         (sqlite3.SQLITE_IOERR_READ, "Input/output error: see whether the disk"),
-        (sqlite3.SQLITE_FULL, "No space left on device: make room there"),
         (sqlite3.SQLITE_READONLY, "Permission denied: see that it may be written"),
     ],
 )
@@ -291,8 +237,6 @@ def test_a_disk_that_fails_for_now_is_no_reason_to_throw_anything_away(code, sai
 
 @pytest.mark.parametrize("replaced", [False, True])
 def test_a_file_that_was_removed_meanwhile_is_told(replaced, opened, path):
-    opened.put(RESULTS, key(1), kept(1))
-    opened.flush()
     path.unlink()
     if replaced:
         path.write_bytes(b"of somebody else")
@@ -301,39 +245,11 @@ def test_a_file_that_was_removed_meanwhile_is_told(replaced, opened, path):
         opened.flush()
 
 
-# several runs
-
-HOLDER = """
-import sys, time
-from pathlib import Path
-from studyrunner.checkpoint.store import Store
-store = Store(Path(sys.argv[1]))
-print("locked", flush=True)
-time.sleep(float(sys.argv[2]))
-"""
-
-
-@contextlib.contextmanager
-def another_run(path, seconds):
-    command = [sys.executable, "-c", HOLDER, str(path), str(seconds)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
-        assert holder.stdout.readline() == "locked\n"
-        yield holder
-        holder.kill()
-
-
-def test_two_runs_are_kept_apart(path):
-    fill(path)
-    with another_run(path, 60.0) as holder:
-        for _ in range(2):
-            with pytest.raises(StoreInUseError, match=rf"process {holder.pid} on \S+$"):
-                Store(path)
-            assert read_study(path) is None  # it has not said so, and nobody waits for its lock
-    Store(path).close()
-
-
-def test_the_study_of_a_file_is_read_without_its_lock(path, opened):
-    assert read_study(path) is None
-    opened.note_study("joint", "sdof_slider")
-    assert read_study(path) == ("joint", "sdof_slider")
+def test_two_runs_are_kept_apart(path, opened):
+    for _ in range(2):
+        with pytest.raises(StoreInUseError, match=rf"process {os.getpid()} on \S+$"):
+            Store(path)
+    assert read_study(path) is None  # it has not said so, and nobody waits for its lock
+    opened.note_study("of a joint")
+    assert read_study(path) == "of a joint"
     assert read_study(path.with_name("none")) is None

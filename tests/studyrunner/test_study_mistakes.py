@@ -34,6 +34,7 @@ DRAW = "scatter.friction_coefficient"
 # a study, overrides, and for each line how it begins and what is in it
 WRONG = [
     (SLIDER, "axes.freqency=1", "axes.freqency = 1: unknown key, give frequency"),
+    (SLIDER, "slow_time.schemes=implicit", 'slow_time.schemes = "implicit": unknown key, give axes.scheme'),
     (SLIDER, "axis.frequency=1", "axis = {frequency = 1}: unknown table, give axes"),
     (SLIDER, "slow_time=3", "slow_time = 3: .. [slow_time]"),
     (SLIDER, "study.name='a/b'", 'study.name = "a/b": .. slash'),

@@ -13,8 +13,8 @@ from studyrunner.accessor import FretwearAccessor
 from studyrunner.kinds.kind import build_tasks
 from studyrunner.result import write as writing
 from studyrunner.result.arrays import coordinates, scene_arrays
-from studyrunner.result.paths import progress_file
 from studyrunner.result.provenance import describe_run
+from studyrunner.result.target import Target
 from studyrunner.scene.scene_set import pair_arrays
 from studyrunner.study.study_file import read_study
 from studyrunner.system import files
@@ -47,10 +47,10 @@ def write(results, path, *overrides):
 
 def write_study(study, results, path, of_scene=()):
     plan = build_tasks(study, FACTS.n_displacements)
-    completion = fake_completion(study, plan, results, progress_file(path))
+    completion = fake_completion(study, plan, results, Target(path).progress)
     arrays = [*coordinates(study, FACTS, pair_arrays(study, [FACTS])), *scene_arrays(study, of_scene)]
     with contextlib.closing(completion.store):
-        return writing.write_result(study, FACTS, completion, path, arrays, describe_run(study, FACTS))
+        return writing.write_result(study, FACTS, completion, Target(path), arrays, describe_run(study, FACTS))
 
 
 @pytest.fixture
@@ -71,7 +71,7 @@ CONTRACT = {
         (("cycle", "response"), "m", "response_amplitude response_mean response_peak"),
         (("cycle", "response"), "rad", "response_phase"),
         (("cycle",), "1", "residual penetration tension cone_violation energy_error response_error wear_rate_error"),
-        (("cycle",), "1", "worn_volume_error harmonics_used samples_used stable"),
+        (("cycle",), "1", "worn_volume_error harmonics_used samples_used"),
         ((), "1", "cycles_to_target cycles_to_target_error"),
         ((), "1", "outcome jump_cycle newton_iterations error_estimate branch"),
         ((), "1", "last_cycle step_limit message"),
@@ -110,7 +110,6 @@ def test_a_point_that_failed_opens_as_nan_and_0(tmp_path):
                 there = opened[name].values[point]
                 assert (np.isnan(there) if there.dtype.kind == "f" else there == 0).all(), name
                 assert "0 where there is no result" in opened[name].attrs.get("comment", "") or there.dtype.kind == "f"
-        assert opened.stable.sum() == opened.stable.size - 3
 
 
 @pytest.mark.parametrize(("overrides", "bytes_a_slab"), [((), 1e9), ((*SHARED, LOOP), 3000.0), ((WEAR_RATE,), 1.0)])
@@ -148,7 +147,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     with pytest.raises(StorageError, match="disk full"):
         write(fake_results(), path)
     assert path.read_text(encoding="utf-8") == "an earlier result"
-    assert sorted(tmp_path.iterdir()) == [path, progress_file(path)]
+    assert sorted(tmp_path.iterdir()) == [path, Target(path).progress]
 
 
 def test_the_examples_of_readme_and_pages_run(tmp_path, monkeypatch):

@@ -28,7 +28,6 @@ from studyrunner.result.view import NO_VOLUME, Result, as_sentences
 _MOST_LINES, _MOST_RESPONSES, _MOST_FOLDS, _MOST_MODES = 3, 3, 12, 6
 _OF_WEAR = ("wear_coefficient", "step", "scheme")
 _BEFORE = "worn_cycle"
-_RING: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 10, "markerfacecolor": "none"}
 _WORN: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (5, 1.5)), "marker": "s", "markersize": 4.5}
 
 
@@ -86,10 +85,6 @@ def _draw_new(
         text = label if _BEFORE in result.varying else ", ".join(filter(None, (label, "new joint")))
         full = {**result.shown_point(), **point}
         at, values = course.values, scale(line)
-        if result.has("stable"):
-            unstable = course.read(result, "stable", full)[:, 0] == 0
-            if unstable.any():
-                panel.plot(at[unstable], values[unstable], color="black", label="unstable", **_RING)
         if result.has("branch"):
             # open where the sweep has jumped
             jumps = np.flatnonzero(np.diff(course.read(result, "branch", full)) != 0) + 1

@@ -38,7 +38,7 @@ ALL_DRAWINGS = (
 )
 NOTHING = (
     *("worn_volume", "wear_rate", "wear_depth", "mean_pressure", "response_amplitude", "response_phase"),
-    *("response_error", "wear_rate_error", "energy_error", "stable"),
+    *("response_error", "wear_rate_error", "energy_error"),
 )
 FLAT = "worn_volume_map final_worn_volume wear_depth worn_profile"
 SAMPLED = "worn_volume_bands worn_volume_bands_course exceedance deciding_inputs deciding_input"
@@ -195,11 +195,11 @@ def test_final_volumes_have_bars_and_marks():
     np.testing.assert_allclose(bar[:, 1], [0.98 * worn, 1.02 * worn])
 
 
-def test_frequency_response_of_both_sweeps_is_open_at_the_fold_and_unstable_states_are_ringed():
+def test_frequency_response_of_both_sweeps_is_open_at_the_fold():
     result = make_result(sweep=["up", "down"], scheme=["implicit"])
-    branch, fold, stable = (result.dataset[name].copy() for name in ("branch", "fold_frequency", "stable"))
-    branch[2:, ..., 0], fold[2, ..., 0], stable[1, ..., 0] = 1, 201.4, 0
-    changed = with_variables(result, branch=branch, fold_frequency=fold, stable=stable)
+    branch, fold = (result.dataset[name].copy() for name in ("branch", "fold_frequency"))
+    branch[2:, ..., 0], fold[2, ..., 0] = 1, 201.4
+    changed = with_variables(result, branch=branch, fold_frequency=fold)
     lines = lines_of(draw_figure(changed, "frequency_response").figure.axes[0])
     for number, sweep in enumerate(("up", "down")):
         x, y = lines[f"sweep {sweep}, new joint"]
@@ -209,8 +209,6 @@ def test_frequency_response_of_both_sweeps_is_open_at_the_fold_and_unstable_stat
         assert np.flatnonzero(~known).tolist() == ([2] if number == 0 else [])
     (fold,) = [line for label, line in lines.items() if label.startswith("fold, sweep up")]
     assert set(fold[0].tolist()) == {201.4}
-    ringed = 1e3 * values_of(result, "response_amplitude", frequency=1, cycle=0, sweep=1)
-    np.testing.assert_allclose(lines["unstable"], [[201.0], [ringed]])
 
 
 def test_worn_joints_have_response_curves_and_joints_that_wore_differently_are_marks():

@@ -1,0 +1,271 @@
+"""The wear of one joint over cycles or over missions, from a model in Python."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
+from solver.forced_response import check_case, check_number, check_numbers, check_word, worn_model
+from solver.loading_history.start_states import follow_branch
+from solver.missions.history import integrate_missions
+from solver.missions.mission import Begin, Block, Mission, MissionHistory, Passage
+from solver.model import ReducedModel
+from solver.results.history import WearHistory
+from solver.settings import (
+    FOLLOWED,
+    TARGETS,
+    Direction,
+    Followed,
+    FollowedFrequency,
+    Scheme,
+    SolverSettings,
+    ToTheEnd,
+    WearTarget,
+)
+from solver.structure.joint import friction_of_pairs
+from solver.wear.history import integrate_together
+from solver.wear.integrate import SlowTime
+from solver.wear.step import steps_of
+
+
+def march_wear(
+    model: ReducedModel,
+    frequency: float | Followed,
+    excitation_amplitude: float,
+    friction_coefficient: ArrayLike | None,
+    wear_coefficient: float,
+    cycles: ArrayLike,
+    *,
+    scheme: Scheme | Literal["final"] = "adaptive",
+    step: float | None = None,
+    sweep: Direction = "up",
+    settings: SolverSettings | None = None,
+    law: WearLaw = ARCHARD,
+    until: WearTarget | None = None,
+    outputs: int = 101,
+    final_share: float = 1e-4,
+    wear_depth: ArrayLike | None = None,
+    between: tuple[float, float] | None = None,
+) -> WearHistory:
+    """Wear history of a joint that vibrates at one frequency, from its unworn state or from given depths on.
+
+    A failure is no exception: `outcome` and `message` of the history give the reason and the last cycle count.
+
+    Parameters
+    ----------
+    model
+        From `build_model`, `studies.build_scene` or `studies.read_scene`.
+    frequency
+        Of the excitation, Hz; or "resonance" or "peak", which it follows while the joint wears, see `between`.
+    excitation_amplitude
+        N. It multiplies the unit harmonic load of the model.
+    friction_coefficient
+        One number for all pairs, or (n_contact,) for each pair. None for a model with its own, e.g. from a scene file.
+    wear_coefficient
+        k_w of Eq. (2), 1/Pa; with the law "energy" the energy wear coefficient.
+    cycles
+        Ascending cycle counts at which the history is reported, or the last count alone. A missing 0 is added. With inf
+        the history ends where wear has come to an end, see `outputs`.
+    scheme, step
+        "adaptive" chooses its steps by `settings.rtol`. "implicit" and "explicit" take steps of `step` cycles, Eqs.
+        (23), (24). "final" is "adaptive" to the final state, in which nothing wears any more; it needs `cycles` = inf.
+    sweep
+        Way to the unworn state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
+    settings, law
+        The defaults of `SolverSettings`, and Archard's law (`solver.contact.wear_law`), if not given.
+    until
+        Wear at which the history ends before the last of `cycles`; `cycles_to_target` of the history is its count.
+    outputs, final_share
+        For `cycles` = inf. outputs: number of reported states, spaced evenly in worn volume and cycles. final_share:
+        the history ends where the wear rate of each pair is below this share of its own largest wear rate.
+    wear_depth
+        (n_contact,), m, of a joint that is worn before: opens the pairs as a gap does. Depths and volumes of the
+        history count from there.
+    between
+        Range of a frequency that is followed, Hz: (lowest, highest). The history begins at the first resonance that the
+        sweep meets in the range. "resonance" is phase resonance: in the first harmonic, the vibration is in quadrature
+        with the excitation, `F^H x` has no real part. "peak" is the largest amplitude of the first response in its
+        first harmonic, over the frequency at constant wear depth. Under strong damping both differ: for one degree of
+        freedom with the damping ratio zeta the peak lies lower by a factor sqrt(1 - 2 zeta^2).
+
+    Raises
+    ------
+    ValueError
+        A number is out of its range; counts do not ascend; the scheme needs a step that is not given; model, friction
+        or law do not fit together; the law "table", whose factors depend on the depth, is given with `wear_depth`.
+    """
+    settings = SolverSettings() if settings is None else settings
+    load, friction = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
+    at, follow = _check_frequency(frequency, between, sweep, scheme)
+    per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
+    to_the_end = np.ndim(cycles) == 0 and cycles == math.inf
+    counts = check_numbers("cycles", 0.0 if to_the_end else cycles, least=0.0)
+    if (np.diff(counts) <= 0.0).any():
+        raise ValueError("cycles: give ascending counts")
+    check_word("scheme", scheme, (*get_args(Scheme), "final"))
+    if scheme == "final" and (not to_the_end or until is not None):
+        raise ValueError('scheme: "final" goes with cycles = inf and without until')
+    if step is None and scheme not in ("adaptive", "final"):
+        raise ValueError(f'step: give the length of a step in cycles to the scheme "{scheme}"')
+    length = math.inf if step is None else check_number("step", step, above=0.0)
+    counts = counts if counts[0] == 0.0 else np.concatenate([[0.0], counts])
+    if to_the_end and scheme == "explicit":
+        raise ValueError('scheme: explicit steps cannot grow: give "adaptive" or "implicit" with cycles inf')
+    if to_the_end and outputs < 2:
+        raise ValueError(f"outputs = {outputs}: give at least 2, the unworn and the final state")
+    check_number("final_share", final_share, above=0.0)
+    if until is not None:
+        check_word("until.quantity", until.quantity, TARGETS)
+        check_number("until.value", until.value, above=0.0)
+    if wear_depth is not None and law.name == "table":
+        raise ValueError('wear_depth: give another law: the factors of a "table" depend on depths that count from 0')
+    model = worn_model(model, wear_depth)
+    # a law that does not fit the pairs is an error of the caller: raise it before the computation
+    wearing_work(law, model.contact, friction_of_pairs(model, friction))
+    _, start = next(follow_branch(model, friction, load, follow or np.array([at]), sweep, settings))
+    read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
+    steps = steps_of(scheme, length, settings.rtol)
+    asked = SlowTime(per_pressure, steps, read_at, law=law, until=until, follow=follow)
+    return next(integrate_together(model, friction, settings, start, (asked,)))
+
+
+def _check_frequency(
+    frequency: float | Followed, between: tuple[float, float] | None, sweep: Direction, scheme: str
+) -> tuple[float, FollowedFrequency | None]:
+    """The given frequency, Hz, or NaN and what the frequency follows. Raises ValueError."""
+    if not isinstance(frequency, str):
+        if between is not None:
+            raise ValueError('between: leave it out, or give "resonance" or "peak" as the frequency')
+        return check_number("frequency", frequency, above=0.0), None
+    check_word("frequency", frequency, FOLLOWED)
+    ends = np.zeros(0) if between is None else check_numbers("between", between, above=0.0)
+    if ends.size != 2 or not ends[0] < ends[1]:
+        raise ValueError("between: give the lowest and the highest frequency in Hz, as (205, 215)")
+    if sweep == "ramp":
+        raise ValueError('sweep: give "up" or "down": a ramp holds the frequency that is sought')
+    if scheme == "final":
+        raise ValueError('scheme: the scheme "final" holds the frequency: give "adaptive" with cycles = inf')
+    return math.nan, FollowedFrequency(frequency, float(ends[0]), float(ends[1]))
+
+
+def integrate_mission(
+    blocks: Sequence[Block],
+    wear_coefficient: float,
+    missions: ArrayLike,
+    *,
+    settings: SolverSettings | None = None,
+    law: WearLaw = ARCHARD,
+    until: WearTarget | None = None,
+    sweep: Direction = "up",
+    largest_step: int | None = None,
+) -> MissionHistory:
+    """Mission history of a joint from its unworn state on: blocks of vibration in order, repeated many times.
+
+    Depths are carried from block to block. Thousands of missions are integrated in steps of many missions at once
+    (`solver.missions.step`). A failure is no exception: `outcome` and `message` of the history give the reason.
+
+    Parameters
+    ----------
+    blocks
+        Blocks in the order; of `solver.Block`.
+    missions
+        Ascending whole numbers of missions at which the history is reported, or the last number alone. A missing
+        0 is added.
+    wear_coefficient, settings, law
+        As for `march_wear`.
+    until
+        Wear depth or worn volume at which the history ends before; `missions_to_target` of the history is its number.
+    sweep
+        Way to the state of the first mission, where its first block continues the last one of the mission before.
+    largest_step
+        Most missions that are computed at once; 1: every mission by itself. By default the error decides.
+
+    Raises
+    ------
+    ValueError
+        A number is out of its range; numbers of missions are not whole or do not ascend; there is no block; the blocks
+        do not have equal contact pairs; a block continues another one with another model or friction; a model, friction
+        or law does not fit.
+    """
+    settings = SolverSettings() if settings is None else settings
+    check_word("sweep", sweep, get_args(Direction))
+    if not blocks:
+        raise ValueError("blocks: give at least one block")
+    checked = tuple(_checked(block, place, settings, law) for place, block in enumerate(blocks))
+    for place, block in enumerate(checked):
+        _check_neighbours(checked[place - 1], block, place)
+    counts = check_numbers("missions", missions, least=0.0)
+    if (np.diff(counts) <= 0.0).any() or (counts != np.round(counts)).any() or counts[-1] < 1.0:
+        raise ValueError("missions: give ascending whole numbers, the last of at least 1")
+    if until is not None:
+        check_word("until.quantity", until.quantity, TARGETS[:2])
+        check_number("until.value", until.value, above=0.0)
+    if largest_step is not None and largest_step != round(check_number("largest_step", largest_step, least=1.0)):
+        raise ValueError(f"largest_step: give a whole number instead of {largest_step:g}")
+    wanted = tuple(sorted({0, *(int(count) for count in counts)}))
+    per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
+    return integrate_missions(
+        Mission(checked, per_pressure, wanted, settings, law, until, sweep, largest_step and int(largest_step))
+    )
+
+
+def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -> Block:
+    """The block with its numbers checked; errors name it by its number and its name."""
+    try:
+        check_word("begin", block.way, get_args(Begin))
+        load, friction = check_case(block.model, block.excitation_amplitude, block.friction_coefficient, "up", settings)
+        wearing_work(law, block.model.contact, friction_of_pairs(block.model, friction))
+        if block.way == "continue":
+            # the way from another amplitude is a ramp of this one
+            check_number("excitation_amplitude", load, above=0.0)
+        found = replace(block, excitation_amplitude=load, friction_coefficient=friction)
+        if isinstance(block.frequency, Passage):
+            return replace(found, frequency=_checked_passage(block, block.frequency))
+        if block.cycles is None:
+            raise ValueError("cycles: missing: only a passage has cycles of its own")
+        frequency = check_number("frequency", block.frequency, above=0.0)
+        return replace(found, frequency=frequency, cycles=check_number("cycles", block.cycles, above=0.0))
+    except ValueError as error:
+        raise ValueError(f"{_called(place, block)}: {error}") from error
+
+
+def _checked_passage(block: Block, passage: Passage) -> Passage:
+    """The passage of a block with its numbers checked."""
+    names = ("start", "stop", "rate")
+    found = Passage(*(check_number(f"frequency.{name}", getattr(passage, name), above=0.0) for name in names))
+    if found.start == found.stop:
+        raise ValueError("frequency.stop: give another frequency than start")
+    if block.cycles is not None:
+        raise ValueError("cycles: the cycles of a passage follow from its rate: leave them out")
+    if block.way != found.sweep:
+        raise ValueError(f'begin: this passage goes {found.sweep}: give "{found.sweep}"')
+    return found
+
+
+def _check_neighbours(before: Block, block: Block, place: int) -> None:
+    """Raises ValueError where a block does not have the pairs of the block before, or cannot continue it."""
+    one, other = before.model.contact, block.model.contact
+    same = one.n_contact == other.n_contact and (one.area == other.area).all() and one.surface == other.surface
+    said = ""
+    if not same or ((one.dofs < 0) != (other.dofs < 0)).any():
+        said = "model: give equal contact pairs to all blocks"
+    elif before.model.response_names != block.model.response_names:
+        said = "model: give equal responses to all blocks"
+    elif block.way == "continue":
+        rubs = [friction_of_pairs(each.model, each.friction_coefficient) for each in (before, block)]
+        if before.excitation_amplitude == 0.0:
+            said = "begin: the block before does not vibrate: begin with a ramp"
+        elif before.model is not block.model or (rubs[0] != rubs[1]).any():
+            said = 'begin: continue goes with the model and friction of the block before: give "ramp", "up" or "down"'
+    if said:
+        raise ValueError(f"{_called(place, block)}: {said}")
+
+
+def _called(place: int, block: Block) -> str:
+    return f"blocks[{place}]" + (f" ({block.name})" if block.name else "")

@@ -1,1 +1,0 @@
-"""Steps along a line of states, whose lengths follow from one rule."""

@@ -1,0 +1,154 @@
+"""Files that a run writes: obstacles are found, and results of other studies protected, before anything is computed."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from studies.hdf5 import is_hdf5, open_hdf5, read_attribute
+from studies.scene_error import SceneError
+from studies.scene_file import has_mesh
+from studyrunner.checkpoint.store import read_study
+from studyrunner.result.provenance import POINTS_LEFT
+from studyrunner.study.toml_text import read_toml
+from studyrunner.system.files import create, new_partial, sync
+from studyrunner.user_error import UserError
+
+if TYPE_CHECKING:
+    from studyrunner.study.study import Study
+
+_TRIAL = bytes(4096)  # a full disk has room for a name
+_UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, KeyError, SceneError, UserError)
+
+
+@dataclass(frozen=True)
+class Target:
+    """Path of a result. finished: whether a result without missing points exists, which only another such result
+    replaces.
+    """
+
+    path: Path
+    finished: bool = False
+
+    @property
+    def progress(self) -> Path:
+        """File of what is computed so far."""
+        return self.path.with_name(f"{self.path.name}.progress")
+
+    @property
+    def older_folder(self) -> Path:
+        """Folder of what version 0.4.0 or before has computed."""
+        return self.path.with_name(f"{self.path.name}.parts")
+
+
+def identity_of(study: Study) -> str:
+    """Identity of a study in words: the same study with other values, such as a finer axis, has the same."""
+    return _identity(study.study.name, study.scene.model)
+
+
+def _identity(name: str, model: str) -> str:
+    """name: of the study. model: of its scene; of a file the name without folders."""
+    return f'study "{name}" (scene {os.path.basename(model)})'  # noqa: PTH119 - of an empty text as well
+
+
+def check_output(option: str, path: Path, inputs: Sequence[Path]) -> Path:
+    """The file at `path`, links followed, after a test that it can be written; nothing is changed.
+
+    option: of the command line, that gave the path. inputs: files that the run reads and must not replace. Raises
+    UserError where the file cannot be written, or is one of the inputs.
+    """
+    try:
+        target = Path(os.path.realpath(path))
+        # the libraries that write it are given a text, not bytes
+        str(target).encode(sys.getfilesystemencoding())
+        remedy = _obstacle(option, path, target, inputs)
+        if not remedy:
+            trial = new_partial(target)
+            with create(trial) as file:
+                try:
+                    file.write(_TRIAL)
+                    sync(file)
+                finally:
+                    trial.unlink()
+    except OSError as error:
+        remedy = f"give a file that can be written: {error.strerror}"
+    except ValueError:
+        remedy = f"give a name in {sys.getfilesystemencoding().upper()}, as those of its folders"
+    if remedy:
+        raise UserError("command line", option, str(path), remedy)
+    return target
+
+
+def _obstacle(option: str, path: Path, target: Path, inputs: Sequence[Path]) -> str:
+    """Remedy for what keeps a file from being written to `target`; "" for nothing. Raises OSError."""
+    if target.is_dir():
+        return "give the name of a file: this is a folder"
+    if not target.parent.is_dir():
+        no_folder = next((part for part in path.parents if os.path.lexists(part) and not part.is_dir()), None)
+        missing = f"there is no folder {path.parent}" if no_folder is None else f"{no_folder} is no folder"
+        return f"give a file in a folder that exists: {missing}"
+    # what leads to a stream, or to a file without a name, exists although its target does not
+    if os.path.lexists(target) or path.exists():
+        if not target.is_file():
+            return "give the name of an ordinary file"
+        if not os.access(target, os.W_OK):
+            return "give a file that may be written: this one is write-protected"
+        if any(source.exists() and target.samefile(source) for source in inputs):
+            return f"give another file with {option}: this one is read by the run"
+    progress = Target(target).progress
+    if os.path.lexists(progress) and (progress.is_symlink() or not progress.is_file()):
+        return f"give another name: {progress.name}, which the run needs, is no plain file"
+    return ""
+
+
+def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how: str = "--overwrite") -> Target:
+    """Target of a result, after `check_output` and a test that nothing forbids to replace what exists there.
+
+    option: of the command line, that gave the path. study: of the new result. overwrite: whether a result of another
+    study may be replaced. how: the user asks for that, in words. Raises UserError where the file cannot be written, is
+    no result of run-study, or where it or its progress belongs to another study.
+    """
+    target = Target(check_output(option, path, study.files))
+    own, (standing, finished) = identity_of(study), _read_result(option, target.path)
+    for what, found in ((target.path, standing), (target.progress, read_study(target.progress))):
+        if found is not None and found != own and not overwrite:
+            remedy = f"give another name or {how}: {what.name} is of {found}, this is {own}"
+            raise UserError("command line", option, str(target.path), remedy)
+    return Target(target.path, finished)
+
+
+def check_scene_file(option: str, path: Path, study: Study) -> Path:
+    """As `check_output`, of a scene file. Raises UserError also where a file exists that is no scene file."""
+    target = check_output(option, path, study.files)
+    with contextlib.suppress(*_UNREADABLE):
+        if not target.exists() or target.stat().st_size == 0:
+            return target
+        if is_hdf5(target):
+            has_mesh(target)  # raises where there is anything but a scene
+            with open_hdf5(target) as file:
+                if read_attribute(file, "study") is None:
+                    return target
+    remedy = "give another name: this is no scene file, and is left as it is"
+    raise UserError("command line", option, str(target), remedy)
+
+
+def _read_result(option: str, path: Path) -> tuple[str | None, bool]:
+    """Identity of the study of an existing result, None without one, and whether the result is finished."""
+    with contextlib.suppress(*_UNREADABLE):
+        # damaged, or unreadable: it may be anything
+        if not path.exists() or path.stat().st_size == 0:
+            return None, False
+        with open_hdf5(path) as file:
+            text, left = read_attribute(file, "study"), read_attribute(file, POINTS_LEFT)
+            stored: Any = b"" if text is None else text.item()
+            table: Any = read_toml(stored if isinstance(stored, bytes) else stored.encode(), "")
+            found = _identity(str(table["study"]["name"]), str(table["scene"]["model"]))
+            # version 0.4.0 does not say how many points are left
+            return found, left is None or left.item() == 0
+    remedy = "remove the file or give another name: it is no result of run-study that can be read, and is left as it is"
+    raise UserError("command line", option, str(path), remedy)

@@ -1,0 +1,145 @@
+"""The process of a command: signals that end it, and streams that nobody reads.
+
+The first signal raises KeyboardInterrupt in the main thread. A callback of an import or of a library may lose this
+exception; then the next call of `raise_ending` raises it again, until `begin_ending` was called.
+
+By hand: `signal` of Python raises at any instruction, and nothing in it defers a signal or keeps a lost one. Streams
+of Python raise an error where nobody reads, at the end of the process as well.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from types import FrameType
+from typing import Any, TextIO
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+"""Ctrl-C, the end of the time of a job or of a terminal, and signals that batch systems send before the end."""
+
+SECONDS_OF_GRACE = 10.0
+"""Time after the first signal in which further signals do nothing, s; later ones end the process at once. A launcher
+sends its signal more than once, and a user may press Ctrl-C again. A result of 200 MB is written in 3 s."""
+
+INTERRUPTED = 130
+"""Exit status after an end from outside."""
+
+_LAST_STREAM = 2
+
+_n_uninterrupted = 0
+_came: float | None = None  # when the first signal came
+_begun = False
+
+
+def take_endings() -> None:
+    """From now on each of these signals raises KeyboardInterrupt in the main thread, once; ignored ones stay so."""
+    global _came, _begun
+    _came, _begun = None, False
+    for number in ENDING:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _interrupt)
+
+
+def begin_ending() -> None:
+    """The process comes to its end now: a signal does not disturb this any more.
+
+    A launcher sends its signal to all ranks, and rank 0 may hear of it from another rank first.
+    """
+    global _begun
+    _begun = True
+
+
+def is_ending(error: BaseException) -> bool:
+    """Whether an exception is the end from outside, or may be an exception that a library has made of it."""
+    return isinstance(error, KeyboardInterrupt) or _ending_waits()
+
+
+def raise_ending() -> None:
+    """Raises KeyboardInterrupt where a signal has come that nothing was done about.
+
+    For use between steps that may have lost the exception.
+    """
+    if _ending_waits():
+        raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """A block that is done as a whole: a signal during the block raises KeyboardInterrupt after the block.
+
+    For steps of the main thread that an exception between two instructions would leave half done: a message whose
+    memory is freed before it is sent, or a lock that is never released.
+    """
+    global _n_uninterrupted
+    _n_uninterrupted += 1
+    try:
+        yield
+    finally:
+        _n_uninterrupted -= 1
+        if _n_uninterrupted == 0:
+            raise_ending()
+
+
+def _ending_waits() -> bool:
+    return _came is not None and not _begun
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
+    global _came
+    now = time.monotonic()
+    if _came is not None:
+        if now > _came + SECONDS_OF_GRACE:
+            os._exit(INTERRUPTED)
+        return
+    _came = now
+    if not _n_uninterrupted and not _begun:
+        raise KeyboardInterrupt
+
+
+class _Patient(io.FileIO):
+    """A stream of the process that takes what it cannot write as well. error: why it could not, the first time."""
+
+    error: OSError | None = None
+
+    def write(self, data: memoryview) -> int:  # type: ignore[override]
+        """Length of the data, whatever became of them."""
+        left = memoryview(data).cast("B")
+        try:
+            # nothing at all is written where the other end is slow and must not be waited for
+            while left and (written := super().write(left)):
+                left = left[written:]
+        except OSError as error:
+            self.error = self.error or error
+        return len(data)
+
+
+def keep_talking() -> None:
+    """From here on stdout and stderr take what they are given: a closed pipe or a full log does not end a run.
+
+    What stands in for them, as in a test or a notebook, is left alone.
+    """
+    # Closed streams leave their numbers to files that are opened later, and libraries write to these numbers.
+    while (nowhere := os.open(os.devnull, os.O_RDWR)) <= _LAST_STREAM:
+        pass
+    os.close(nowhere)
+    if sys.stdout is sys.__stdout__:
+        sys.stdout = _open_patiently(1, sys.stdout)
+    if sys.stderr is sys.__stderr__:
+        sys.stderr = _open_patiently(_LAST_STREAM, sys.stderr)
+
+
+def last_error(stream: TextIO) -> OSError | None:
+    """Why something that was written to a stream did not arrive; None where it did, or where nobody can know."""
+    buffer = getattr(stream, "buffer", None)
+    return buffer.error if isinstance(buffer, _Patient) else None
+
+
+def _open_patiently(number: int, stream: TextIO | None) -> TextIO:
+    raw: Any = _Patient(number, "w", closefd=False)
+    # line by line: those of several processes do not get mixed; a name that the encoding lacks is shown by its numbers
+    return io.TextIOWrapper(raw, None if stream is None else stream.encoding, "backslashreplace", line_buffering=True)
