@@ -21,7 +21,6 @@ from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State, carried_history, history_at_rest, vibration_change, vibration_size
 from solver.model import FloatArray
-from solver.newton.linear_solver import FORCING
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import Resolution, first_resolution
@@ -78,10 +77,6 @@ class Path(Protocol[S]):
     @property
     def steps(self) -> tuple[float, float, float]:
         """Shortest and longest step, and the one at which a state that is not found is left to `rescue`."""
-
-    @property
-    def node_tolerance(self) -> float:
-        """Tolerance of the scaled residual of a node; results are solved to that of the settings."""
 
     def ahead(self, parameter: float, length: float) -> float:
         """The parameter a step farther, or back where the length is below 0."""
@@ -153,11 +148,6 @@ class LoadingPath:
     def steps(self) -> tuple[float, float, float]:
         """As in Path, over the frequency or the whole load."""
         return SHORTEST_STEP, LONGEST_STEP, FREE_STEP
-
-    @property
-    def node_tolerance(self) -> float:
-        """As in Path."""
-        return max(self.case.settings.tolerance, FORCING * self.case.settings.rtol)
 
     def ahead(self, parameter: float, length: float) -> float:
         """As in Path; a ramp ends at its whole load."""

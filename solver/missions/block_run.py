@@ -282,7 +282,9 @@ def _through_nodes(path: LoadingPath, begun: Begun, target: float, every_node: i
     ahead, halvings = [*nodes, target], 0
     while ahead:
         here, parameter = states[-1], ahead[0]
-        after = coarse.solve(states, parameter, run if parameter == target else run.to(coarse.node_tolerance))
+        after = coarse.solve(
+            states, parameter, run if parameter == target else run.to(coarse.case.settings.rough_tolerance)
+        )
         if after is not None and coarse.change(here, after, float(every_node)) <= LARGEST_CHANGE:
             states = (*states, after)[-KEPT_NODES:]
             ahead.pop(0)

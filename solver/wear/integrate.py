@@ -200,6 +200,7 @@ class Integrations:
         compared (n,): ascending counts at which it is read, the first 0. spent: as for `history`.
         """
         work, end = self._joint(asked), float(compared[-1])
+        work.run = work.run.to(self._case.settings.rough_tolerance)
         resolutions = tuple((count, coarser(resolution, self._case.model)) for count, resolution in like.resolutions)
         # a short history may consist of its first steps, which do not depend on rtol
         steps = Adaptive(RTOL_RATIO * self._case.settings.rtol, 2.0 if asked.ends_at_last else 1.0)
