@@ -33,12 +33,7 @@ def is_hdf5(path: Path) -> bool:
 def open_hdf5(path: Path) -> Iterator[h5py.File]:
     """The file, open for reading; damage that shows in use is a SceneError about "model".
 
-    Raises
-    ------
-    SceneError
-        Where it is no such file.
-    OSError
-        Where it is missing or not readable.
+    Raises SceneError where it is no such file, OSError where it is missing or not readable.
     """
     with path.open("rb"):  # says why, where h5py only says that a file cannot be opened
         pass
@@ -60,12 +55,8 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
 def find_datasets(group: h5py.Group) -> dict[str, h5py.Dataset]:
     """Datasets below a group, by name with the groups above.
 
-    Datasets that only name a dimension, and named types, are left out.
-
-    Raises
-    ------
-    SceneError
-        Where a dataset is stored elsewhere, has another type than numbers and text, or all together are too large.
+    Datasets that only name a dimension, and named types, are left out. Raises SceneError where a dataset is stored
+    elsewhere, has another type than numbers and text, or all together are too large.
     """
     links: list[tuple[str, Any]] = []
     group.visititems_links(lambda name, link: links.append((name, link)))

@@ -43,11 +43,8 @@ def check_model(model: ReducedModel, n_harmonics: int = 1, *, grouped: bool | No
     check_harmonics(model, n_harmonics)
     for k, linear in model.linear.items():
         if not 0 <= k <= model.n_sectors // 2:
-            raise SceneError(
-                f"nd/{k}",
-                f"there are {model.n_sectors} sectors",
-                f"give nodal diameters of 0 to {model.n_sectors // 2}",
-            )
+            found = f"there are {model.n_sectors} sectors"
+            raise SceneError(f"nd/{k}", found, f"give nodal diameters of 0 to {model.n_sectors // 2}")
         _check_linear(linear, f"nd/{k}/" if grouped else "", len(model.response_names))
     _check_contact(model.contact, min(len(linear.stiffness) for linear in model.linear.values()))
     _check_static(model.linear[0], model.contact, "nd/0/" if grouped else "")
@@ -88,11 +85,9 @@ def check_order(contact: ContactInterface) -> None:
         return
     if not (turned < 0).all(axis=1).any() and (contact.normal_load[turned[:, 0] < 0] > 0).all():
         name, value = PAIRS_ARE_ROWS
-        raise SceneError(
-            "contact/dofs",
-            "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction",
-            f'write one row for each pair, and give the dataset the attribute {name} = "{value}"',
-        )
+        found = "3 pairs, and nothing shows whether a row is a pair or, as MATLAB and Fortran write it, a direction"
+        remedy = f'write one row for each pair, and give the dataset the attribute {name} = "{value}"'
+        raise SceneError("contact/dofs", found, remedy)
 
 
 def _check_names(names: tuple[str, ...], key: str) -> None:
@@ -140,11 +135,8 @@ def _check_contact(contact: ContactInterface, n: int) -> None:
         )
     used, counts = np.unique(dofs[dofs >= 0], return_counts=True)
     if (counts > 1).any():
-        raise SceneError(
-            "contact/dofs",
-            f"index {used[counts > 1][0]} is used twice",
-            "give every direction a displacement of its own",
-        )
+        found = f"index {used[counts > 1][0]} is used twice"
+        raise SceneError("contact/dofs", found, "give every direction a displacement of its own")
     without = np.flatnonzero((dofs < 0).all(axis=1))
     if len(without):
         raise SceneError("contact/dofs", f"pair {without[0]} has no direction", "give it at least one, or leave it out")
@@ -158,11 +150,8 @@ def _check_contact(contact: ContactInterface, n: int) -> None:
             raise SceneError("contact/friction_coefficient", f"{value} at {_at(negative[:1])}", "give 0 or more")
     loose = np.flatnonzero((dofs[:, 0] < 0) & (contact.normal_load <= 0))
     if len(loose):
-        raise SceneError(
-            "contact/normal_load",
-            f"{contact.normal_load[loose[0]]} at {_at(loose[:1])}",
-            "give a positive normal force in N to a pair without closing displacement",
-        )
+        remedy = "give a positive normal force in N to a pair without closing displacement"
+        raise SceneError("contact/normal_load", f"{contact.normal_load[loose[0]]} at {_at(loose[:1])}", remedy)
 
 
 def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:

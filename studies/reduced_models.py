@@ -16,20 +16,12 @@ from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE as OF_A_WAVE
 def build_scene(name: str, /, *, n_harmonics: int = OF_A_WAVE, **parameters: object) -> ReducedModel:
     """Reduced model of a bundled scene, as a study with the same parameters has it.
 
-    Parameters
-    ----------
-    name
-        One of `studies.scenes.BUNDLED`, such as "dovetail_sector" or "sdof_slider".
-    n_harmonics
-        A sector under a travelling wave holds the nodal diameters of so many harmonics; without influence on others.
-    parameters
-        As in the table [scene] of a study, but for the friction coefficient, which is no part of the model: it is given
-        to `solver.frequency_response` and `solver.march_wear`.
+    name: one of `studies.scenes.BUNDLED`, such as "dovetail_sector" or "sdof_slider". n_harmonics: a sector under a
+    travelling wave holds the nodal diameters of so many harmonics; without influence on others. parameters: as in the
+    table [scene] of a study, but for the friction coefficient, which is no part of the model: it is given to
+    `solver.frequency_response` and `solver.march_wear`.
 
-    Raises
-    ------
-    SceneError
-        Where there is no such scene or parameter, or the parameters describe no possible structure.
+    Raises SceneError where there is no such scene or parameter, or the parameters describe no possible structure.
     """
     kind = scenes.scene_parameters(name)
     given = {key: value.item() if isinstance(value, np.generic) else value for key, value in parameters.items()}
@@ -57,20 +49,11 @@ def build_scene(name: str, /, *, n_harmonics: int = OF_A_WAVE, **parameters: obj
 
 
 def read_scene(path: str | Path, *, n_harmonics: int = 1) -> ReducedModel:
-    """Reduced model of a scene file.
+    """Reduced model of a scene file (HDF5), see `studies.scene_file`.
 
-    Parameters
-    ----------
-    path
-        A scene file (HDF5), see `studies.scene_file`.
-    n_harmonics
-        The file must hold the nodal diameters that the harmonics 0..n_harmonics of its travelling wave see.
+    n_harmonics: the file must hold the nodal diameters that the harmonics 0..n_harmonics of its travelling wave see.
 
-    Raises
-    ------
-    SceneError
-        Where the file is no scene file, is damaged, or describes no possible structure.
-    OSError
-        Where there is no such file or it cannot be opened.
+    Raises SceneError where the file is no scene file, is damaged, or describes no possible structure; OSError where
+    there is no such file or it cannot be opened.
     """
     return scene_file.read_scene(path, n_harmonics)

@@ -79,11 +79,7 @@ def unknown_answer(asked: WearQuestion, n_response: int) -> ExactAnswer:
 def stuck_frequencies(model: ReducedModel) -> NaturalFrequencies:
     """Lowest frequencies of every nodal diameter of a model with its joint stuck: no relative displacement moves.
 
-    Raises
-    ------
-    SceneError
-        Where all displacements are relative ones of pairs, so that nothing moves, or where the stuck structure is not
-        held.
+    Raises SceneError where nothing else moves, or the stuck structure is not held.
     """
     dofs = model.contact.dofs
     frequencies = np.full((len(model.linear), N_MODES), np.nan)
@@ -96,11 +92,8 @@ def stuck_frequencies(model: ReducedModel) -> NaturalFrequencies:
             # M x = K x / w^2: a displacement without mass has no frequency, which is 0 here
             inverse = eigh(linear.mass[held], linear.stiffness[held], eigvals_only=True)[::-1]
         except LinAlgError:
-            raise SceneError(
-                "variables",
-                "natural_frequency",
-                f"leave it out: nothing holds the stuck structure at nodal diameter {k}",
-            ) from None
+            remedy = f"leave it out: nothing holds the stuck structure at nodal diameter {k}"
+            raise SceneError("variables", "natural_frequency", remedy) from None
         moving = inverse[inverse > np.finfo(np.float64).eps * len(free) * inverse[0]][:N_MODES]
         frequencies[row, : len(moving)] = 1.0 / (2.0 * np.pi * np.sqrt(moving))
     return NaturalFrequencies(tuple(sorted(model.linear)), frequencies)

@@ -25,23 +25,15 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
-from solver.model import (
-    BoolArray,
-    ComplexArray,
-    ContactInterface,
-    FloatArray,
-    IntArray,
-    LinearModel,
-    Matrix,
-    ReducedModel,
-)
+from solver.model import ContactInterface, LinearModel, ReducedModel
 from studies.hdf5 import find_datasets, is_number, open_hdf5, read_attribute, read_text_attribute, read_texts
 from studies.model_check import PAIRS_ARE_ROWS, check_model, check_order, check_sector
 from studies.scene_answers import SurfaceMesh
 from studies.scene_error import SceneError
 from studies.scene_layout import ATTRIBUTES, CONTACT, LINEAR, MESH, ORIGIN, scene_attributes, scene_datasets
+
+Datasets = Mapping[str, h5py.Dataset]
 
 
 def write_scene(
@@ -91,7 +83,7 @@ def read_scene(path: str | Path, n_harmonics: int = 1, group: str = "") -> Reduc
 def read_mesh(path: str | Path, group: str = "") -> SurfaceMesh | None:
     """The mesh of a scene file, None where it has none. Raises what `read_scene` raises."""
     with _open_scene(Path(path), group) as (_, datasets):
-        return _read_mesh(datasets) if _has_mesh(datasets) else None
+        return _read_mesh(datasets) if any(key.startswith("mesh/") for key in datasets) else None
 
 
 def read_origin(path: str | Path) -> dict[str, str]:
@@ -106,7 +98,7 @@ def read_origin(path: str | Path) -> dict[str, str]:
 def has_mesh(path: str | Path, group: str = "") -> bool:
     """Whether a scene file has a mesh. Raises what `read_scene` raises."""
     with _open_scene(Path(path), group) as (_, datasets):
-        return _has_mesh(datasets)
+        return any(key.startswith("mesh/") for key in datasets)
 
 
 @contextmanager
@@ -125,59 +117,50 @@ def _is_grouped(datasets: Iterable[str]) -> bool:
     return any(key.startswith("nd/") for key in datasets)
 
 
-def _has_mesh(datasets: Iterable[str]) -> bool:
-    return any(key.startswith("mesh/") for key in datasets)
-
-
-def _read_model(root: h5py.Group, datasets: Mapping[str, h5py.Dataset]) -> ReducedModel:
+def _read_model(root: h5py.Group, datasets: Datasets) -> ReducedModel:
     grouped = _is_grouped(datasets)
     n_sectors, nodal_diameter = (_read_count(root, name, required=grouped) for name in ATTRIBUTES)
     check_sector(n_sectors, nodal_diameter)
-
     prefixes = {0: ""}
     if grouped:
-        numbers = sorted({int(key.split("/")[1]) for key in datasets if key.startswith("nd/")})
-        prefixes = {k: f"nd/{k}/" for k in numbers}
+        prefixes = {
+            k: f"nd/{k}/" for k in sorted({int(key.split("/")[1]) for key in datasets if key.startswith("nd/")})
+        }
     linear = {k: _read_linear(datasets, prefix, real=k == 0) for k, prefix in prefixes.items()}
-    names = {prefix: _read_names(datasets, prefix) for prefix in prefixes.values()}
-    first = next(iter(names.values()))
-    for prefix, others in names.items():
+    shared = "response/names" in datasets
+    own = {key: _read(datasets, key if key in datasets or not shared else "response/names", "text")
+           for key in (f"{prefix}response/names" for prefix in prefixes.values())}  # fmt: skip
+    first = next(iter(own.values()))
+    for key, others in own.items():
         if others != first:
-            raise SceneError(f"{prefix}response/names", ", ".join(others), f"give the same names as elsewhere: {first}")
-    return ReducedModel(
-        linear=linear,
-        contact=_read_contact(datasets),
-        response_names=first,
-        n_sectors=n_sectors,
-        nodal_diameter=nodal_diameter,
-    )
+            raise SceneError(key, ", ".join(others), f"give the same names as elsewhere: {first}")
+    return ReducedModel(linear, _read_contact(datasets), first, n_sectors, nodal_diameter)
 
 
-def _read_mesh(datasets: Mapping[str, h5py.Dataset]) -> SurfaceMesh:
-    axes = [_read_real(datasets, f"mesh/{axis}") for axis in "xyz"]
+def _read_mesh(datasets: Datasets) -> SurfaceMesh:
+    axes = [_read(datasets, f"mesh/{axis}", "real") for axis in "xyz"]
     n_nodes = axes[0].size
     for axis, values in zip("xyz", axes, strict=True):
         if values.shape != (n_nodes,):
             raise SceneError(f"mesh/{axis}", f"shape {values.shape}", f"give shape ({n_nodes},), as mesh/x has")
         if not np.isfinite(values).all():
             raise SceneError(f"mesh/{axis}", "not finite", "give finite numbers")
-    quads = _whole("mesh/quad", _read_numbers(datasets, "mesh/quad"))
+    quads = _read(datasets, "mesh/quad", "whole")
     if quads.ndim != 2 or quads.shape[1] != 4:
         raise SceneError("mesh/quad", f"shape {quads.shape}", "give one row of 4 nodes for each face")
     outside = quads[(quads < 0) | (quads >= n_nodes)]
     if len(outside):
         raise SceneError("mesh/quad", str(outside[0]), f"give nodes from 0 to {n_nodes - 1}")
-    parts = _read_text(datasets, "mesh/part")
+    parts = _read(datasets, "mesh/part", "text")
     if len(parts) != len(quads):
         raise SceneError("mesh/part", f"{len(parts)} labels", f"give one label for each of {len(quads)} faces")
     return SurfaceMesh(np.stack(axes, axis=1), quads, parts)
 
 
 def _refuse_unknown(datasets: Iterable[str], grouped: bool) -> None:
-    contact = {f"contact/{name}" for name in CONTACT}
-    mesh = {f"mesh/{name}" for name in MESH}
+    known = {*(f"contact/{name}" for name in CONTACT), *(f"mesh/{name}" for name in MESH)}
     for key in datasets:
-        if key in contact or key in mesh or (grouped and key == "response/names"):
+        if key in known or (grouped and key == "response/names"):
             continue
         dataset = key
         if grouped:
@@ -186,9 +169,7 @@ def _refuse_unknown(datasets: Iterable[str], grouped: bool) -> None:
                 raise SceneError(key, "unknown dataset", "remove it, or move it into nd/<nodal diameter>/")
             dataset = "/".join(below[:-1])
         if dataset not in LINEAR:
-            raise SceneError(
-                key, "unknown dataset", f"remove it, known are {', '.join([*sorted(contact | mesh), *LINEAR])}"
-            )
+            raise SceneError(key, "unknown dataset", f"remove it, known are {', '.join([*sorted(known), *LINEAR])}")
 
 
 def _read_count(root: h5py.Group, name: str, *, required: bool) -> int:
@@ -203,82 +184,50 @@ def _read_count(root: h5py.Group, name: str, *, required: bool) -> int:
     return int(number)
 
 
-def _read_linear(datasets: Mapping[str, h5py.Dataset], prefix: str, *, real: bool) -> LinearModel:
-    stiffness = _read_matrix(datasets, f"{prefix}stiffness", real)
-    response = _read_matrix(datasets, f"{prefix}response/dofs", real)
+def _read_linear(datasets: Datasets, prefix: str, *, real: bool) -> LinearModel:
+    def matrix(name: str) -> Any:
+        """Numbers as they are, but without the imaginary part where it is zero and cannot be anything else."""
+        values = _read(datasets, prefix + name, "any")
+        return values.real.copy() if real and not values.imag.any() else values
+
+    stiffness, mass, response = matrix("stiffness"), matrix("mass"), matrix("response/dofs")
+    key, n = f"{prefix}response/dofs", len(stiffness)
     if response.ndim == 1:
-        response = _selection(f"{prefix}response/dofs", response, len(stiffness))
-    harmonic: ComplexArray = _read_numbers(datasets, f"{prefix}load/harmonic").astype(np.complex128)
-    mass = _read_matrix(datasets, f"{prefix}mass", real)
+        indices = _whole(key, response)
+        outside = indices[(indices < 0) | (indices >= n)]
+        if len(outside):
+            raise SceneError(key, str(outside[0]), f"give indices from 0 to {n - 1}, or a matrix")
+        response = np.eye(n)[indices]
+    key = f"{prefix}damping"
+    damping = matrix("damping") if key in datasets else np.zeros(stiffness.shape)
+    if damping.shape == (2,):  # coefficients of mass, 1/s, and stiffness, s
+        if np.iscomplexobj(damping) or not np.isfinite(damping).all():
+            remedy = "give two finite numbers: of mass, 1/s, and stiffness, s"
+            raise SceneError(key, f"{damping[0]}, {damping[1]}", remedy)
+        # what fits not is said of the mass
+        fits = mass.shape == stiffness.shape
+        damping = damping[0] * mass + damping[1] * stiffness if fits else np.zeros(stiffness.shape)
     return LinearModel(
         mass=mass,
-        damping=_read_damping(datasets, f"{prefix}damping", mass, stiffness, real=real),
+        damping=damping,
         stiffness=stiffness,
-        load_static=_read_real(datasets, f"{prefix}load/static"),
-        load_harmonic=harmonic,
+        load_static=_read(datasets, f"{prefix}load/static", "real"),
+        load_harmonic=_read(datasets, f"{prefix}load/harmonic", "any").astype(np.complex128),
         response=response,
     )
 
 
-def _read_damping(
-    datasets: Mapping[str, h5py.Dataset], key: str, mass: Matrix, stiffness: Matrix, *, real: bool
-) -> Matrix:
-    """The matrix; or `a M + b K` from two coefficients a, 1/s, and b, s; or zeros where there is none."""
-    if key not in datasets:
-        return np.zeros(stiffness.shape)
-    damping = _read_matrix(datasets, key, real)
-    if damping.shape != (2,):
-        return damping
-    if np.iscomplexobj(damping) or not np.isfinite(damping).all():
-        raise SceneError(key, f"{damping[0]}, {damping[1]}", "give two finite numbers: of mass, 1/s, and stiffness, s")
-    if mass.shape != stiffness.shape:
-        # what fits not is said of the mass
-        return np.zeros(stiffness.shape)
-    combined: Matrix = damping[0] * mass + damping[1] * stiffness
-    return combined
-
-
-def _selection(key: str, indices: Matrix, n: int) -> FloatArray:
-    """Rows (n_response, n) that pick displacements by their indices."""
-    whole = _whole(key, indices)
-    outside = whole[(whole < 0) | (whole >= n)]
-    if len(outside):
-        raise SceneError(key, str(outside[0]), f"give indices from 0 to {n - 1}, or a matrix")
-    return np.eye(n)[whole]
-
-
-def _read_names(datasets: Mapping[str, h5py.Dataset], prefix: str) -> tuple[str, ...]:
-    key = f"{prefix}response/names"
-    return _read_text(datasets, key if key in datasets or not prefix else "response/names")
-
-
-def _read_contact(datasets: Mapping[str, h5py.Dataset]) -> ContactInterface:
-    dofs = _whole("contact/dofs", _read_numbers(datasets, "contact/dofs"))
-    n_contact = len(dofs)
-    absent = {
-        "gap": np.zeros(n_contact),
-        "normal_load": np.zeros(n_contact),
-        "position": np.full((n_contact, 3), np.nan),
+def _read_contact(datasets: Datasets) -> ContactInterface:
+    present = {
+        name: kind for name, kind in CONTACT.items() if f"contact/{name}" in datasets or name in ("dofs", "area")
     }
-    gap, normal_load, position = (
-        _read_real(datasets, f"contact/{name}") if f"contact/{name}" in datasets else values
-        for name, values in absent.items()
-    )
-    labelled = "contact/surface" in datasets
-    friction = "contact/friction_coefficient"
-    return ContactInterface(
-        dofs=dofs,
-        area=_read_real(datasets, "contact/area"),
-        gap=gap,
-        normal_load=normal_load,
-        position=position,
-        surface=_read_text(datasets, "contact/surface") if labelled else ("",) * n_contact,
-        friction_coefficient=_read_real(datasets, friction) if friction in datasets else None,
-        edge=_flags("contact/edge", _read_numbers(datasets, "contact/edge")) if "contact/edge" in datasets else None,
-    )
+    found = {name: _read(datasets, f"contact/{name}", kind) for name, kind in present.items()}
+    n_contact = len(found["dofs"])
+    absent = {"gap": np.zeros(n_contact), "normal_load": np.zeros(n_contact), "surface": ("",) * n_contact}
+    return ContactInterface(**{**absent, "position": np.full((n_contact, 3), np.nan), **found})
 
 
-def _shows_order(datasets: Mapping[str, h5py.Dataset]) -> bool:
+def _shows_order(datasets: Datasets) -> bool:
     """Whether the file shows that its arrays are not transposed: by the attribute, or by an array that is not square.
 
     Such an array would be refused for its shape.
@@ -290,58 +239,37 @@ def _shows_order(datasets: Mapping[str, h5py.Dataset]) -> bool:
     return any(len(shape) == 2 and shape[0] != shape[1] for shape in shapes)
 
 
-def _flags(key: str, values: NDArray[Any]) -> BoolArray:
-    wrong = values[(values != 0) & (values != 1)]
-    if wrong.size:
-        raise SceneError(key, str(wrong.flat[0]), "give 0 or 1")
-    return np.asarray(values == 1)
-
-
-def _whole(key: str, values: NDArray[Any]) -> IntArray:
+def _whole(key: str, values: Any) -> Any:
     # MATLAB writes whole numbers as floating ones.
     with np.errstate(invalid="ignore"):
-        whole: IntArray = values.real.astype(np.int64)
+        whole = values.real.astype(np.int64)
     wrong = values[whole != values]
     if wrong.size:
         raise SceneError(key, str(wrong.flat[0]), "give whole numbers")
     return whole
 
 
-def _read_matrix(datasets: Mapping[str, h5py.Dataset], key: str, real: bool) -> Matrix:
-    """Numbers as they are, but without the imaginary part where it is zero and cannot be anything else."""
-    values: Matrix = _read_numbers(datasets, key)
-    return values.real.copy() if real and not values.imag.any() else values
-
-
-def _read_real(datasets: Mapping[str, h5py.Dataset], key: str) -> FloatArray:
-    values: FloatArray = _read_numbers(datasets, key)
-    if np.iscomplexobj(values):
-        raise SceneError(key, "complex", "give real numbers")
-    return values
-
-
-def _read_numbers(datasets: Mapping[str, h5py.Dataset], key: str) -> Any:
-    """Values as float64 or complex128."""
-    dataset = _dataset(datasets, key)
-    if not is_number(dataset.dtype):
-        raise SceneError(key, f"type {dataset.dtype}", "give numbers")
-    names = dataset.dtype.names
-    if names is not None:
-        parts = dataset[()]
-        values = np.empty(dataset.shape, dtype=np.complex128)
-        values.real, values.imag = parts[names[0]], parts[names[1]]
-        return values
-    return dataset[()].astype(np.complex128 if dataset.dtype.kind == "c" else np.float64)
-
-
-def _read_text(datasets: Mapping[str, h5py.Dataset], key: str) -> tuple[str, ...]:
-    return read_texts(_dataset(datasets, key), key)
-
-
-def _dataset(datasets: Mapping[str, h5py.Dataset], key: str) -> h5py.Dataset:
+def _read(datasets: Datasets, key: str, kind: str) -> Any:
+    """Values of a dataset: "any" numbers (float64 or complex128), "real" or "whole" ones, "flags", or "text"."""
     if key not in datasets:
         raise SceneError(key, "missing", "give this dataset")
     dataset = datasets[key]
     if not dataset.shape:
         raise SceneError(key, "a single value or nothing", "give an array")
-    return dataset
+    if kind == "text":
+        return read_texts(dataset, key)
+    if not is_number(dataset.dtype):
+        raise SceneError(key, f"type {dataset.dtype}", "give numbers")
+    values, names = dataset[()], dataset.dtype.names
+    if names is not None:
+        parts, values = values, np.empty(dataset.shape, dtype=np.complex128)
+        values.real, values.imag = parts[names[0]], parts[names[1]]
+    values = values.astype(np.complex128 if values.dtype.kind == "c" else np.float64)
+    if kind == "real" and np.iscomplexobj(values):
+        raise SceneError(key, "complex", "give real numbers")
+    if kind == "flags":
+        wrong = values[(values != 0) & (values != 1)]
+        if wrong.size:
+            raise SceneError(key, str(wrong.flat[0]), "give 0 or 1")
+        return np.asarray(values == 1)
+    return _whole(key, values) if kind == "whole" else values

@@ -11,7 +11,17 @@ from solver.model import ReducedModel
 from studies.model_check import is_grouped
 from studies.scene_answers import SurfaceMesh
 
-CONTACT = ("dofs", "area", "gap", "normal_load", "friction_coefficient", "position", "edge", "surface")
+CONTACT = {
+    "dofs": "whole",
+    "area": "real",
+    "gap": "real",
+    "normal_load": "real",
+    "friction_coefficient": "real",
+    "position": "real",
+    "edge": "flags",
+    "surface": "text",
+}
+"""Fields of the contact pairs, and what their numbers are."""
 LINEAR = ("mass", "damping", "stiffness", "load/static", "load/harmonic", "response/dofs", "response/names")
 MESH = ("x", "y", "z", "quad", "part")
 ATTRIBUTES = ("n_sectors", "nodal_diameter")
@@ -29,7 +39,7 @@ def scene_attributes(model: ReducedModel) -> dict[str, int]:
 def scene_datasets(model: ReducedModel, mesh: SurfaceMesh | None) -> Iterator[tuple[str, NDArray[np.generic]]]:
     """Name with its groups and values of each dataset; texts as arrays of numpy's type U."""
     contact = model.contact
-    for name in CONTACT[:-1]:
+    for name in list(CONTACT)[:-1]:
         values = getattr(contact, name)
         # without friction coefficients or edges of its own a scene has no such dataset
         if values is not None:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver import build_model
+from solver.model import ReducedModel
 from tests.event_driven import FloatArray, Orbit, Phase, PiecewiseLinear, solve_orbit
 from tests.references import coulomb_orbit
 
@@ -64,16 +65,10 @@ class Cantilever:
     def model(self) -> ReducedModel:
         """Scene with the tip as its response."""
         mass, damping, stiffness, load, tip = self.matrices()
-        contact = ContactInterface(
-            dofs=np.array([[-1, 0, -1]]),
-            area=np.array([1e-4]),
-            gap=np.zeros(1),
-            normal_load=np.array([NORMAL_LOAD]),
-            position=np.full((1, 3), np.nan),
-            surface=("tip",),
-        )
-        linear = LinearModel(mass, damping, stiffness, np.zeros(len(load)), load.astype(complex), tip[None])
-        return ReducedModel({0: linear}, contact, ("tip",))
+        return build_model(
+            *(mass, damping, stiffness, [[-1, 0, -1]], 1e-4), load_harmonic=load, response=tip[None],
+            normal_load=NORMAL_LOAD, surface=("tip",), response_names=("tip",),
+        )  # fmt: skip
 
     def tip_of_orbit(self) -> FloatArray:
         """What gives the tip from the displacements of `orbit`."""

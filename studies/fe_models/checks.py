@@ -12,9 +12,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from studies.fe_models.deck.mesh import Deck, FloatArray, IntArray
+from studies.fe_models.deck.contents import Deck
 from studies.fe_models.matrices.matrices import Matrices
-from studies.fe_models.units import Units
+from studies.fe_models.model_files import Units
+from studies.fe_models.text import FloatArray, IntArray
 from studies.finite_element.element_matrices import element_volumes
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.solid_mesh import Rotation
@@ -221,21 +222,20 @@ def omega_squared_of(deck: Deck, matrices: Matrices, axis: FloatArray) -> float 
     return float(np.mean(found))
 
 
-def check_speed(deck: Deck, matrices: Matrices, units: Units) -> Rotation | None:
-    """Tests that the stiffness was made at the speed of the deck; returns the rotation, SI, None without rotation.
+def check_speed(deck: Deck, matrices: Matrices, rotation: Rotation, *, of_study: bool = False) -> float | None:
+    """Square of the speed, rad2/s2, at which the stiffness was made; None where it cannot be found.
 
-    Where the model is held in its matrices the speed cannot be found from them; then the speed of the deck is used.
+    rotation: SI. Raises SceneError where it has another speed. of_study: whether the study gives it, not the deck.
     """
-    rotation = rotation_of_deck(deck, units)
-    if rotation is None:
-        return None
     held = omega_squared_of(deck, matrices, rotation.axis)
-    if held is None or math.isclose(held, rotation.omega_squared, rel_tol=_SPEED_AGREES):
-        return rotation
-    speed = math.sqrt(rotation.omega_squared)
-    found = f"the deck spins at {speed:.6g} rad/s, the stiffness holds {math.sqrt(held):.6g}"
-    remedy = _REMEDIES[matrices.code][2]
-    raise SceneError("matrices", found, remedy if held == 0 else "give the files of one run")
+    if held is None or math.isclose(held, rotation.omega_squared, rel_tol=2.0 * _SPEED_AGREES):
+        return held
+    speed, own = math.sqrt(rotation.omega_squared), math.sqrt(held)
+    if of_study:
+        found = f"{30.0 * speed / math.pi:g} rpm, the stiffness holds {30.0 * own / math.pi:.6g} rpm"
+        raise SceneError("rotation_speed", found, "export the matrices at this speed, or leave it out")
+    found = f"the deck spins at {speed:.6g} rad/s, the stiffness holds {own:.6g}"
+    raise SceneError("matrices", found, _REMEDIES[matrices.code][2] if held == 0 else "give the files of one run")
 
 
 def check_units(deck: Deck, mass: float | None, units: Units) -> None:

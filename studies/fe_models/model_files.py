@@ -1,10 +1,12 @@
-"""The files of a finite-element model."""
+"""The files of a finite-element model, and the systems of units in which they are written."""
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+
+from studies.scene_error import SceneError
 
 
 @dataclass(frozen=True)
@@ -34,3 +36,49 @@ def file_digest(path: Path) -> str:
     """SHA-256 of a file, hexadecimal. Raises OSError."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@dataclass(frozen=True)
+class Units:
+    """A system of units by its length (m), mass (kg) and time (s); what is derived from them follows.
+
+    label_of_length, label_of_mass: for messages.
+    """
+
+    name: str
+    length: float
+    mass: float
+    label_of_length: str
+    label_of_mass: str
+
+    @property
+    def stiffness(self) -> float:
+        """N/m."""
+        return self.mass  # mass / s2
+
+    @property
+    def force(self) -> float:
+        """N."""
+        return self.mass * self.length  # mass length / s2
+
+    @property
+    def density(self) -> float:
+        """kg/m3."""
+        return self.mass / self.length**3
+
+    @property
+    def stress(self) -> float:
+        """Pa."""
+        return self.mass / self.length
+
+
+_SYSTEMS = (Units("SI", 1.0, 1.0, "m", "kg"), Units("mm-t-s", 1e-3, 1e3, "mm", "t"))
+
+
+def find_units(name: str) -> Units:
+    """Units by their name, "SI" or "mm-t-s". Raises SceneError about "units"."""
+    for units in _SYSTEMS:
+        if units.name == name:
+            return units
+    known = " or ".join(f'"{units.name}"' for units in _SYSTEMS)
+    raise SceneError("units", f"{name!r}", f"give {known}")

@@ -23,26 +23,24 @@ _NOTHING = 1e-12  # square of a motion that moves no node, over that of one that
 class Dependence:
     """Displacements (d,) that are sums of others, by their places in (3 n_nodes,).
 
-    dependent (d,): the displacements. row, column, value (t,): coefficients; rows count the dependent ones.
-    origin (d,): what makes each depend, a place in `origins`. origins: where they stand, for messages.
+    row, column, value (t,): coefficients; rows count the dependent ones. place: where it stands, for messages.
     """
 
     dependent: IntArray
     row: IntArray
     column: IntArray
     value: FloatArray
-    origin: IntArray
-    origins: Sequence[str]
+    place: str
 
 
 @dataclass(frozen=True)
 class Constraints:
     """`u = transformation @ q`: q are the displacements that depend on no other and are not held, the rest of q is 0.
 
-    transformation (3 n_nodes, 3 n_nodes). dependent (n_nodes, 3): which displacements move with others.
-    origin (n_nodes,): what makes a node depend on others, a place in `origins`; -1 for none.
-    oblique (n_nodes,): nodes that are held along directions that are not x, y or z. There q has all three
-        displacements, of which u lacks these directions. across (3 n_nodes, 3 n_nodes): projection on them.
+    dependent (n_nodes, 3): which displacements move with others. origin (n_nodes,): what makes a node depend on others,
+    a place in `origins`; -1 for none. oblique (n_nodes,): nodes that are held along other directions than x, y, z:
+    there q has all three displacements, of which u lacks these directions. across: projection on them. Matrices are (3
+    n_nodes, 3 n_nodes).
     """
 
     transformation: sparse.csr_matrix
@@ -106,7 +104,7 @@ def _check_free(constraints: Constraints, nodes: IntArray, numbers: IntArray, wh
 
 
 def eliminate(
-    dependence: Dependence,
+    entries: Sequence[Dependence],
     held: BoolArray,
     oblique: Mapping[int, FloatArray],
     numbers: IntArray,
@@ -114,18 +112,23 @@ def eliminate(
 ) -> tuple[Constraints, BoolArray]:
     """Constraints, and which displacements (n_nodes, 3) are 0 or follow others.
 
-    dependence: which displacements depend on others. held (n_nodes, 3): displacements that are 0. oblique: projections
-    (3, 3) of nodes on other directions in which they are held. numbers (n_nodes,): of the nodes in the file, for
-    messages. n_with_elements: number of nodes with elements. Motions of the others that move none of these are held.
-
-    Raises SceneError where a displacement depends twice, on itself, or is held as well.
+    held (n_nodes, 3): displacements that are 0. oblique: projections (3, 3) of nodes on other directions in which they
+    are held. numbers (n_nodes,): of the nodes in the file. n_with_elements: number of nodes with elements; motions of
+    the others that move none of these are held. Raises SceneError where a displacement depends twice, on itself, or is
+    held as well.
     """
-    size, dependent = held.size, dependence.dependent
+    size, places = held.size, [each.place for each in entries]
+    none = np.empty(0, dtype=np.int64)
+    dependent = np.concatenate([none, *(each.dependent for each in entries)])
+    origin_of = np.repeat(np.arange(len(entries)), [len(each.dependent) for each in entries])
     slanted = np.zeros(len(held), dtype=np.bool_)
     slanted[list(oblique)] = True
-    _check_once(dependence, held | slanted[:, None], numbers)
+    _check_once(dependent, [places[each] for each in origin_of], held | slanted[:, None], numbers)
     shape = (size, size)
-    steps = sparse.csr_matrix((dependence.value, (dependent[dependence.row], dependence.column)), shape=shape)
+    rows = np.concatenate([none, *(each.dependent[each.row] for each in entries)])
+    columns = np.concatenate([none, *(each.column for each in entries)])
+    values = np.concatenate([np.empty(0), *(each.value for each in entries)])
+    steps = sparse.csr_matrix((values, (rows, columns)), shape=shape)
     own = np.ones(size)
     own[dependent] = 0.0
     total = sparse.diags(own, format="csr")
@@ -137,7 +140,7 @@ def eliminate(
         if power.nnz == 0:
             break
     else:
-        found = f"{dependence.origins[dependence.origin[0]]}: displacements depend on each other in a circle"
+        found = f"{places[0]}: displacements depend on each other in a circle"
         raise SceneError("model", found, "let each depend on others that do not depend on it")
     fixed = held.ravel().copy()
     across = sparse.lil_matrix(shape)
@@ -152,28 +155,27 @@ def eliminate(
     moves[dependent] = np.diff(total.indptr)[dependent] > 0
     fixed[dependent] = True
     origin = np.full(len(held), -1)
-    origin[dependent // 3] = dependence.origin
-    constraints = Constraints(total, moves.reshape(-1, 3), origin, dependence.origins, slanted, across)
+    origin[dependent // 3] = origin_of
+    constraints = Constraints(total, moves.reshape(-1, 3), origin, places, slanted, across)
     return constraints, fixed.reshape(-1, 3)
 
 
-def _check_once(dependence: Dependence, held: BoolArray, numbers: IntArray) -> None:
+def _check_once(dependent: IntArray, origins: Sequence[str], held: BoolArray, numbers: IntArray) -> None:
     """Each displacement depends once, and is not held."""
-    dependent, origins = dependence.dependent, dependence.origins
+
+    def found(place: int) -> str:
+        at = dependent[place]
+        return f"{origins[place]}: displacement {at % 3 + 1} of node {numbers[at // 3]} depends on others"
+
     order = np.argsort(dependent, kind="stable")
     twice = np.flatnonzero(dependent[order][1:] == dependent[order][:-1])
     if len(twice):
         first, second = order[twice[0]], order[twice[0] + 1]
-        where = f"displacement {dependent[first] % 3 + 1} of node {numbers[dependent[first] // 3]}"
-        found = (
-            f"{origins[dependence.origin[second]]}: {where} depends on others by {origins[dependence.origin[first]]}"
-        )
-        raise SceneError("model", found, "let each displacement depend once: take it out of one of them")
+        remedy = "let each displacement depend once: take it out of one of them"
+        raise SceneError("model", f"{found(second)} by {origins[first]}", remedy)
     wrong = np.flatnonzero(held.ravel()[dependent])
     if len(wrong):
-        at = dependent[wrong[0]]
-        found = f"{origins[dependence.origin[wrong[0]]]}: displacement {at % 3 + 1} of node {numbers[at // 3]}"
-        raise SceneError("model", f"{found} depends on others and is held", "take the node out of one of them")
+        raise SceneError("model", f"{found(wrong[0])} and is held", "take the node out of one of them")
 
 
 def _without_idle(total: sparse.csr_matrix, first: int, fixed: BoolArray) -> tuple[sparse.csr_matrix, IntArray]:

@@ -57,54 +57,68 @@ class Front:
 
 
 @dataclass(frozen=True)
-class Factor:
-    """order (n,): rows of the matrix in the order of elimination. fronts: each with L (e, e) and W (f, e)."""
+class Dissection:
+    """order (n,): rows of a matrix in the order of elimination. fronts: each after its children."""
 
     order: IntArray
-    fronts: tuple[tuple[Front, Dense, Dense], ...]
+    fronts: tuple[Front, ...]
+
+
+@dataclass(frozen=True)
+class Factor:
+    """blocks: L (e, e) and W (f, e) of each front."""
+
+    dissection: Dissection
+    blocks: tuple[tuple[Dense, Dense], ...]
 
     def solve(self, forces: Dense) -> Dense:
         """Solutions (n, n_vectors) for right-hand sides of this shape."""
-        result = np.array(forces[self.order], dtype=self.fronts[0][1].dtype)
-        for front, lower, below in self.fronts:
+        order, steps = self.dissection.order, list(zip(self.dissection.fronts, self.blocks, strict=True))
+        result = np.array(forces[order], dtype=self.blocks[0][0].dtype)
+        for front, (lower, below) in steps:
             own = slice(front.first, front.stop)
             result[own] = _solve_lower(lower, result[own], adjoint=False)
             result[front.boundary] -= below @ result[own]
-        for front, lower, below in reversed(self.fronts):
+        for front, (lower, below) in reversed(steps):
             own = slice(front.first, front.stop)
             result[own] = _solve_lower(lower, result[own] - below.conj().T @ result[front.boundary], adjoint=True)
         solved = np.empty_like(result)
-        solved[self.order] = result
+        solved[order] = result
         return solved
 
 
-def factorise(matrix: sparse.csr_matrix, node: IntArray, positions: FloatArray) -> Factor:
-    """Factors of a Hermitian matrix (n, n).
+def dissect(matrix: sparse.csr_matrix, node: IntArray, positions: FloatArray) -> Dissection:
+    """Order of elimination of matrices whose nodes are coupled as those of a matrix (n, n), its values do not matter.
 
     node (n,): node of each row, ascending. positions (n_nodes, n_directions): layers of nodes are looked for along each
     direction, as along coordinates.
-
-    Raises NotPositiveDefiniteError where the matrix is not positive definite.
     """
     used, node = np.unique(node, return_inverse=True)
     owner = sparse.csr_matrix((np.ones(len(node), dtype=np.float32), (node, np.arange(len(node)))))
     pattern = sparse.csr_matrix((np.ones(matrix.nnz, dtype=np.float32), matrix.indices, matrix.indptr), matrix.shape)
-    cutter = _Cutter((owner @ pattern @ owner.T).tocsr(), positions[used])
+    couplings = (owner @ pattern @ owner.T).tocsr()
+    cutter = _Cutter(couplings, positions[used])
     starts = np.searchsorted(node, np.arange(len(used) + 1))
     rows = [np.concatenate([np.arange(starts[n], starts[n + 1]) for n in nodes]) for nodes in cutter.layers]
     order = np.concatenate(rows)
-    ordered = matrix[order][:, order].tocsc()
+    whole = (owner.T @ couplings @ owner).tocsr()  # all directions of nodes that are coupled
+    fronts = _fronts(whole[order][:, order].tocsc(), [len(each) for each in rows], cutter.children)
+    return Dissection(order, tuple(fronts))
+
+
+def factorise(matrix: sparse.csr_matrix, dissection: Dissection) -> Factor:
+    """Factors of a Hermitian matrix (n, n). Raises NotPositiveDefiniteError where it is not positive definite."""
+    ordered = matrix[dissection.order][:, dissection.order].tocsc()
     waiting: dict[int, Dense] = {}
-    fronts: list[tuple[Front, Dense, Dense]] = []
-    for number, front in enumerate(_fronts(ordered, [len(each) for each in rows], cutter.children)):
+    blocks: list[tuple[Dense, Dense]] = []
+    for number, front in enumerate(dissection.fronts):
         whole = _gathered(ordered, front)
         for child in front.children:
-            boundary = fronts[child][0].boundary
-            places = _places(front, boundary)
+            places = _places(front, dissection.fronts[child].boundary)
             whole[np.ix_(places, places)] += waiting.pop(child)
         lower, below, waiting[number] = _eliminate(whole, front.stop - front.first)
-        fronts.append((front, lower, below))
-    return Factor(order, tuple(fronts))
+        blocks.append((lower, below))
+    return Factor(dissection, tuple(blocks))
 
 
 class _Cutter:

@@ -19,13 +19,10 @@ from studies.finite_element.solid_mesh import Rotation, SolidMesh
 class MeshModel:
     """A model whose matrices are assembled here.
 
-    rotation: None for a model at rest.
     prestress: whether the stiffness contains the stress and the displacements of the glued structure under the
-        centrifugal load, and spin softening.
-    preload (3 n_nodes,): constant forces beside the centrifugal ones, N. They are no part of the prestress: forces that
-        press on gaps and flanks act otherwise on a glued structure.
-    gravity (3,): acceleration of all mass, m/s2, in the same way; None of none.
-    extra (m,): numbers of nodes without elements, behind those of the mesh: others follow them.
+    centrifugal load, and spin softening. preload (3 n_nodes,): constant forces, N, and gravity (3,): acceleration of
+    all mass, m/s2. They are no part of the prestress: forces that press on gaps and flanks act otherwise on a glued
+    structure. extra (m,): numbers of nodes without elements, behind those of the mesh: others follow them.
     """
 
     mesh: SolidMesh
@@ -53,14 +50,11 @@ class MeshModel:
 
 @dataclass(frozen=True)
 class MatrixModel:
-    """A model with matrices of another program.
+    """A model with matrices of another program, with their prestress and spin softening.
 
-    coordinates (n_nodes, 3): m; NaN for nodes without a place, such as inner nodes of an element. numbers (n_nodes,):
-        of the nodes in the file.
-    stiffness, mass (3 n_nodes, 3 n_nodes): N/m and kg, symmetric, unconstrained, displacements node by node in x, y, z.
-        Prestress and spin softening of the other program stay in them.
-    rotation: for the centrifugal load, which follows from the mass. preload, gravity: as in `MeshModel`.
-    damping (3 n_nodes, 3 n_nodes): viscous, N s/m; None for that of a loss factor.
+    coordinates (n_nodes, 3): m; NaN for nodes without a place, such as inner nodes of an element. stiffness, mass,
+    damping (3 n_nodes, 3 n_nodes): N/m, kg, N s/m, symmetric, unconstrained, displacements node by node in x, y, z;
+    damping None for that of a loss factor. rotation: for the centrifugal load. preload, gravity: as in `MeshModel`.
     """
 
     coordinates: FloatArray
@@ -131,12 +125,10 @@ class Retainer:
 class JointDefinition:
     """What is done with a model.
 
-    contacts: pairs of surfaces, at least one. held (n_nodes, 3): displacements that are 0, or follow others by the
-        constraints. load: harmonic load of 1 N. responses: by name.
-    cut: cut faces; None where the structure is no cyclic sector.
-    along (3,): direction near the first tangents. None for the axis of rotation or of the cyclic structure, else z.
-    ties: surfaces that are always glued. constraints: displacements that follow others.
-    pairs: pairs of the contacts in another order or with other frames than `build_contact_pairs` gives them.
+    held (n_nodes, 3): displacements that are 0, or follow others by the constraints. load: harmonic load of 1 N. cut:
+    None where the structure is no cyclic sector. along (3,): direction near the first tangents; None for the axis of
+    rotation or of the cyclic structure, else z. ties: surfaces that are always glued. pairs: those of the contacts in
+    another order or with other frames than `build_contact_pairs` gives them.
     """
 
     contacts: tuple[ContactSurfaces, ...]

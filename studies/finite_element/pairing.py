@@ -26,16 +26,13 @@ _STRAIGHT = 0.7  # part of the way to the closest point that is along the normal
 class ContactSurfaces:
     """Two surfaces in contact.
 
-    first, second: the nodes of the finer surface move, those of the first one where both are alike. Where one surface
-        alone is covered by the other, its nodes move.
-    tolerance: largest distance of a node that is paired, m; None for a share of the size of a facet.
-    friction_coefficient: of these surfaces; None where all pairs have the same.
-    with_gaps: whether distances in the mesh are gaps of the joint. Otherwise they are errors of flat facets on curved
-        surfaces, and the pairs touch.
-    clearance: gap of all pairs in place of the distances, m, negative for an interference; None for the distances.
-    label: of the pairs; the names of both surfaces if empty.
-    sector: of the second surface, counted from that of the first one: 1 where it belongs to the next sector in the
-        sense of the axis, -1 to the one before, 0 to the same.
+    The nodes of the finer surface move, those of the first one where both are alike; where one surface alone is covered
+    by the other, its nodes move. tolerance: largest distance of a node that is paired, m; None for a share of the size
+    of a facet. friction_coefficient: None where all pairs have the same. with_gaps: whether distances in the mesh are
+    gaps of the joint; else they are errors of flat facets on curved surfaces, and the pairs touch. clearance: gap of
+    all pairs in place of the distances, m, negative for an interference. label: of the pairs; the names of both
+    surfaces if empty. sector: of the second surface: 1 where it belongs to the next sector in the sense of the axis, -1
+    to the one before.
     """
 
     first: Surface
@@ -62,16 +59,13 @@ class ContactSurfaces:
 class ContactPairs:
     """Contact pairs, `n_contact` of them.
 
-    moving (n_contact,): nodes. The relative displacement is that of the node minus that of the opposite point.
-    opposite (n_contact, n_nodes): interpolation weights of the opposite points; rows sum to 1.
-    sector (n_contact,): of the opposite point, counted from that of the moving node: 0, 1 or -1. The weights are of the
-        nodes of this sector that the point is the image of.
-    frames (n_contact, 3, 3): rows are unit vectors: normal (out of the moving body, so that motion along it closes the
-        pair), first tangent, second tangent.
-    present (n_contact, 3): whether a relative displacement exists; the others are held.
-    area (n_contact,): m2. position (n_contact, 3): of the moving node, m.
-    distance (n_contact,): along the normal, positive where the pair is open, m. gap (n_contact,): initial gap, m.
-    surface (n_contact,): number of the pair of surfaces. moving_name, opposite_name: of each pair of surfaces.
+    moving (n_contact,): nodes; the relative displacement is that of the node minus that of the opposite point. opposite
+    (n_contact, n_nodes): interpolation weights of the opposite points, of the nodes of this sector whose images they
+    are; sector (n_contact,): where the point is, 0, 1 or -1. frames (n_contact, 3, 3): rows are normal (out of the
+    moving body, so that motion along it closes the pair), first and second tangent. present (n_contact, 3): whether a
+    relative displacement exists; the others are held. area (n_contact,): m2. position (n_contact, 3): of the moving
+    node, m. distance (n_contact,): along the normal, positive where the pair is open, m. gap (n_contact,): m. surface
+    (n_contact,): number of the pair of surfaces, whose names are moving_name and opposite_name.
     """
 
     moving: IntArray
@@ -131,14 +125,12 @@ def match_nodes(
     given: tuple[FloatArray, FloatArray, FloatArray],
     axis: CyclicAxis | None,
 ) -> ContactPairs:
-    """Pairs of nodes that meet, of reduced matrices, which have no facets.
+    """As `build_contact_pairs`, of nodes that meet, of reduced matrices, which have no facets.
 
-    As `build_contact_pairs`, of the nodes of the first surface of each contact and the nearest ones of the second.
-    given: areas (n_nodes,), m2, normals (n_nodes, 3), unit vectors out of the body, and initial gaps (n_nodes,), m; NaN
-    where there is none; those of the first surface count. The first tangents are as near to the axis as possible, else
-    to z.
-
-    Raises SceneError where a node has no area or normal, or finds no node that it meets.
+    Pairs of the nodes of the first surface and the nearest ones of the second. given, of the first surface: areas
+    (n_nodes,), m2, normals (n_nodes, 3), unit vectors out of the body, initial gaps (n_nodes,), m; NaN where there is
+    none. The first tangents are as near to the axis as possible, else to z. Raises SceneError where a node has no area
+    or normal, or finds no node that it meets.
     """
     along = np.array([0.0, 0.0, 1.0]) if axis is None else axis.axis
     area, normals, gap = given

@@ -7,14 +7,14 @@ stiffness couples no mode with a shape. One factorisation of the glued stiffness
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
 from scipy.linalg import eigh, qr
 
 from solver.model import FloatArray, Matrix
-from studies.finite_element.elimination import Factor, factorise
+from studies.finite_element.elimination import Dissection, Factor, dissect, factorise
 from studies.finite_element.structure import Coordinates, Structure
 
 _COLUMNS = 64  # vectors solved for at a time
@@ -51,6 +51,7 @@ class Reduction:
     structure: Structure
     forms: Mapping[str, sparse.csr_matrix]
     positions: FloatArray
+    _dissections: list[Dissection] = field(default_factory=list)  # one, the same at all nodal diameters
 
     def solve_static(self, load: FloatArray) -> FloatArray:
         """Displacements (3 n_nodes,), m, of the glued structure at nodal diameter 0 under a load (3 n_nodes,), N."""
@@ -68,7 +69,10 @@ class Reduction:
     def _factorise(self, coordinates: Coordinates) -> tuple[sparse.csr_matrix, Factor]:
         """Stiffness with the pairs glued, and its factors."""
         stiffness = _on(coordinates.glued, self.forms["stiffness"])
-        return stiffness, factorise(stiffness, coordinates.node, self.positions)
+        if not self._dissections:
+            everything = _on(abs(coordinates.glued), sum(abs(form) for form in self.forms.values()))
+            self._dissections.append(dissect(everything, coordinates.node, self.positions))
+        return stiffness, factorise(stiffness, self._dissections[0])
 
     def reduce(self, nodal_diameter: int, n_modes: int, vectors: FloatArray) -> ReducedStructure:
         """The structure at a nodal diameter.

@@ -83,9 +83,9 @@ class Surface:
     """A surface of one body.
 
     triangles (n_triangles, 3), quads (n_quads, 4): facets, rows of `SolidMesh.coordinates`, anticlockwise as seen from
-    outside the body. faces (n_triangles + n_quads, 8): nodes of the element face that each facet is of, -1 after the
-    last. places (n_triangles + n_quads, 4, 2): reference coordinates on that face of the corners of the facet, of a
-    triangle the last one twice. depth (n_nodes,): how deep the elements are below each of `nodes`, the least one, m.
+    outside. Of triangles, then quads: faces (n, 8): nodes of the element face that each is of, -1 after the last;
+    places (n, 4, 2): reference coordinates of its corners there, of a triangle the last one twice. depth (n_nodes,):
+    how deep the elements are below each of `nodes`, the least one, m.
     """
 
     name: str

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from solver.model import ReducedModel
     from studies.scene_answers import ExactAnswer, NaturalFrequencies, SurfaceMesh, WearQuestion
-    from studies.scenes.half_space.room_for_wear import ExpectedWear
+    from studies.scenes.half_space import ExpectedWear
 
 BUNDLED = (
     "cylinder_on_flat",

@@ -2,9 +2,9 @@
 
 A constant force P presses. A tangential force Q or a stroke moves the cylinder; `excitation_amplitude` multiplies Q or
 the stroke, and the frequency has no influence. Strips of half of the contact carry uniform tractions on two elastic
-half-planes; each strip also stands for its mirror image (`half_space.influence`). Areas, forces and volumes are of both
+half-planes; each strip also stands for its mirror image (`half_space`). Areas, forces and volumes are of both
 halves, a depth is the sum of both bodies. A stroke has to be small against the contact. Without wear the pressure is
-that of Hertz, the stick zone that of Cattaneo; partial slip wears to a known profile (`closed_forms.hertz`).
+that of Hertz, the stick zone that of Cattaneo; partial slip wears to a known profile (`hertz`).
 """
 
 from __future__ import annotations
@@ -15,15 +15,21 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from solver.model import ReducedModel
 from studies.contact_compliance import ContactStiffness
 from studies.scene_error import SceneError
-from studies.scenes.closed_forms.hertz import (
+from studies.scenes.half_space import (
+    ExpectedWear,
+    Scar,
+    composite_modulus,
+    pairs_of_patches,
+    press_body,
+    round_up,
+    strip_compliance,
+)
+from studies.scenes.hertz import (
     line_half_width,
     line_stick_under_stroke,
     line_stick_width,
     line_worn_edge,
 )
-from studies.scenes.half_space.influence import composite_modulus, strip_compliance
-from studies.scenes.half_space.pressed_body import pairs_of_patches, press_body
-from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar, round_up
 
 _WIDER = 1.0 / 6.0
 """Of its width: by this much strips of uniform traction are wider, at each end, than the flat punch that they bear as.

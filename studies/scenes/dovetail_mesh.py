@@ -1,66 +1,18 @@
-"""Mesh of the dovetail sector: a disk and a blade with coincident nodes on the two flanks.
+"""Mesh of the dovetail sector: blocks of the disk and of the blade, whose points on the two flanks coincide.
 
 Cross-sections lie in the plane x (radius along the centre line), y (tangential); all parts have the same number of
-axial stations from z < 0 (leading edge) to z > 0. Disk and blade share no node.
+axial stations from z < 0 (leading edge) to z > 0. Mesh density m gives 4 m axial x (m + 1) nodes on a flank.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import asin, atan2, cos, hypot, pi, radians, sin, sqrt, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solver.model import FloatArray, IntArray
+from solver.model import FloatArray
 from studies.scenes.dovetail_parameters import Parameters
-from studies.scenes.structured_mesh import HexMesh, graded, join_blocks
-
-
-@dataclass(frozen=True)
-class DovetailMesh:
-    """A sector and its node sets.
-
-    mesh: disk and blade. blade_elements (n_elements,): which elements are of the blade. bore_nodes: clamped.
-    left_nodes, right_nodes (n,): the cut faces at -pi/N and +pi/N, node by node images of each other under rotation
-    by one sector. disk_flanks, blade_flanks (2, n_axial, n_flank): coincident nodes; flank 0 lies at y > 0 (intrados),
-    flank 1 at y < 0 (extrados); from the leading to the trailing edge, then from the inner to the outer end.
-    tip_nodes (n_thickness, n_axial): end face of the blade, from extrados to intrados, from leading to trailing edge.
-    """
-
-    mesh: HexMesh
-    blade_elements: NDArray[np.bool_]
-    bore_nodes: IntArray
-    left_nodes: IntArray
-    right_nodes: IntArray
-    disk_flanks: IntArray
-    blade_flanks: IntArray
-    tip_nodes: IntArray
-
-
-def build_dovetail_mesh(parameters: Parameters) -> DovetailMesh:
-    """Structured mesh of the sector; density m gives 4 m axial x (m + 1) nodes on a flank."""
-    density = parameters.mesh
-    disk, disk_grids = join_blocks(_disk_blocks(parameters))
-    blade, blade_grids = join_blocks(_blade_blocks(parameters))
-    (web, post_right, post_left), body = disk_grids, blade_grids[0]
-    offset = len(disk.nodes)
-    # Above the slot bottom and above the root bottom there are `density` rows of elements before the flank begins.
-    flank = slice(density, 2 * density + 1)
-    n_disk, n_blade = len(disk.elements), len(blade.elements)
-    return DovetailMesh(
-        mesh=HexMesh(
-            nodes=np.concatenate([disk.nodes, blade.nodes]),
-            elements=np.concatenate([disk.elements, blade.elements + offset]),
-        ),
-        blade_elements=np.arange(n_disk + n_blade) >= n_disk,
-        bore_nodes=web[0].ravel(),
-        left_nodes=np.concatenate([web[:, 0], post_left[1:, 0]]).ravel(),
-        right_nodes=np.concatenate([web[:, -1], post_right[1:, -1]]).ravel(),
-        disk_flanks=np.swapaxes(np.stack([post_right[flank, 0], post_left[flank, -1]]), 1, 2),
-        blade_flanks=offset + np.swapaxes(np.stack([body[flank, -1], body[flank, 0]]), 1, 2),
-        tip_nodes=offset + body[-1],
-    )
+from studies.scenes.sector import graded
 
 
 def _across(density: int) -> int:
@@ -82,7 +34,7 @@ def _disk_width(parameters: Parameters, radius: FloatArray) -> FloatArray:
     return np.asarray(p.web_width + (outer - p.web_width) * 0.5 * (1.0 + np.cos(phase)))
 
 
-def _disk_blocks(parameters: Parameters) -> list[FloatArray]:
+def disk_blocks(parameters: Parameters) -> list[FloatArray]:
     """Web below the slot, post at y > 0, post at y < 0; grids (radial, tangential, axial)."""
     p, m = parameters, parameters.mesh
     half_pitch = p.half_pitch
@@ -122,7 +74,7 @@ def _disk_grid(parameters: Parameters, radii: FloatArray, angles: FloatArray) ->
     return grid
 
 
-def _blade_blocks(parameters: Parameters) -> list[FloatArray]:
+def blade_blocks(parameters: Parameters) -> list[FloatArray]:
     """Root, neck and blade in one; platform at y > 0; platform at y < 0; grids (radial, tangential, axial)."""
     p, m = parameters, parameters.mesh
     bottom_x, bottom_y = p.flank_bottom

@@ -10,8 +10,7 @@ from pydantic import Field
 from studies.scene_error import SceneError
 from studies.scenes.sector import SectorParameters
 
-TRAVELLING_RETAINER = 1e7
-"""Retainer under a travelling wave, N/m: stiff against the slip of the flanks, soft against the flanks themselves."""
+_TRAVELLING_RETAINER = 1e7  # N/m: stiff against the slip of the flanks, soft against the flanks themselves
 
 
 class Parameters(SectorParameters):
@@ -68,7 +67,7 @@ class Parameters(SectorParameters):
     def retainer(self) -> float:
         """Stiffness of the retainer, N/m, with its default filled in."""
         if self.retention_stiffness is None:
-            return TRAVELLING_RETAINER if self.nodal_diameter > 0 else 0.0
+            return _TRAVELLING_RETAINER if self.nodal_diameter > 0 else 0.0
         return self.retention_stiffness
 
     @property
@@ -96,31 +95,38 @@ _ASCENDING = (
 
 def check_parameters(parameters: Parameters) -> None:
     """Raises SceneError where parameters that are fine one by one do not go together."""
-    parameters.check_wave()
-    for inner, outer in pairwise(_ASCENDING):
-        if getattr(parameters, inner) >= getattr(parameters, outer):
-            raise SceneError(
-                outer, str(getattr(parameters, outer)), f"make it larger than {inner} = {getattr(parameters, inner)}"
-            )
-    bottom_radius, bottom_half_width = parameters.flank_bottom
-    if bottom_radius <= parameters.slot_bottom_radius + parameters.root_clearance:
-        raise SceneError(
+    p = parameters
+    p.check_wave()
+    bottom_radius, bottom_half_width = p.flank_bottom
+    neck = p.flank_top_half_width
+    shorten = "shorten the flanks or "
+    for wrong, key, remedy in (
+        *(
+            (getattr(p, inner) >= getattr(p, outer), outer, f"make it larger than {inner} = {getattr(p, inner)}")
+            for inner, outer in pairwise(_ASCENDING)
+        ),
+        (
+            bottom_radius <= p.slot_bottom_radius + p.root_clearance,
             "flank_length",
-            str(parameters.flank_length),
-            "shorten the flanks or lower slot_bottom_radius, so that they end above the slot bottom",
-        )
-    if bottom_half_width <= parameters.root_clearance:
-        raise SceneError("root_clearance", str(parameters.root_clearance), "make it smaller than the root")
-    if bottom_half_width >= 0.9 * parameters.slot_bottom_radius * sin(parameters.half_pitch):
-        raise SceneError(
+            f"{shorten}lower slot_bottom_radius, so that they end above the slot bottom",
+        ),
+        (bottom_half_width <= p.root_clearance, "root_clearance", "make it smaller than the root"),
+        (
+            bottom_half_width >= 0.9 * p.slot_bottom_radius * sin(p.half_pitch),
             "flank_length",
-            str(parameters.flank_length),
-            "shorten the flanks or use fewer sectors, so that a post is left between two slots",
-        )
-    neck = parameters.flank_top_half_width
-    if neck + parameters.platform_gap >= parameters.platform_radius * tan(parameters.half_pitch):
-        raise SceneError("platform_gap", str(parameters.platform_gap), "make it smaller, the platform vanishes")
-    if neck + parameters.mouth_clearance >= parameters.rim_radius * sin(parameters.half_pitch):
-        raise SceneError("mouth_clearance", str(parameters.mouth_clearance), "make it smaller, the post vanishes")
-    if parameters.fillet_height >= parameters.blade_length:
-        raise SceneError("fillet_height", str(parameters.fillet_height), "make it smaller than blade_length")
+            f"{shorten}use fewer sectors, so that a post is left between two slots",
+        ),
+        (
+            neck + p.platform_gap >= p.platform_radius * tan(p.half_pitch),
+            "platform_gap",
+            "make it smaller, the platform vanishes",
+        ),
+        (
+            neck + p.mouth_clearance >= p.rim_radius * sin(p.half_pitch),
+            "mouth_clearance",
+            "make it smaller, the post vanishes",
+        ),
+        (p.fillet_height >= p.blade_length, "fillet_height", "make it smaller than blade_length"),
+    ):
+        if wrong:
+            raise SceneError(key, str(getattr(p, key)), remedy)

@@ -17,20 +17,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.model import FloatArray
-from studies.finite_element import surfaces
+from solver.model import FloatArray, IntArray
 from studies.finite_element.cut_faces import CutFaces
 from studies.finite_element.joint_model import JointDefinition, Retainer, SetMotion
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
-from studies.finite_element.solid_mesh import ElementGroup, SolidMesh, check_elements
+from studies.finite_element.solid_mesh import check_elements
+from studies.finite_element.surfaces import surface_of_nodes
 from studies.scene_error import SceneError
-from studies.scenes.dovetail_mesh import DovetailMesh, build_dovetail_mesh, chord_directions
+from studies.scenes.dovetail_mesh import blade_blocks, chord_directions, disk_blocks
 from studies.scenes.dovetail_parameters import Parameters, check_parameters
-from studies.scenes.sector import AXIS, Sector, functions_of
+from studies.scenes.sector import AXIS, Sector, functions_of, mesh_of_bodies
 
 __all__ = ["Parameters", "build"]
-
-SURFACES = ("intrados", "extrados")
 
 
 def define_sector(parameters: Parameters) -> Sector:
@@ -45,58 +43,53 @@ def define_sector(parameters: Parameters) -> Sector:
     Raises SceneError where the parameters do not go together.
     """
     check_parameters(parameters)
-    mesh = build_dovetail_mesh(parameters)
-    solid = build_solid_mesh(parameters, mesh)
+    p, m = parameters, parameters.mesh
+    bodies = [(disk_blocks(p), ("disk",) * 3, p.material), (blade_blocks(p), ("blade",) * 3, p.material)]
+    solid, (web, post_right, post_left, blade, *_) = mesh_of_bodies(bodies)
     try:
         check_elements(solid)
     except SceneError as error:
-        raise SceneError("mesh", str(parameters.mesh), f"change the geometry: {error.value}") from error
-    contacts = _contacts(solid, mesh)
+        raise SceneError("mesh", str(m), f"change the geometry: {error.value}") from error
+    # Coincident nodes, from the leading to the trailing edge, then from the inner to the outer end. Above the slot
+    # bottom and above the root bottom there are m rows of elements before the flank begins.
+    flank = slice(m, 2 * m + 1)
+    disk_flanks = [post_right[flank, 0].T.ravel(), post_left[flank, -1].T.ravel()]
+    blade_flanks = [blade[flank, -1].T.ravel(), blade[flank, 0].T.ravel()]
+    contacts = tuple(
+        ContactSurfaces(
+            surface_of_nodes(solid, f"{name} of the blade", moving),
+            surface_of_nodes(solid, f"{name} of the disk", opposite),
+            label=name,
+        )
+        for name, moving, opposite in zip(("intrados", "extrados"), blade_flanks, disk_flanks, strict=True)
+    )
     held = np.zeros((solid.n_nodes, 3), dtype=np.bool_)
-    held[mesh.bore_nodes] = True
+    held[web[0].ravel()] = True
     # The number of axial stations is even: mid-chord lies halfway between the two middle ones.
-    n_across, n_axial = mesh.tip_nodes.shape
-    middle = mesh.tip_nodes[n_across // 2, n_axial // 2 - 1 : n_axial // 2 + 1]
-    tip = SetMotion(middle, chord_directions(parameters.tip_stagger)[1])
+    n_across, n_axial = blade[-1].shape
+    middle = blade[-1][n_across // 2, n_axial // 2 - 1 : n_axial // 2 + 1]
+    tip = SetMotion(middle, chord_directions(p.tip_stagger)[1])
+    left, right = (
+        np.concatenate([web[:, side], post[1:, side]]).ravel() for side, post in ((0, post_left), (-1, post_right))
+    )
+    pairs = build_contact_pairs(solid.coordinates, solid.numbers, contacts, AXIS)
     joint = JointDefinition(
         contacts=contacts,
         held=held,
         load=tip,
         responses={"tip": tip},
-        cut=CutFaces(parameters.axis, mesh.left_nodes, mesh.right_nodes),
-        retainer=Retainer(parameters.retainer, AXIS),
-        pairs=_arranged(build_contact_pairs(solid.coordinates, solid.numbers, contacts, AXIS), mesh),
+        cut=CutFaces(p.axis, left, right),
+        retainer=Retainer(p.retainer, AXIS),
+        pairs=_arranged(pairs, np.concatenate(blade_flanks), solid.n_nodes),
     )
-    return parameters.model_of(solid), joint
+    return p.model_of(solid), joint
 
 
-def build_solid_mesh(parameters: Parameters, mesh: DovetailMesh) -> SolidMesh:
-    """Disk and blade in hexahedra with incompatible modes."""
-    elements = mesh.mesh.elements
-    groups = tuple(
-        ElementGroup("C3D8I", elements[own], np.flatnonzero(own) + 1, parameters.material, part)
-        for part, own in (("disk", ~mesh.blade_elements), ("blade", mesh.blade_elements))
-    )
-    return SolidMesh(mesh.mesh.nodes, np.arange(len(mesh.mesh.nodes)) + 1, groups)
-
-
-def _contacts(solid: SolidMesh, mesh: DovetailMesh) -> tuple[ContactSurfaces, ...]:
-    """Both flanks, intrados first; the blade moves."""
-    return tuple(
-        ContactSurfaces(
-            surfaces.surface_of_nodes(solid, f"{name} of the blade", blade.ravel()),
-            surfaces.surface_of_nodes(solid, f"{name} of the disk", disk.ravel()),
-            label=name,
-        )
-        for name, blade, disk in zip(SURFACES, mesh.blade_flanks, mesh.disk_flanks, strict=True)
-    )
-
-
-def _arranged(pairs: ContactPairs, mesh: DovetailMesh) -> ContactPairs:
-    """Pairs in the order of the flanks' grids, second tangents outwards: frames of both flanks mirror each other."""
-    place = np.empty(len(mesh.mesh.nodes), dtype=np.int64)
+def _arranged(pairs: ContactPairs, flanks: IntArray, n_nodes: int) -> ContactPairs:
+    """Pairs in the order of the flanks' nodes, second tangents outwards: frames of both flanks mirror each other."""
+    place = np.empty(n_nodes, dtype=np.int64)
     place[pairs.moving] = np.arange(pairs.n_contact)
-    ordered = pairs.chosen(place[mesh.blade_flanks.ravel()])
+    ordered = pairs.chosen(place[flanks])
     frames: FloatArray = ordered.frames.copy()
     frames[:, 2] *= np.sign(frames[:, 2, :1])
     return replace(ordered, frames=frames)

@@ -12,10 +12,11 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from solver.contact.wear_law import wearing_work
-from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.model import ReducedModel
+from solver.model_from_matrices import build_model
 from studies.contact_compliance import ContactStiffness
 from studies.scene_answers import ExactAnswer, WearQuestion, unknown_answer
-from studies.scenes.closed_forms.den_hartog import DenHartogSlider, WearingSlider
+from studies.scenes.den_hartog import DenHartogSlider, WearingSlider
 
 
 class Parameters(BaseModel):
@@ -47,35 +48,24 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
     """
     del n_harmonics
     p = parameters
-    if p.normal_stiffness > 0:
-        mass, damping, stiffness = (
-            np.diag(pair) for pair in ((0.0, p.mass), (0.0, p.damping), (p.normal_stiffness, p.stiffness))
-        )
-        load_static = np.array([p.normal_load, 0.0])
-        dofs, normal_load = [0, 1, -1], 0.0
-    else:
-        mass, damping, stiffness = (np.array([[value]]) for value in (p.mass, p.damping, p.stiffness))
-        load_static = np.zeros(1)
-        dofs, normal_load = [-1, 0, -1], p.normal_load
-    on_mass = np.zeros(len(load_static))
-    on_mass[-1] = 1.0
-    linear = LinearModel(
-        mass=mass,
-        damping=damping,
-        stiffness=stiffness,
-        load_static=load_static,
-        load_harmonic=on_mass.astype(np.complex128),
-        response=on_mass[np.newaxis, :],
-    )
-    contact = ContactInterface(
-        dofs=np.array([dofs], dtype=np.int64),
-        area=np.array([p.area]),
-        gap=np.zeros(1),
-        normal_load=np.array([normal_load]),
-        position=np.full((1, 3), np.nan),
+    mass, damping, stiffness = (np.diag(each) for each in (
+        (0.0, p.mass), (0.0, p.damping), (p.normal_stiffness, p.stiffness)
+    ))  # fmt: skip
+    sprung = p.normal_stiffness > 0
+    own = slice(0 if sprung else 1, None)  # with the closing displacement, or without it
+    return build_model(
+        mass[own, own],
+        damping[own, own],
+        stiffness[own, own],
+        [[0, 1, -1]] if sprung else [[-1, 0, -1]],
+        p.area,
+        load_harmonic=np.array([0.0, 1.0])[own],
+        load_static=np.array([p.normal_load, 0.0]) if sprung else None,
+        response=np.array([[0.0, 1.0]])[:, own],
+        normal_load=0.0 if sprung else p.normal_load,
         surface=("support",),
+        response_names=("mass",),
     )
-    return ReducedModel(linear={0: linear}, contact=contact, response_names=("mass",))
 
 
 _OF_SCENE = "friction_coefficient", "mass", "stiffness", "normal_load", "normal_stiffness", "area", "worn"

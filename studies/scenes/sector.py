@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from math import pi
 from typing import TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.contact_compliance import ContactStiffness
@@ -19,8 +23,8 @@ from studies.finite_element.solid_mesh import ElementGroup, Rotation, SolidMesh
 from studies.finite_element.surfaces import describe_mesh
 from studies.scene_answers import NaturalFrequencies, SurfaceMesh
 from studies.scene_error import SceneError
-from studies.scenes.structured_mesh import join_blocks
 
+_SAME_NODE = 1e-9  # points closer than this, in m, are one node
 AXIS, ORIGIN = np.array([0.0, 0.0, 1.0]), np.zeros(3)
 
 
@@ -78,32 +82,21 @@ Sector = tuple[MeshModel, JointDefinition]
 P = TypeVar("P", bound=SectorParameters)
 
 
-def reduce_sector(sector: Sector, parameters: SectorParameters, n_harmonics: int) -> ReducedModel:
-    """Reduced model of a sector for the harmonics 0..n_harmonics of a travelling wave of `nodal_diameter`.
-
-    The centrifugal load enters the static harmonic only, the unit force of 1 N nodal diameter d only. Stress stiffening
-    takes the stress of the linear elastic sector with its contacts glued at the given speed, the usual reference state
-    of a modal analysis with prestress: in the blade it follows from equilibrium alone, and how the contacts share the
-    load matters only beside them. With spin softening, `-Omega^2` times the mass that moves across the axis, it is part
-    of every stiffness, the static one included. Coriolis forces are left out. The damping is `loss_factor / omega_1`
-    times the elastic stiffness, omega_1 the first frequency of the glued sector, rad/s, at the nodal diameter of the
-    excitation.
-    """
-    options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
-    return build_fe_scene(*sector, options, n_harmonics).model
-
-
 def functions_of(
     define_sector: Callable[[P], Sector],
 ) -> tuple[Callable[[P, int], ReducedModel], Callable[[P], SurfaceMesh], Callable[[P], NaturalFrequencies]]:
     """Functions `build`, `describe_mesh` and `natural_frequencies` of a scene, see `studies.scenes`.
 
-    build: as `reduce_sector`. describe_mesh: outer faces of the sector. natural_frequencies: with all contacts glued,
-    at all nodal diameters 0..N/2. All raise SceneError where the parameters do not go together.
+    build: as `build_fe_scene`. Stress stiffening takes the stress of the sector with its contacts glued, the usual
+    reference state of a modal analysis with prestress: in the blade it follows from equilibrium alone, and how the
+    contacts share the load matters only beside them. With spin softening it is part of every stiffness, the static one
+    included. describe_mesh: outer faces of the sector. natural_frequencies: with all contacts glued, at all nodal
+    diameters 0..N/2. All raise SceneError where the parameters do not go together.
     """
 
     def build(parameters: P, n_harmonics: int) -> ReducedModel:
-        return reduce_sector(define_sector(parameters), parameters, n_harmonics)
+        options = ReductionOptions(parameters.nodal_diameter, parameters.stuck_modes, parameters.loss_factor)
+        return build_fe_scene(*define_sector(parameters), options, n_harmonics).model
 
     def mesh(parameters: P) -> SurfaceMesh:
         return describe_mesh(define_sector(parameters)[0].mesh)
@@ -114,30 +107,48 @@ def functions_of(
     return build, mesh, frequencies
 
 
-def mesh_of_bodies(bodies: Sequence[tuple[Sequence[FloatArray], Sequence[str], Material]]) -> tuple[
-    SolidMesh, tuple[IntArray, ...]
-]:  # fmt: skip
-    """Mesh of several bodies in hexahedra with incompatible modes, and node numbers of all blocks.
+def mesh_of_bodies(
+    bodies: Sequence[tuple[Sequence[FloatArray], Sequence[str], Material]],
+) -> tuple[SolidMesh, tuple[IntArray, ...]]:
+    """Mesh of several bodies in hexahedra with incompatible modes, and node numbers (n_i, n_j, n_k) of all blocks.
 
-    bodies: blocks of points (radial, tangential, axial, 3), the name of each block's part, material. Blocks of one body
-    are joined where their points coincide; bodies are not.
+    bodies: blocks, the name of each block's part, material. A block is a grid of points (n_i, n_j, n_k, 3), m, whose
+    three directions are right-handed. Points of one body that coincide become one node; those of several do not.
     """
     nodes: list[FloatArray] = []
     grids: list[IntArray] = []
     groups: list[ElementGroup] = []
     n_nodes = n_elements = 0
     for blocks, parts, material in bodies:
-        mesh, own = join_blocks(blocks)
-        first = 0
-        for part, grid in zip(parts, own, strict=True):
-            last = first + int(np.prod([size - 1 for size in grid.shape]))
-            numbers = np.arange(n_elements + first, n_elements + last) + 1
-            groups.append(ElementGroup("C3D8I", mesh.elements[first:last] + n_nodes, numbers, material, part))
-            first = last
-        grids += [grid + n_nodes for grid in own]
-        nodes.append(mesh.nodes)
-        n_nodes, n_elements = n_nodes + len(mesh.nodes), n_elements + len(mesh.elements)
+        points = np.concatenate([block.reshape(-1, 3) for block in blocks])
+        pairs = cKDTree(points).query_pairs(_SAME_NODE, output_type="ndarray")
+        touching = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
+        _, node = connected_components(touching, directed=False)
+        _, first = np.unique(node, return_index=True)
+        ends = np.cumsum([0] + [block[..., 0].size for block in blocks])
+        for block, part, (start, end) in zip(blocks, parts, pairwise(ends), strict=True):
+            grids.append(n_nodes + node[start:end].reshape(block.shape[:3]).astype(np.int64))
+            cells = _cells(grids[-1])
+            numbers = n_elements + np.arange(len(cells)) + 1
+            groups.append(ElementGroup("C3D8I", cells, numbers, material, part))
+            n_elements += len(cells)
+        nodes.append(points[first])
+        n_nodes += len(first)
     return SolidMesh(np.concatenate(nodes), np.arange(n_nodes) + 1, tuple(groups)), tuple(grids)
+
+
+def _cells(grid: IntArray) -> IntArray:
+    """Corner nodes (n_cells, 8) of the cells of a grid of node numbers."""
+    n_i, n_j, n_k = (size - 1 for size in grid.shape)
+    corners = [grid[i : i + n_i, j : j + n_j, k : k + n_k] for k in (0, 1) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    return np.stack(corners, axis=-1).reshape(-1, 8)
+
+
+def graded(stations: Sequence[float], divisions: Sequence[int]) -> FloatArray:
+    """Values through all stations, with so many equal divisions from each station to the next."""
+    spans = zip(pairwise(stations), divisions, strict=True)
+    parts = [np.linspace(start, end, n, endpoint=False) for (start, end), n in spans]
+    return np.append(np.concatenate(parts), stations[-1])
 
 
 def block_of(

@@ -1,7 +1,7 @@
 """A sphere on a flat: two elastic half-spaces of one material, no mass.
 
 As `cylinder_on_flat`, with a force along x. Square patches of a quarter of the contact carry uniform tractions; each
-patch also stands for its mirror images (`half_space.influence`). Areas, forces and volumes are of all quarters. The
+patch also stands for its mirror images (`half_space`). Areas, forces and volumes are of all quarters. The
 stick zone is that of Cattaneo and Mindlin, without tractions across the force.
 """
 
@@ -13,15 +13,21 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from solver.model import ReducedModel
 from studies.contact_compliance import ContactStiffness
 from studies.scene_error import SceneError
-from studies.scenes.closed_forms.hertz import (
+from studies.scenes.half_space import (
+    ExpectedWear,
+    Scar,
+    composite_modulus,
+    pairs_of_patches,
+    patch_compliance,
+    press_body,
+    round_up,
+)
+from studies.scenes.hertz import (
     point_radius,
     point_stick_radius,
     point_stick_under_stroke,
     point_worn_edge,
 )
-from studies.scenes.half_space.influence import composite_modulus, patch_compliance
-from studies.scenes.half_space.pressed_body import pairs_of_patches, press_body
-from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar, round_up
 
 _WIDER = 0.11
 """Of the width of a patch: by so much the circle of equal area is wider than the punch that stuck patches bear as.

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.model import FloatArray, ReducedModel
+from solver.model_from_matrices import build_model
 from studies.contact_compliance import ContactStiffness
 
 
@@ -37,23 +38,17 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
     """
     del n_harmonics
     p = parameters
-    linear = LinearModel(
-        mass=np.diag([p.mass_1, p.mass_2]),
-        damping=_chain(p.damping_1, p.damping_2),
-        stiffness=_chain(p.stiffness_1, p.stiffness_2),
-        load_static=np.zeros(2),
-        load_harmonic=np.array([1.0, 0.0], dtype=np.complex128),
-        response=np.eye(2),
-    )
-    contact = ContactInterface(
-        dofs=np.array([[-1, 1, -1]], dtype=np.int64),
-        area=np.array([p.area]),
-        gap=np.zeros(1),
-        normal_load=np.array([p.normal_load]),
-        position=np.full((1, 3), np.nan),
+    return build_model(
+        np.diag([p.mass_1, p.mass_2]),
+        _chain(p.damping_1, p.damping_2),
+        _chain(p.stiffness_1, p.stiffness_2),
+        [[-1, 1, -1]],
+        p.area,
+        load_harmonic=[1.0, 0.0],
+        normal_load=p.normal_load,
         surface=("support",),
+        response_names=("mass_1", "mass_2"),
     )
-    return ReducedModel(linear={0: linear}, contact=contact, response_names=("mass_1", "mass_2"))
 
 
 def _chain(to_ground: float, between: float) -> FloatArray:

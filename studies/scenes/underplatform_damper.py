@@ -31,9 +31,9 @@ from studies.scenes.sector import (
     SectorParameters,
     block_of,
     functions_of,
+    graded,
     mesh_of_bodies,
 )
-from studies.scenes.structured_mesh import graded
 
 
 class Parameters(SectorParameters):

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.model import ReducedModel
+from solver.model_from_matrices import build_model
 from studies.contact_compliance import ContactStiffness
 
 
@@ -43,22 +44,16 @@ def build(parameters: Parameters, n_harmonics: int) -> ReducedModel:
     """
     del n_harmonics
     p = parameters
-    linear = LinearModel(
-        mass=np.diag([0.0, p.mass]),
-        damping=np.diag([0.0, p.damping]),
-        stiffness=np.array(
-            [[p.wall_stiffness, -p.wall_stiffness], [-p.wall_stiffness, p.wall_stiffness + p.stiffness]]
-        ),
-        load_static=np.zeros(2),
-        load_harmonic=np.array([0.0, 1.0], dtype=np.complex128),
-        response=np.array([[0.0, 1.0]]),
-    )
-    contact = ContactInterface(
-        dofs=np.array([[0, -1, -1]], dtype=np.int64),
-        area=np.array([p.area]),
-        gap=np.array([p.gap]),
-        normal_load=np.zeros(1),
-        position=np.full((1, 3), np.nan),
+    wall = p.wall_stiffness
+    return build_model(
+        np.diag([0.0, p.mass]),
+        np.diag([0.0, p.damping]),
+        [[wall, -wall], [-wall, wall + p.stiffness]],
+        [[0, -1, -1]],
+        p.area,
+        load_harmonic=[0.0, 1.0],
+        response=[[0.0, 1.0]],
+        gap=p.gap,
         surface=("wall",),
+        response_names=("mass",),
     )
-    return ReducedModel(linear={0: linear}, contact=contact, response_names=("mass",))

@@ -172,7 +172,7 @@ def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:
     """Label and text of each line on what was skipped in files, or read in one of two ways."""
     if study.scene.files is None:
         return ()
-    from studies.fe_models.mesh_files import read_mesh_file
+    from studies.fe_models.meshes import read_mesh_file
 
     return read_mesh_file(study.scene.files.mesh).remarks
 
@@ -184,7 +184,10 @@ def check_study_model(study: Study, picture: Path, progress: Callable[[str], Non
     """
     files = study.scene.files
     if files is None:
-        remedy = f"give a study of a finite-element model: {study.scene.model} is none; --plan tells what is computed"
+        what = f"{study.scene.model} is none"
+        if study.scene.group:
+            what = f"the result holds the reduced scene of {study.scene.model}"
+        remedy = f"give a study of a finite-element model: {what}; --plan tells what is computed"
         raise UserError("command line", "--check", study.source, remedy)
     # what reads and reduces it is loaded where there is one
     from studies.fe_models.from_files.check import describe_model

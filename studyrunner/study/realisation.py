@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel
 
 from studies.scenes import scene_with_room
-from studies.scenes.half_space.room_for_wear import ExpectedWear
+from studies.scenes.half_space import ExpectedWear
 from studyrunner.scatter.draws import Drawn, ScatteredPairs, drawn
 from studyrunner.scatter.section import OF_PAIRS, Scattered
 from studyrunner.study.mission import MissionBlock

@@ -15,7 +15,8 @@ from solver.model import FloatArray, ReducedModel
 from solver.results.history import WearHistory
 from solver.settings import SolverSettings
 from studies import build_scene
-from studies.scenes.closed_forms.hertz import (
+from studies.scenes.half_space import composite_modulus
+from studies.scenes.hertz import (
     line_half_width,
     line_stick_width,
     line_worn_depth,
@@ -23,7 +24,6 @@ from studies.scenes.closed_forms.hertz import (
     point_stick_radius,
     point_worn_depth,
 )
-from studies.scenes.half_space.influence import composite_modulus
 from tests.benchmarks.frame import Table, arguments, measure
 from tests.studies.half_space_twin import limit_depth, pressed
 

@@ -11,8 +11,8 @@ from solver.outcome import Outcome
 from solver.results.verdict import describe_cut_off, first_cut_off
 from solver.settings import SolverSettings
 from studies import build_scene
-from studies.scenes.closed_forms.hertz import line_half_width, point_radius
-from studies.scenes.half_space.influence import composite_modulus
+from studies.scenes.half_space import composite_modulus
+from studies.scenes.hertz import line_half_width, point_radius
 
 A_LINE = line_half_width(1.2e5, 6e-3, composite_modulus(200e9, 0.3))
 A_POINT = point_radius(100.0, 10e-3, composite_modulus(200e9, 0.3))

@@ -35,7 +35,7 @@ from solver.packing import Packed
 from solver.results.history import StartState
 from solver.settings import Resolution, WearTarget
 from solver.wear.integrate import Guide
-from studies.scenes.closed_forms.den_hartog import DenHartogSlider
+from studies.scenes.den_hartog import DenHartogSlider
 from studies.scenes.sdof_slider import Parameters as SliderParameters
 from tests.solver.models import scene
 

@@ -12,7 +12,7 @@ from solver.contact.wear_law import ARCHARDS_WORK
 from solver.outcome import Outcome
 from solver.settings import Scheme, SolverSettings, WearTarget
 from studies import build_scene
-from studies.scenes.closed_forms.den_hartog import DenHartogSlider, WearingSlider
+from studies.scenes.den_hartog import DenHartogSlider, WearingSlider
 from tests.solver.worn_slider import AREA, CYCLES, END, march
 
 STEP = 4000.0

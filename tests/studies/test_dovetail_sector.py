@@ -51,8 +51,8 @@ def test_contact_pairs(default):
 def blade_alone(parameters):
     """Mesh of the blade, with the nodes of the disk, which move nothing; and the rotation."""
     model, _ = define_sector(parameters)
-    (blade,) = (group for group in model.mesh.groups if group.part == "blade")
-    return SolidMesh(model.coordinates, model.numbers, (blade,)), model.rotation
+    blade = tuple(group for group in model.mesh.groups if group.part == "blade")
+    return SolidMesh(model.coordinates, model.numbers, blade), model.rotation
 
 
 def test_axial_sliding_is_the_only_motion_that_closed_flanks_leave_free(at_rest):

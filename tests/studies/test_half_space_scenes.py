@@ -11,7 +11,8 @@ from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from studies import build_scene
 from studies.model_check import check_model
-from studies.scenes.closed_forms.hertz import (
+from studies.scenes.half_space import composite_modulus, patch_compliance, strip_compliance
+from studies.scenes.hertz import (
     line_half_width,
     line_stick_width,
     line_worn_depth,
@@ -19,7 +20,6 @@ from studies.scenes.closed_forms.hertz import (
     point_stick_radius,
     point_worn_depth,
 )
-from studies.scenes.half_space.influence import composite_modulus, patch_compliance, strip_compliance
 from tests.studies.half_space_twin import limit_depth, pressed
 
 MU, E, NU = 0.6, 200e9, 0.3

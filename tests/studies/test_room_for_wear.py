@@ -7,15 +7,14 @@ import pytest
 
 from studies import build_scene
 from studies.scenes import scene_parameters, scene_with_room
-from studies.scenes.closed_forms.hertz import (
+from studies.scenes.half_space import ExpectedWear, Scar, composite_modulus, round_up
+from studies.scenes.hertz import (
     line_half_width,
     line_stick_under_stroke,
     line_worn_edge,
     point_radius,
     point_stick_under_stroke,
 )
-from studies.scenes.half_space.influence import composite_modulus
-from studies.scenes.half_space.room_for_wear import ExpectedWear, Scar, round_up
 from tests.studies.half_space_twin import compliances, pressed, solve_pressed
 
 MODULUS = composite_modulus(200e9, 0.3)

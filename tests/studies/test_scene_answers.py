@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from solver.contact.wear_law import ARCHARD, WearLaw, WearTable
 from studies.scene_answers import WearQuestion, stuck_frequencies
 from studies.scenes import build_scene, scene_answer, scene_frequencies, scene_mesh, scene_parameters
-from studies.scenes.closed_forms.den_hartog import DenHartogSlider
-from studies.scenes.dovetail_mesh import build_dovetail_mesh
+from studies.scenes.den_hartog import DenHartogSlider
+from studies.scenes.dovetail_sector import define_sector
 from tests.references import StopsOccurError, den_hartog_amplitude, slider_amplitude, slider_orbit
 
 WEAR = np.array([1.1e-11, 0.0, 1.1e-12])
@@ -114,7 +114,7 @@ def test_where_the_closed_form_does_not_hold_there_is_no_answer(changes):
 
 
 def test_the_mesh_is_the_skin_of_blade_and_disk():
-    mesh, whole = scene_mesh("dovetail_sector", dovetail()), build_dovetail_mesh(dovetail())
+    mesh, whole = scene_mesh("dovetail_sector", dovetail()), define_sector(dovetail())[0].mesh
     assert sorted(set(mesh.parts)) == ["blade", "disk"]
     assert np.array_equal(np.unique(mesh.quads), np.arange(len(mesh.nodes)))
     # every edge of a closed skin belongs to two faces, which pass it in opposite directions
@@ -122,10 +122,10 @@ def test_the_mesh_is_the_skin_of_blade_and_disk():
     there, back = (sorted(map(tuple, way.tolist())) for way in (edges, edges[:, ::-1]))
     assert there == back
     # divergence theorem with flat triangles, against the hexahedra of each part cut in the same way from their centre
-    for part, inside in (("blade", whole.blade_elements), ("disk", ~whole.blade_elements)):
+    for part in ("blade", "disk"):
         chosen = mesh.nodes[mesh.quads[np.array(mesh.parts) == part]]
         volume = sum(np.linalg.det(chosen[:, corners]).sum() / 6.0 for corners in ([0, 1, 2], [0, 2, 3]))
-        box = whole.mesh.nodes[whole.mesh.elements[inside]]
+        box = whole.coordinates[np.concatenate([group.nodes for group in whole.groups if group.part == part])]
         edges = np.stack([box[:, 1] - box[:, 0], box[:, 3] - box[:, 0], box[:, 4] - box[:, 0]], axis=1)
         assert volume == pytest.approx(np.linalg.det(edges).sum(), rel=0.1)
 

@@ -2,13 +2,16 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from studies.model_check import check_model
 from studies.scene_error import SceneError
+from studies.scene_help import all_scenes, scene_help
 from studies.scenes import BUNDLED, build_scene, scene_parameters
+from studyrunner.cli import main
 from tests.references import coulomb_orbit, vibro_impact_orbit
 
 TEXTBOOK = ("sdof_slider", "two_masses", "vibro_impact")
@@ -83,3 +86,10 @@ def test_the_vibro_impact_scene_is_the_bilinear_spring():
         balance -= load if harmonic == 1 else 0
         # The kinks of the sampled contact force alias; everything else is exact.
         assert np.abs(balance).max() < 1e-5 * np.abs(contact_force).max()
+
+
+def test_the_page_is_what_the_scenes_say_and_the_command_prints(capsys):
+    page = Path(__file__).parents[2] / "studies" / "SCENES.md"
+    assert page.read_text(encoding="utf-8") == all_scenes(), "python -m studies.scene_help > studies/SCENES.md"
+    assert main(["--scene-help", "two_masses"]) == 0
+    assert capsys.readouterr().out == scene_help("two_masses") + "\n"

@@ -1,326 +1,226 @@
-"""The contents of a deck: frozen dataclasses of arrays, in the units of the file. Nothing is read here.
-
-Node and element numbers are those of the file, not indices of an array. Names of sets, surfaces, materials and
-interactions are in capitals, as the programs ignore case.
-"""
+"""The mesh of a deck: every number exists, and sets, surfaces and numbers can be looked up by what a line says."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from studies.fe_models.deck.contents import NODES_OF_KIND, ElementBlock, Surface
+from studies.fe_models.deck.draft import Draft, Records
+from studies.fe_models.deck.sets import Key, Reference, Resolver, scope_of
+from studies.fe_models.text import LARGEST_NUMBER, FloatArray, IntArray, Place, shown
+from studies.finite_element.elements import ELEMENT_KINDS
+from studies.scene_error import SceneError
 
-NODES_OF_KIND: Mapping[str, int] = {
-    "C3D4": 4,
-    "C3D6": 6,
-    "C3D8": 8,
-    "C3D8I": 8,
-    "C3D8R": 8,
-    "C3D8H": 8,
-    "C3D10": 10,
-    "C3D10M": 10,
-    "C3D15": 15,
-    "C3D20": 20,
-    "C3D20R": 20,
-}
-"""Kinds of elements that a mesh may hold, by their names in CalculiX and Abaqus, and their numbers of nodes.
-
-Nodes stand in the order of these codes. C3D8R, C3D8H and C3D10M are read for their geometry: their matrices come from
-the code itself.
-"""
+_MOST_FACES = 20_000_000  # of all surfaces together
+_NONE = np.empty(0, dtype=np.int64)
 
 
-_MOST_NAMED = 20  # keywords in one line
+class Mesh:
+    """Nodes, elements, sets and surfaces of a draft under the numbers that they have in the deck.
 
-
-@dataclass(frozen=True)
-class ElementBlock:
-    """Elements of one kind.
-
-    kind: a key of NODES_OF_KIND.
-    numbers (m,): element numbers.
-    nodes (m, k): node numbers, in the order of the programs.
+    offsets: what is added to the numbers of every scope. numbers (n,), coordinates (n, 3): of the nodes. blocks:
+    elements, one block a kind, by ascending number. all_elements, kinds, solid (m,): numbers of all elements, their
+    kinds, and whether these are read. Raises SceneError where numbers or names are missing or do not fit.
     """
 
-    kind: str
-    numbers: IntArray
-    nodes: IntArray
-
-
-@dataclass(frozen=True)
-class Surface:
-    """Faces of elements, or nodes; the other of the two is empty.
-
-    elements (f,): element numbers.
-    faces (f,): 1 to 6, the faces S1 to S6 of the programs.
-    nodes (p,): node numbers, ascending.
-    """
-
-    elements: IntArray
-    faces: IntArray
-    nodes: IntArray
+    def __init__(self, draft: Draft) -> None:
+        for generate in draft.generators:
+            generate(draft)
+        self.draft = draft
+        self.offsets = _find_offsets(draft)
+        self.numbers, self.coordinates = _build_nodes(draft, self.offsets)
+        self.blocks = _build_blocks(draft, self.offsets, self.numbers)
+        order = np.concatenate([block.numbers for block in self.blocks] or [_NONE])
+        kinds = np.repeat([block.kind for block in self.blocks], [block.numbers.size for block in self.blocks])
+        rows = np.argsort(order)
+        self.all_elements, self.kinds = order[rows], kinds[rows]
+        self.solid = np.isin(self.kinds, list(NODES_OF_KIND))
+        self._elements = Resolver(draft.element_sets, self.all_elements, self.offsets, "EALL")
+        self._nodes = Resolver(draft.node_sets, self.numbers, self.offsets, "NALL", self.nodes_of)
+        self._faces_left = _MOST_FACES
+        # sets first: their errors are about the lines where they are defined
+        self.element_sets, self.node_sets = self._sets(self._elements), self._sets(self._nodes)
+        self.surfaces: dict[str, Surface] = {}
+        for key in draft.surfaces:
+            self.surfaces.update(dict.fromkeys(self._names(key, draft.surfaces), self._surface(key)))
 
     @property
-    def of_nodes(self) -> bool:
-        """Whether the surface is one of nodes."""
-        return self.nodes.size > 0
-
-
-@dataclass(frozen=True)
-class Tie:
-    """Two glued surfaces, or the cut faces of a sector.
-
-    dependent, independent: names of surfaces, slave first, as in the deck.
-    tolerance: largest distance of a tied node, in the unit of length of the file; None where the deck gives none, or 0.
-    cyclic: whether these are the cut faces of a sector.
-    """
-
-    name: str
-    dependent: str
-    independent: str
-    tolerance: float | None
-    cyclic: bool
-
-
-@dataclass(frozen=True)
-class ContactPair:
-    """Two surfaces in contact.
-
-    dependent, independent: names of surfaces, slave first, as in the deck.
-    interaction: name of the interaction.
-    friction_coefficient: of the interaction; None where the deck gives none.
-    problem: a law that is not read, as "deck.inp, line 7: *FRICTION with TAUMAX"; "" where there is none.
-    glued: where the deck says that the surfaces do not part, as "deck.inp, line 7: ..."; "" where they may.
-    fitted: where the deck gives a clearance or an interference, as "deck.inp, line 7: ..."; "" where it gives none.
-    clearance: distance of the surfaces, negative for an interference; None for the distances in the mesh.
-    adjusted: where the deck moves nodes onto the other surface, as "deck.inp, line 7: ..."; "" where it does not.
-    """
-
-    dependent: str
-    independent: str
-    interaction: str
-    friction_coefficient: float | None
-    problem: str = ""
-    glued: str = ""
-    fitted: str = ""
-    clearance: float | None = None
-    adjusted: str = ""
-
-
-@dataclass(frozen=True)
-class CyclicSymmetry:
-    """A sector of a cyclic structure.
-
-    n_sectors: number of sectors.
-    ties: names of the ties of the cut faces; none where the deck gives none.
-    axis (2, 3): two points on the axis.
-    """
-
-    n_sectors: int
-    ties: tuple[str, ...]
-    axis: FloatArray
-
-
-@dataclass(frozen=True)
-class Boundary:
-    """Prescribed displacements.
-
-    name: the set, or the node number as text.
-    nodes (p,): node numbers.
-    first_dof, last_dof: 1 to 3 are displacements along x, y and z, or along the directions of a `Transform`; 4 to 6
-        rotations of reference points; larger numbers are possible.
-    value: displacement; 0 for held ones.
-    place: in the file, for messages.
-    """
-
-    name: str
-    nodes: IntArray
-    first_dof: int
-    last_dof: int
-    value: float
-    place: str = ""
-
-
-@dataclass(frozen=True)
-class Transform:
-    """Directions of the displacements 1 to 3 of nodes.
-
-    place: in the file, for messages. nodes (p,): node numbers.
-    points (2, 3): cylindrical: on the axis; directions are radial, tangential and axial. Else one vector along the
-        first direction, and another in the plane of the first two.
-    """
-
-    place: str
-    nodes: IntArray
-    cylindrical: bool
-    points: FloatArray
-
-
-@dataclass(frozen=True)
-class Equation:
-    """`sum(coefficients * u) = 0`; the first term depends on the others.
-
-    place: in the file, for messages. nodes, dofs, coefficients (t,): dofs as in `Boundary`.
-    """
-
-    place: str
-    nodes: IntArray
-    dofs: IntArray
-    coefficients: FloatArray
-
-
-@dataclass(frozen=True)
-class RigidMotion:
-    """Nodes that follow a reference node: `u = u_reference + theta x (x - x_reference)`.
-
-    place: in the file, for messages. nodes (p,): node numbers. dofs: 1 to 3, those that follow.
-    rotation: the node whose displacements are theta; 0 where the reference node has dofs 4 to 6 of its own.
-    turns: whether there is theta.
-    """
-
-    place: str
-    nodes: IntArray
-    dofs: tuple[int, ...]
-    reference: int
-    rotation: int = 0
-    turns: bool = True
-
-
-@dataclass(frozen=True)
-class NodalForce:
-    """A constant force on each of some nodes (p,) along a dof as in `Boundary`. place: in the file, for messages."""
-
-    place: str
-    nodes: IntArray
-    dof: int
-    value: float
-
-
-@dataclass(frozen=True)
-class Pressure:
-    """A constant pressure on faces (f,) of elements (f,), positive into the body. place: in the file, for messages."""
-
-    place: str
-    elements: IntArray
-    faces: IntArray
-    value: float
-
-
-@dataclass(frozen=True)
-class Material:
-    """An isotropic linear elastic material, in units of the file. None where the deck gives no such value.
-
-    problem: what of the material is not read, as "deck.inp, line 7: *ELASTIC, TYPE=ORTHO"; "" where there is nothing.
-    """
-
-    young: float | None
-    poisson: float | None
-    density: float | None
-    problem: str = ""
-
-
-@dataclass(frozen=True)
-class SolidSection:
-    """Elements of one material. element_set: name of a set of elements. material: name of a material."""
-
-    element_set: str
-    material: str
-
-
-@dataclass(frozen=True)
-class CentrifugalLoad:
-    """Centrifugal load.
-
-    name: the set, or the element number as text.
-    elements (m,): element numbers.
-    omega_squared: square of the speed, rad2/s2.
-    point (3,): on the axis.
-    axis (3,): unit vector.
-    """
-
-    name: str
-    elements: IntArray
-    omega_squared: float
-    point: FloatArray
-    axis: FloatArray
-
-
-@dataclass(frozen=True)
-class ContactNodes:
-    """Nodes of a table: area (n,), unit normal (n, 3) out of the body, initial gap (n,); NaN where none is given."""
-
-    area: FloatArray
-    normals: FloatArray
-    gap: FloatArray
-
-
-@dataclass(frozen=True)
-class Deck:
-    """All that is read of a model's mesh file: the model as its steps leave it that do not write matrices.
-
-    path: name of the file, for messages.
-    node_numbers (n,), coordinates (n, 3): numbers ascending, coordinates in units of the file.
-    blocks: elements, one block a kind; no element number is in two of them.
-    node_sets, element_sets: ascending numbers by the name of the set; all of them exist.
-    surfaces, materials: by name.
-    ties, contact_pairs, sections, boundaries, transforms, equations, rigid_motions: in the order of the file.
-    cyclic: None where the deck is none of a sector.
-    centrifugal: loads of the last step that has some.
-    forces, pressures, gravity: constant loads of static steps; the acceleration (3,) acts on all elements.
-    unassembled: what has a stiffness or a mass that only matrices of another program hold, as "deck.inp, line 7: ...".
-    removed: what *MODEL CHANGE takes away, a sentence each; it is not among the rest.
-    n_instances: of parts; where there are several, numbers are not those of the file.
-    skipped: keywords that cannot change the model and were not read, each as "sector.inp, line 7: *KEYWORD".
-    notes: what was read in a way that may be asked for, a sentence each.
-    included: files that the deck includes, relative to its folder.
-    contact_nodes: of a table of nodes, which has no elements; None of a mesh.
-    """
-
-    path: str
-    node_numbers: IntArray
-    coordinates: FloatArray
-    blocks: tuple[ElementBlock, ...]
-    node_sets: Mapping[str, IntArray] = field(default_factory=dict)
-    element_sets: Mapping[str, IntArray] = field(default_factory=dict)
-    surfaces: Mapping[str, Surface] = field(default_factory=dict)
-    ties: tuple[Tie, ...] = ()
-    contact_pairs: tuple[ContactPair, ...] = ()
-    cyclic: CyclicSymmetry | None = None
-    boundaries: tuple[Boundary, ...] = ()
-    transforms: tuple[Transform, ...] = ()
-    equations: tuple[Equation, ...] = ()
-    rigid_motions: tuple[RigidMotion, ...] = ()
-    materials: Mapping[str, Material] = field(default_factory=dict)
-    sections: tuple[SolidSection, ...] = ()
-    centrifugal: tuple[CentrifugalLoad, ...] = ()
-    forces: tuple[NodalForce, ...] = ()
-    pressures: tuple[Pressure, ...] = ()
-    gravity: FloatArray | None = None
-    unassembled: tuple[str, ...] = ()
-    removed: tuple[str, ...] = ()
-    n_instances: int = 0
-    skipped: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    included: tuple[str, ...] = ()
-    contact_nodes: ContactNodes | None = None
+    def notes(self) -> tuple[str, ...]:
+        """What sets name that does not exist."""
+        return (*self._nodes.notes, *self._elements.notes)
 
     @property
-    def remarks(self) -> tuple[tuple[str, str], ...]:
-        """Label and text of lines for the user: what was skipped, where there is something, and the notes."""
-        more = len(self.skipped) - _MOST_NAMED
-        skipped = "; ".join(self.skipped[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
-        return (
-            *((("skipped", skipped),) if skipped else ()),
-            *(("note", text) for text in (*self.notes, *self.removed)),
-        )
+    def numbering(self) -> tuple[str, ...]:
+        """Which numbers the nodes of instances have."""
+        later = [(name, offset) for name, offset in self.offsets.items() if offset]
+        return tuple(f"Node 1 of {name or 'the assembly'} is node {offset + 1}." for name, offset in later)
 
-    def rows_of_nodes(self, numbers: IntArray) -> IntArray:
-        """Places of nodes in `coordinates`, of the shape of `numbers`; all of them must exist."""
-        rows = np.searchsorted(self.node_numbers, numbers)
-        assert np.array_equal(self.node_numbers[np.minimum(rows, self.node_numbers.size - 1)], numbers)
-        return rows.astype(np.int64)
+    def nodes(self, reference: Reference) -> tuple[str, IntArray]:
+        """Name for messages, and the nodes of a set or number."""
+        return self._name(reference, self.draft.node_sets.items), self._nodes.find(reference)
+
+    def elements(self, reference: Reference) -> tuple[str, IntArray]:
+        """Name for messages, and the elements of a set or number."""
+        return self._name(reference, self.draft.element_sets.items), self._elements.find(reference)
+
+    def node(self, reference: Reference) -> int:
+        """A node, or the only one of a set."""
+        found = self._nodes.find(reference)
+        if found.size != 1:
+            what = f"{shown(str(reference.target))} has {found.size} nodes"
+            raise reference.place.wrong(what, "give one reference node that exists")
+        return int(found[0])
+
+    def ordered(self, reference: Reference) -> IntArray:
+        """Nodes of a set or number in the order that counts in equations."""
+        found, name = self._nodes.find(reference), shown(str(reference.target))
+        if (reference.scope, reference.target) in self.draft.node_sets.unsorted and found.size > 1:
+            raise reference.place.wrong(f"the set {name} is UNSORTED", "give nodes one by one")
+        if not found.size:
+            raise reference.place.wrong(f"{name} of a constraint has no node", "give nodes that exist")
+        return found
+
+    def surface(self, reference: Reference) -> str:
+        """Name of a surface."""
+        scope = scope_of(self.draft.surfaces, self.offsets, reference)
+        if scope is None:
+            found = f"there is no surface {shown(str(reference.target))}"
+            raise reference.place.wrong(found, "define it with *SURFACE")
+        return self._names((scope, str(reference.target)), self.draft.surfaces)[0]
+
+    def surface_nodes(self, name: str) -> IntArray:
+        """Nodes of a surface."""
+        surface = self.surfaces[name]
+        found = [surface.nodes]
+        for block in self.blocks:
+            if block.kind in NODES_OF_KIND:
+                for face, local in enumerate(ELEMENT_KINDS[block.kind].faces):
+                    own = surface.elements[surface.faces == face + 1]
+                    found.append(block.nodes[np.isin(block.numbers, own)][:, local].ravel())
+        return np.unique(np.concatenate(found))
+
+    def nodes_of(self, reference: Reference) -> IntArray:
+        """Nodes of a set of elements."""
+        elements = self._elements.find(reference)
+        found = [block.nodes[np.isin(block.numbers, elements)].ravel() for block in self.blocks]
+        return np.unique(np.concatenate([_NONE, *found]))
+
+    def other_kinds(self, elements: IntArray) -> list[str]:
+        """Kinds of those elements (m,) that are not read."""
+        return sorted(set(self.kinds[np.isin(self.all_elements, elements) & ~self.solid].tolist()))
+
+    def placed(self, scope: str, points: FloatArray, *, vectors: bool = False) -> FloatArray:
+        """Points or vectors (n, 3) of an instance where the instance stands."""
+        shift, turn = self.draft.placed.get(scope, (np.zeros(3), np.eye(3)))
+        return points @ turn.T + (0.0 if vectors else shift)
+
+    def _names(self, key: Key, everything: Mapping[Key, object]) -> list[str]:
+        """Names of a set or surface: where others have the same, the one of an instance has that before it."""
+        scope, name = key
+        if not scope:
+            return [name]
+        long = f"{scope}.{name}"
+        alone = [other for other in ("", *self.draft.placed) if (other, name) in everything] == [scope]
+        return [name, long] if alone else [long]
+
+    def _name(self, reference: Reference, everything: Mapping[Key, object]) -> str:
+        scope = scope_of(everything, self.offsets, reference)
+        target = str(reference.target)
+        return target if scope is None else self._names((scope, target), everything)[0]
+
+    def _sets(self, resolver: Resolver) -> dict[str, IntArray]:
+        start, sets = Place(self.draft.name, 1), resolver.sets.items
+        return {name: resolver.members(key, start) for key in sets for name in self._names(key, sets)}
+
+    def _surface(self, key: Key) -> Surface:
+        parts = self.draft.surfaces[key]
+        if not parts or parts[0][1] == 0:
+            nodes = np.concatenate([_NONE, *(self._nodes.find(reference) for reference, _ in parts)])
+            return Surface(_NONE, _NONE, np.unique(nodes))
+        found: list[IntArray] = []
+        for reference, face in parts:
+            name, members = self.elements(reference)
+            self._faces_left -= members.size
+            if self._faces_left < 0:
+                raise reference.place.wrong(f"more than {_MOST_FACES} faces", "remove surfaces that are not used")
+            rows = np.searchsorted(self.all_elements, members)
+            few = rows[self._n_faces[rows] < face]
+            if few.size:
+                example = f"element {self.all_elements[few[0]]} ({self.kinds[few[0]]})"
+                what = f"elements of {shown(name)} have no face S{face}, as {example}"
+                raise reference.place.wrong(what, "give another, of a solid element")
+            found.append(np.stack((members, np.full(members.size, face)), axis=1))
+        both = np.unique(np.concatenate(found), axis=0)
+        return Surface(both[:, 0].copy(), both[:, 1].copy(), _NONE)
+
+    @cached_property
+    def _n_faces(self) -> IntArray:
+        faces = {kind: len(each.corner_faces) for kind, each in ELEMENT_KINDS.items()}
+        return np.array([faces.get(kind, 0) for kind in self.kinds], dtype=np.int64)
+
+
+def _find_offsets(draft: Draft) -> dict[str, int]:
+    """What is added to the numbers of every scope: 0 for the first one, then a power of ten and its multiples."""
+    largest: dict[str, int] = {}
+    for each in (*draft.nodes, *draft.elements):
+        largest[each.scope] = max(largest.get(each.scope, 0), int(each.numbers.max(initial=0)))
+    step = 10 ** len(str(max(largest.values(), default=0)))
+    if step * len(largest) > LARGEST_NUMBER and len(largest) > 1:
+        raise SceneError("model", f"{draft.name}: {len(largest)} instances with numbers up to {step}", "number from 1")
+    return {scope: place * step for place, scope in enumerate(largest)} or {"": 0}
+
+
+def _build_nodes(draft: Draft, offsets: Mapping[str, int]) -> tuple[IntArray, FloatArray]:
+    """Numbers (n,), ascending, and coordinates (n, 3)."""
+    if not any(each.numbers.size for each in draft.nodes):
+        what = "nodes: no *PART has an *INSTANCE" if draft.parts and not draft.placed else "nodes"
+        raise SceneError("model", f"{draft.name} has no {what}", "give the deck with its mesh")
+    numbers = np.concatenate([each.numbers + offsets[each.scope] for each in draft.nodes])
+    coordinates = np.concatenate([each.values.astype(np.float64) for each in draft.nodes])
+    scopes = np.repeat([each.scope for each in draft.nodes], [each.numbers.size for each in draft.nodes])
+    for scope, (shift, turn) in draft.placed.items():
+        own = scopes == scope
+        coordinates[own] = coordinates[own] @ turn.T + shift
+    order = np.argsort(numbers, kind="stable")
+    numbers, coordinates = numbers[order], coordinates[order]
+    again = np.flatnonzero(numbers[1:] == numbers[:-1])
+    moved = again[np.any(coordinates[again] != coordinates[again + 1], axis=1)]
+    if moved.size:
+        number = numbers[moved[0]]
+        place = _place_of(draft.nodes, offsets, number)
+        raise place.wrong(f"node {number} is defined again at another position", "give each node once")
+    keep = np.ones(numbers.size, dtype=bool)
+    keep[again] = False
+    return numbers[keep].astype(np.int64), coordinates[keep]
+
+
+def _place_of(records: list[Records], offsets: Mapping[str, int], number: int) -> Place:
+    """Place of the last record of a number."""
+    return next(each.place for each in reversed(records) if number - offsets[each.scope] in each.numbers)
+
+
+def _build_blocks(draft: Draft, offsets: Mapping[str, int], nodes: IntArray) -> tuple[ElementBlock, ...]:
+    """Elements, one block a kind, by ascending number."""
+    kinds: dict[str, list[tuple[IntArray, IntArray]]] = {}
+    for each in draft.elements:
+        used = each.values.astype(np.int64) + offsets[each.scope]
+        missing = nodes[np.minimum(np.searchsorted(nodes, used), nodes.size - 1)] != used
+        if missing.any():
+            row, column = np.argwhere(missing)[0]
+            found = f"element {each.numbers[row]} has the node {each.values[row, column]}, which does not exist"
+            raise each.place.wrong(found, "give the whole mesh")
+        kinds.setdefault(each.kind, []).append((each.numbers + offsets[each.scope], used))
+    blocks: list[ElementBlock] = []
+    for kind, parts in kinds.items():
+        numbers, used = (np.concatenate(each) for each in zip(*parts, strict=True))
+        order = np.argsort(numbers, kind="stable")
+        blocks.append(ElementBlock(kind, numbers[order], used[order]))
+    numbers = np.sort(np.concatenate([block.numbers for block in blocks] or [_NONE]))
+    again = numbers[1:][numbers[1:] == numbers[:-1]]
+    if again.size:
+        place = _place_of(draft.elements, offsets, again[0])
+        raise place.wrong(f"element {again[0]} is defined again", "give each element once")
+    return tuple(block for block in blocks if block.numbers.size)

@@ -7,10 +7,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from studies.fe_models.deck.mesh import IntArray
-from studies.fe_models.text.keyword_lines import Block, read_name
-from studies.fe_models.text.numbers import LARGEST_NUMBER, is_integer, read_fields, read_integer
-from studies.fe_models.text.read_errors import Place, shown
+from studies.fe_models.text import (
+    LARGEST_NUMBER,
+    Block,
+    IntArray,
+    Place,
+    is_integer,
+    read_fields,
+    read_integer,
+    read_name,
+    shown,
+)
 
 _DEEPEST = 100
 
@@ -38,10 +45,9 @@ class _Members:
 
 @dataclass
 class SetDefinitions:
-    """Sets as they are written.
+    """Sets as they are written. what: "nodes" or "elements". items: of every set what it consists of.
 
-    what: "nodes" or "elements". items: of every set what it consists of. of_elements: whether the set has the nodes of
-    elements added, as references to sets of elements. unsorted: sets of several numbers whose order matters.
+    of_elements: sets of elements whose nodes a set has as well. unsorted: sets of several numbers whose order matters.
     """
 
     what: str
@@ -76,10 +82,8 @@ class SetDefinitions:
                     numbers.append(read_integer(part, place))
                 elif part:
                     reference = read_reference(part, scope, instances, place)
-                    if isinstance(reference.target, int):
-                        items.append(_Members(reference.scope, np.array([reference.target])))
-                    else:
-                        items.append(reference)
+                    number = isinstance(reference.target, int)
+                    items.append(_Members(reference.scope, np.array([reference.target])) if number else reference)
         if numbers:
             items.append(_Members(scope, np.array(numbers, dtype=np.int64)))
 
@@ -128,9 +132,9 @@ def scope_of(items: Container[Key], instances: Mapping[str, object], reference: 
 class Resolver:
     """Sets as numbers that exist.
 
-    sets: as they are written. existing: (n,) all numbers that exist, ascending. offsets: of every scope, what is added
-    to its numbers; those of one scope are smaller than the difference to the next. everything: the name that the code
-    gives to all of them. nodes_of: of a reference to a set of elements, its nodes; None for sets of elements.
+    existing: (n,) all numbers that exist, ascending. offsets: of every scope, what is added to its numbers; those of
+    one scope are smaller than the difference to the next. everything: the name that the code gives to all of them.
+    nodes_of: of a reference to a set of elements, its nodes; None for sets of elements.
     """
 
     def __init__(

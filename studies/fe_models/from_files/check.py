@@ -107,9 +107,12 @@ def sliding_frequencies(linear: LinearModel, model: ReducedModel) -> FloatArray:
 
 def _reduction_error(loaded: LoadedModel, model: ReducedModel, parameters: Parameters) -> str:
     """How far frequencies change with twice the modes, where the pairs slide freely and the joint moves most."""
+    k = parameters.nodal_diameter
+    n_modes = len(model.linear[k].stiffness) - np.count_nonzero(model.contact.dofs >= 0)
+    if n_modes < parameters.stuck_modes:
+        return f"none: there are no more than {n_modes} modes with the pairs glued"
     more = parameters.model_copy(update={"stuck_modes": 2 * parameters.stuck_modes})
     finer = reduce_model(loaded, more, 1).model
-    k = parameters.nodal_diameter
     own, other = (sliding_frequencies(each.linear[k], each)[: 2 * N_FREQUENCIES] for each in (model, finer))
     n = min(len(own), len(other))
     elastic = other[:n] > 1e-3 * other[:n].max()
@@ -128,8 +131,9 @@ def _contacts(scene: FeScene) -> Iterator[str]:
         neighbour = _NEIGHBOURS[int(pairs.sector[own][0])] if own.any() else ""
         distance = pairs.distance[own]
         distance = np.where(np.abs(distance) < _ROUND_OFF * np.sqrt(pairs.area[own].max()), 0.0, distance)
+        nodes = "node" if own.sum() == 1 else "nodes"
         yield (
-            f"{own.sum()} nodes of {moving} on {opposite}{neighbour}, {1e6 * pairs.area[own].sum():.5g} mm2,"
+            f"{own.sum()} {nodes} of {moving} on {opposite}{neighbour}, {1e6 * pairs.area[own].sum():.5g} mm2,"
             f" distances {distance.min():.2g} to {distance.max():.2g} m"
         )
 
@@ -154,7 +158,8 @@ def describe_rest(model: ReducedModel, friction_coefficient: float | None) -> st
     pressed = forces > _ROUND_OFF * np.abs(model.linear[0].load_static).max(initial=forces.max())
     if not pressed.any():
         return "at rest no pair carries a force: the joint opens, give a preload"
-    return f"normal forces at rest: sum {_sum(forces)} N, {pressed.sum()} of {len(forces)} pairs closed"
+    closed = f"{pressed.sum()} of {len(forces)} pairs" if len(forces) > 1 else "the pair"
+    return f"normal forces at rest: sum {_sum(forces)} N, {closed} closed"
 
 
 def _sum(forces: FloatArray) -> str:

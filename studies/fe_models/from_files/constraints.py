@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from solver.model import BoolArray, FloatArray, IntArray
-from studies.fe_models.deck.mesh import Deck, Equation, RigidMotion, Transform
-from studies.fe_models.units import Units
+from studies.fe_models.deck.contents import Deck, Equation, RigidMotion, Transform
+from studies.fe_models.model_files import Units
 from studies.finite_element.constraints import Constraints, Dependence, eliminate
 from studies.scene_error import SceneError
 
@@ -18,12 +18,10 @@ _ROUND_OFF = 1e-9  # of a direction
 
 @dataclass(frozen=True)
 class Supported:
-    """What holds and joins the nodes.
+    """What holds and joins the nodes: those of the model, then `extra` (m,), the numbers of nodes without elements.
 
-    held (n, 3): displacements that are 0 or follow others; nodes of the model, then those without elements.
-    extra (m,): numbers of these. constraints: None where no displacement follows others.
-    own (n, 3): displacements that are 0 by a boundary condition. references: rows of nodes without elements.
-    forces (3 n,): constant nodal forces, N.
+    held (n, 3): displacements that are 0 or follow others. own (n, 3): those that are 0 by a boundary condition.
+    references: rows of nodes without elements. forces (3 n,): constant nodal forces, N.
     """
 
     held: BoolArray
@@ -39,11 +37,9 @@ def find_constraints(
 ) -> Supported:
     """Held displacements, constraints and nodal forces of a deck.
 
-    deck: in units of the file. numbers (n_nodes,): nodes of the model, in any order. clamped (n_nodes, 3):
-    displacements that the study holds in place of the deck's boundary conditions; None of none. units: of the file.
-    cut: rows of nodes on cut faces.
-
-    Raises SceneError where a displacement depends on others and is held, depends twice, or nodes are missing.
+    numbers (n_nodes,): nodes of the model, in any order. clamped (n_nodes, 3): displacements that the study holds in
+    place of the deck's boundary conditions; None of none. cut: rows of nodes on cut faces. Raises SceneError where a
+    displacement depends on others and is held, depends twice, or nodes are missing.
     """
     return _Builder(deck, numbers, units, set(cut.tolist())).build(clamped)
 
@@ -59,7 +55,7 @@ class _Builder:
     oblique: dict[int, FloatArray] = field(default_factory=dict)
     extra: list[int] = field(default_factory=list)
     rows: dict[tuple[str, int], int] = field(default_factory=dict)
-    entries: list[tuple[IntArray, IntArray, IntArray, FloatArray, str]] = field(default_factory=list)
+    entries: list[Dependence] = field(default_factory=list)
 
     def build(self, clamped: BoolArray | None) -> Supported:
         deck = self.deck
@@ -87,23 +83,8 @@ class _Builder:
         if not self.entries and not self.oblique:
             return Supported(own, extra, None, own.copy(), forces, references)
         everything = np.concatenate([self.numbers, extra])
-        constraints, fixed = eliminate(self._dependence(), own, self.oblique, everything, len(self.numbers))
+        constraints, fixed = eliminate(self.entries, own, self.oblique, everything, len(self.numbers))
         return Supported(fixed, extra, constraints, own, forces, references)
-
-    def _dependence(self) -> Dependence:
-        if not self.entries:
-            nothing = np.empty(0, dtype=np.int64)
-            return Dependence(nothing, nothing, nothing, np.empty(0), nothing, ())
-        counts = [len(dependent) for dependent, *_ in self.entries]
-        starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
-        return Dependence(
-            dependent=np.concatenate([each[0] for each in self.entries]),
-            row=np.concatenate([start + each[1] for start, each in zip(starts, self.entries, strict=True)]),
-            column=np.concatenate([each[2] for each in self.entries]),
-            value=np.concatenate([each[3] for each in self.entries]),
-            origin=np.repeat(np.arange(len(counts)), counts),
-            origins=[each[4] for each in self.entries],
-        )
 
     def _row(self, number: int, place: str) -> int:
         """Row of a node; one without elements is added. Raises SceneError where it does not exist."""
@@ -148,7 +129,7 @@ class _Builder:
                     (rows, np.full(len(rows), 3 * turn + k), np.cross(np.eye(3)[k], arms)[:, directions].ravel())
                 )
         row, column, value = (np.concatenate(each) for each in zip(*parts, strict=True))
-        self.entries.append((dependent, row, column, value, motion.place))
+        self.entries.append(Dependence(dependent, row, column, value, motion.place))
 
     def _hold(self, held: set[int]) -> None:
         """Boundary conditions, those of nodes with directions of their own in these. Raises SceneError."""
@@ -191,7 +172,7 @@ class _Builder:
             frame = self._frame(node)
             rows, columns = np.divmod(np.arange(9), 3)
             place = self.frames[node].place
-            self.entries.append((3 * own + np.arange(3), rows, 3 * row + columns, frame.T.ravel(), place))
+            self.entries.append(Dependence(3 * own + np.arange(3), rows, 3 * row + columns, frame.T.ravel(), place))
         return row
 
     def _frame(self, node: int) -> FloatArray:
@@ -226,7 +207,7 @@ class _Builder:
         columns = np.array([dof for dof, _ in others], dtype=np.int64)
         values = np.array([-value / first for _, value in others])
         rows = np.zeros(len(others), dtype=np.int64)
-        self.entries.append((np.array([dependent]), rows, columns, values, equation.place))
+        self.entries.append(Dependence(np.array([dependent]), rows, columns, values, equation.place))
 
     def _forces(self) -> Iterator[tuple[int, float]]:
         """Displacement and force, N, of each component; the unit of force has that of mass times length."""

@@ -8,31 +8,27 @@ from pathlib import Path
 import numpy as np
 
 from solver.model import FloatArray
-from studies.fe_models.checks import (
-    check_contact_removed,
-    check_mass,
-    check_mesh_is_of_matrices,
-    check_nodes_have_dofs,
-    check_speed,
-    check_translations,
-    check_units,
-    mass_of,
-    omega_squared_of,
-)
-from studies.fe_models.deck.mesh import Deck
+from studies.fe_models.checks import check_nodes_have_dofs, check_units
+from studies.fe_models.deck.contents import Deck
 from studies.fe_models.from_files.constraints import Supported, find_constraints
+from studies.fe_models.from_files.imported import (
+    check_table,
+    constant_forces,
+    import_matrices,
+    read_recovery,
+)
 from studies.fe_models.from_files.parameters import Parameters, SetDirection
-from studies.fe_models.from_files.reduced import check_table, constant_forces, read_recovery
-from studies.fe_models.from_files.selections import Selections
-from studies.fe_models.from_files.solid import build_solid_mesh
-from studies.fe_models.from_files.supports import find_clamped, find_cut, find_cyclic_axis, find_rotation
-from studies.fe_models.from_files.surfaces_in_contact import Surfaces, find_surfaces
-from studies.fe_models.matrices.matrices import Matrices
-from studies.fe_models.matrices.read import find_matrix_files, read_matrices
-from studies.fe_models.mesh_files import read_mesh_file
-from studies.fe_models.model_files import ModelFiles
-from studies.fe_models.nodal_matrices import NodalMatrices, order_by_nodes
-from studies.fe_models.units import Units, find_units
+from studies.fe_models.from_files.selections import Selections, Surfaces, find_surfaces
+from studies.fe_models.from_files.solid import (
+    build_solid_mesh,
+    find_clamped,
+    find_cut,
+    find_cyclic_axis,
+    find_rotation,
+)
+from studies.fe_models.matrices.read import find_matrix_files
+from studies.fe_models.meshes import read_mesh_file
+from studies.fe_models.model_files import ModelFiles, Units, find_units
 from studies.finite_element.cut_faces import CyclicAxis
 from studies.finite_element.joint_model import JointDefinition, MatrixModel, MeshModel, Retainer, RowMotion, SetMotion
 from studies.finite_element.pairing import ContactPairs, match_nodes
@@ -40,8 +36,6 @@ from studies.finite_element.reduced_joint import Progress, silent
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.finite_element.surfaces import loops_of_faces, pressure_forces
 from studies.scene_error import SceneError
-
-_SPEED_AGREES = 1e-3  # relative difference of the speed of a study from that of its matrices
 
 
 @dataclass(frozen=True)
@@ -105,7 +99,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     imported = None
     if files.matrices:
         progress(f"reading {', '.join(path.name for path in files.matrices)}")
-        imported = _import(files, parameters, deck, mesh, surfaces, units, rotation)
+        imported = import_matrices(files, parameters, deck, mesh, surfaces, units, rotation)
     numbers = mesh.numbers if imported is None else imported.nodal.model.numbers
     if clamped is not None:
         clamped = np.pad(clamped, ((0, len(numbers) - len(clamped)), (0, 0)))
@@ -125,7 +119,8 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
             check_table(deck, matrices, parameters, mesh.numbers[on_cut])
             preload = preload + constant_forces(matrices, nodal, units, len(supported.held))
         else:
-            _check_free_nodes(matrices, mesh, np.asarray(supported.own[: mesh.n_nodes].all(axis=1)))
+            free = mesh.numbers[~supported.own[: mesh.n_nodes].all(axis=1)]
+            check_nodes_have_dofs(matrices, free, "the mesh without its clamps")
         supported.held[: len(nodal.missing)] |= nodal.missing
         model = replace(nodal.model.with_nodes(supported.extra), rotation=rotation, preload=preload, gravity=gravity)
         if files.recovery is not None:
@@ -199,47 +194,6 @@ def _pressed(deck: Deck, mesh: SolidMesh, n_nodes: int, units: Units) -> FloatAr
     return forces
 
 
-@dataclass(frozen=True)
-class _Imported:
-    """Matrices of another program, by rows and by nodes; omega_squared_held as in `LoadedModel`."""
-
-    matrices: Matrices
-    nodal: NodalMatrices
-    omega_squared_held: float | None
-
-
-def _import(
-    files: ModelFiles,
-    parameters: Parameters,
-    deck: Deck,
-    mesh: SolidMesh,
-    surfaces: Surfaces,
-    units: Units,
-    rotation: Rotation | None,
-) -> _Imported:
-    """Reads matrices; those of a mesh are whole, and nothing joins surfaces in contact. Raises SceneError."""
-    if not parameters.stress_stiffening:
-        raise SceneError("stress_stiffening", "false", "leave it out: the matrices hold it or not")
-    if deck.n_instances > 1:
-        found = f"{deck.path} has {deck.n_instances} instances, whose nodes have other numbers in matrices"
-        raise SceneError("matrices", found, "write a flat deck, or leave `matrices` out")
-    matrices, held_speed = read_matrices(files.matrices[0]), None
-    check_mesh_is_of_matrices(deck, matrices)
-    if deck.contact_nodes is None:
-        check_translations(matrices)
-        check_units(deck, mass_of(deck, matrices), units)
-        check_mass(deck, matrices, units)
-        for each in (*surfaces.contacts, *surfaces.ties):
-            for surface in (each.first, each.second):
-                check_nodes_have_dofs(matrices, mesh.numbers[surface.nodes], surface.name)
-        for each in surfaces.contacts:
-            nodes = mesh.numbers[each.first.nodes], mesh.numbers[each.second.nodes]
-            check_contact_removed(deck, matrices, nodes, (each.first.name, each.second.name), units)
-        if rotation is not None:
-            held_speed = _check_rotation(deck, matrices, rotation, parameters, units)
-    return _Imported(matrices, order_by_nodes(matrices, units, mesh.numbers, mesh.coordinates), held_speed)
-
-
 def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotation | None) -> Retainer | None:
     if parameters.retention_stiffness == 0.0:
         return None
@@ -251,21 +205,3 @@ def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotatio
     if axis is None:
         raise SceneError("retention_direction", "missing", "give it: the model has no axis")
     return Retainer(parameters.retention_stiffness, axis)
-
-
-def _check_free_nodes(matrices: Matrices, mesh: SolidMesh, held: FloatArray) -> None:
-    """The matrices have all nodes that nothing holds."""
-    check_nodes_have_dofs(matrices, mesh.numbers[~held.astype(bool)], "the mesh without its clamps")
-
-
-def _check_rotation(
-    deck: Deck, matrices: Matrices, rotation: Rotation, parameters: Parameters, units: Units
-) -> float | None:
-    """Square of the speed that the matrices hold; it must be that of the rotation."""
-    if parameters.rotation_speed is None:
-        check_speed(deck, matrices, units)
-    held = omega_squared_of(deck, matrices, rotation.axis)
-    if held is not None and abs(held - rotation.omega_squared) > 2.0 * _SPEED_AGREES * rotation.omega_squared:
-        found = f"{parameters.rotation_speed:g} rpm, the stiffness holds {30.0 * np.sqrt(held) / np.pi:.6g} rpm"
-        raise SceneError("rotation_speed", found, "export the matrices at this speed, or leave it out")
-    return held

@@ -15,7 +15,7 @@ import pandas as pd
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from studies.fe_models.text.read_errors import shown
+from studies.fe_models.text import shown
 from studies.scene_error import SceneError
 
 FloatArray = NDArray[np.float64]
@@ -35,12 +35,10 @@ _ASYMMETRY = 1e-6  # over the largest entry: what text with few digits leaves
 class Matrices:
     """Matrices of a model, in units of its files, rows by node, then direction.
 
-    stiffness, mass (n_dof, n_dof): real symmetric, both triangles. The mass may be singular.
-    node (n_dof,): number of the node; negative ones are internal nodes of Abaqus.
-    direction (n_dof,): 0, 1, 2 for displacements along x, y, z; others are rotations, or coordinates of no place.
-    files: names of the files. code: "calculix", "abaqus", "nastran", "ansys" or "table", for messages.
-    damping: None where the files have none. load (n_dof, n_cases): constant
-    forces; None where the files have none.
+    stiffness, mass, damping (n_dof, n_dof): real symmetric, both triangles; the mass may be singular. node (n_dof,):
+    numbers; negative ones are internal nodes of Abaqus. direction (n_dof,): 0, 1, 2 along x, y, z; others are
+    rotations, or coordinates of no place. code: "calculix", "abaqus", "nastran", "ansys" or "table", for messages. load
+    (n_dof, n_cases): constant forces. damping, load: None where the files have none.
     """
 
     stiffness: sp.csr_array

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from studies.fe_models.matrices.matrices import LARGEST_FILE, Entries, Matrices, assemble, label, wrong
-from studies.fe_models.text.read_errors import check_file, shown
+from studies.fe_models.text import check_file, shown
 
 _USUAL = {"stiffness": "KAAX", "mass": "MAAX", "damping": "BAAX", "load": "PAX"}
 _CD = 5  # field of a GRID, counted behind its first word

@@ -17,7 +17,7 @@ import numpy as np
 from scipy import sparse
 
 from studies.fe_models.matrices.matrices import LARGEST_FILE, wrong
-from studies.fe_models.text.read_errors import check_file, shown
+from studies.fe_models.text import check_file, shown
 
 _MANY_ROWS = 65536
 _SINGLE, _DOUBLE = 1, 2  # types of real matrices

@@ -8,12 +8,18 @@ from functools import partial
 from glob import escape
 from pathlib import Path
 
-from studies.fe_models.matrices.abaqus import read_abaqus, read_substructure
-from studies.fe_models.matrices.ansys import read_ansys
-from studies.fe_models.matrices.calculix import read_calculix
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.nastran import read_nastran
-from studies.fe_models.matrices.tables import NAMES, ONE_EACH, read_matlab, read_nastran_op4, read_tables, rows_of
+from studies.fe_models.matrices.tables import (
+    NAMES,
+    ONE_EACH,
+    read_ansys,
+    read_matlab,
+    read_nastran_op4,
+    read_tables,
+    rows_of,
+)
+from studies.fe_models.matrices.text_files import read_abaqus, read_calculix, read_substructure
 from studies.scene_error import SceneError
 
 _CALCULIX = (".sti", ".mas", ".dof")

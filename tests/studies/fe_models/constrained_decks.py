@@ -10,24 +10,26 @@ from studies.finite_element.reduced_joint import glued_frequencies, prepare_mode
 from tests.studies.fe_models.decks import write
 from tests.studies.fe_models.solid_meshes import run_ccx
 
-"""A deck of two parts in one sector of twelve, with a coupling, equations and cylindrical directions."""
 
-
-def _block(first, height, x_0=0.0):
-    """Nodes and elements of 4 by 2 by 1 hexahedra, 40 mm long and 10 mm wide, at a height."""
-    grid = [(x, y, z) for z in range(2) for y in range(3) for x in range(5)]
-    number = {place: first + n for n, place in enumerate(grid)}
-    nodes = [f"{number[x, y, z]}, {x_0 + 10 * x}, {5 * y}, {height + 5 * z}" for x, y, z in grid]
+def _hexes(first, shape, place):
+    """Lines of nodes, numbered with the first direction fastest, and of hexahedra of a grid; place: of its points."""
+    n = np.array(shape) + 1
+    grid = [(a, b, c) for c in range(n[2]) for b in range(n[1]) for a in range(n[0])]
+    number = {at: first + k for k, at in enumerate(grid)}
+    nodes = [f"{number[at]}, " + ", ".join(f"{value:.12g}" for value in place(*at)) for at in grid]
     corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
-    cells = [(x, y) for y in range(2) for x in range(4)]
+    cells = [at for at in grid if all(at < end for at, end in zip(at, shape, strict=True))]
     elements = [
-        f"{first + n}, " + ", ".join(str(number[x + a, y + b, c]) for a, b, c in corners)
-        for n, (x, y) in enumerate(cells)
+        f"{first + k}, " + ", ".join(str(number[x + a, y + b, z + c]) for a, b, c in corners)
+        for k, (x, y, z) in enumerate(cells)
     ]
     return nodes, elements
 
 
-_LOWER, _UPPER = _block(1, 0), _block(101, 5)
+_LOWER, _UPPER = (
+    _hexes(first, (4, 2, 1), lambda x, y, z, height=height: (10 * x, 5 * y, height + 5 * z))
+    for first, height in ((1, 0), (101, 5))
+)
 
 BLOCKS = "\n".join(
     [
@@ -46,19 +48,12 @@ BLOCKS = "\n".join(
 
 def _ring(first, inner, outer):
     """Nodes and elements of a sector of 30 degrees, 10 mm high, between two radii."""
-    angles, grid = np.radians([-15, -5, 5, 15]), [(r, j, k) for k in range(3) for j in range(4) for r in range(2)]
-    number = {place: first + n for n, place in enumerate(grid)}
-    nodes = []
-    for r, j, k in grid:
-        x, y = (outer if r else inner) * np.array([np.cos(angles[j]), np.sin(angles[j])])
-        nodes.append(f"{number[r, j, k]}, {x:.12g}, {y:.12g}, {5 * k}")
-    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
-    cells = [(j, k) for k in range(2) for j in range(3)]
-    elements = [
-        f"{first + n}, " + ", ".join(str(number[a, j + b, k + c]) for a, b, c in corners)
-        for n, (j, k) in enumerate(cells)
-    ]
-    return nodes, elements
+
+    def place(r, j, k):
+        radius, angle = (outer if r else inner), np.radians(10 * j - 15)
+        return radius * np.cos(angle), radius * np.sin(angle), 5 * k
+
+    return _hexes(first, (1, 3, 2), place)
 
 
 _DISK, _RIM = _ring(1, 20, 25), _ring(101, 25, 30)

@@ -15,11 +15,12 @@ from studies.fe_models.checks import (
     check_units,
     mass_of,
     omega_squared_of,
+    rotation_of_deck,
 )
 from studies.fe_models.deck.read import read_deck
 from studies.fe_models.matrices.matrices import Matrices
 from studies.fe_models.matrices.read import read_matrices
-from studies.fe_models.units import find_units
+from studies.fe_models.model_files import find_units
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import CUBES, SECTOR, write
 from tests.studies.fe_models.matrix_files import needs_ccx, run_ccx
@@ -65,8 +66,9 @@ def test_whole_export(sector):
     check_contact_removed(deck, matrices, (blades, disks), ("BLADES", "DISKS"), SI)
     check_units(deck, mass_of(deck, matrices), SI)
     check_mass(deck, matrices, SI)
-    rotation = check_speed(deck, matrices, SI)
+    rotation = rotation_of_deck(deck, SI)
     assert (rotation.omega_squared, rotation.axis.tolist()) == (250000.0, [0, 0, 1])
+    assert check_speed(deck, matrices, rotation) == pytest.approx(250000, rel=1e-6)
     assert omega_squared_of(deck, matrices, AXIS) == pytest.approx(250000, rel=1e-6)
     # along the axis there is no spin softening
     assert omega_squared_of(deck, matrices, np.array([1.0, 0.0, 0.0])) == pytest.approx(125000, rel=1e-6)
@@ -149,11 +151,11 @@ def test_speed_of_other_codes_and_none(tmp_path):
     deck = read_deck(write(tmp_path, CUBES))
     matrices = springs(deck, [(1, 7, 1e9), (11, 17, 1e9)])
     with pytest.raises(SceneError, match=r"spins at 100 rad/s, the stiffness holds 0; write \*STEP,NLGEOM"):
-        check_speed(deck, matrices, SI)
+        check_speed(deck, matrices, rotation_of_deck(deck, SI))
     turning = replace(matrices, stiffness=sp.csr_array(matrices.stiffness - 1e4 * matrices.mass))
     assert omega_squared_of(deck, turning, AXIS) == pytest.approx(1e4, rel=1e-6)
-    assert check_speed(deck, turning, SI) is not None
-    assert check_speed(replace(deck, centrifugal=()), matrices, SI) is None
+    assert check_speed(deck, turning, rotation_of_deck(deck, SI)) == pytest.approx(1e4, rel=1e-6)
+    assert rotation_of_deck(replace(deck, centrifugal=()), SI) is None
 
 
 def test_units(tmp_path):

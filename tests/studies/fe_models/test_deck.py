@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.fe_models.deck.mesh import ContactPair, Material, SolidSection, Tie
+from studies.fe_models.deck.contents import ContactPair, Material, SolidSection, Tie
 from studies.fe_models.deck.read import read_deck
 from tests.studies.fe_models.decks import CUBES, PART, write
 

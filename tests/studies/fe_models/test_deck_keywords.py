@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import studies
-from studies.fe_models.deck.keywords import HARMLESS, KEYWORDS
-from studies.fe_models.deck.read import read_deck
+from studies.fe_models.deck.read import HARMLESS, KEYWORDS, read_deck
 from studies.scene_error import SceneError
 from tests.studies.fe_models.constrained_decks import BLOCKS, prepared_deck
 from tests.studies.fe_models.decks import write

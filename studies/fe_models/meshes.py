@@ -1,4 +1,10 @@
-"""Meshes of Gmsh by meshio, formats 2.2 and 4.1, text and binary."""
+"""Meshes of files: decks, meshes of Gmsh by meshio (formats 2.2 and 4.1, text and binary), tables of nodes.
+
+A table of nodes of reduced matrices stands in place of a mesh, with the columns node, x, y, z and sets. `sets` names
+the sets of a node, with blanks between the names. Nodes that touch have an area and the direction out of their body as
+well, area, normal_x, normal_y, normal_z, and perhaps a gap, negative for an interference; others leave them empty. All
+are in the units of the model.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +13,14 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+import pandas as pd
 
-from studies.fe_models.deck.mesh import Deck, IntArray
-from studies.fe_models.libraries.errors import library_errors
-from studies.fe_models.libraries.meshes import build_deck
+from studies.fe_models.cdb import read_cdb
+from studies.fe_models.deck.contents import ContactNodes, Deck
+from studies.fe_models.deck.model import deck_of_arrays
+from studies.fe_models.deck.read import read_deck
+from studies.fe_models.library_errors import library_errors
+from studies.fe_models.text import IntArray
 from studies.scene_error import SceneError
 
 # meshio's names, whose order of nodes is VTK's: for these kinds that of the decks
@@ -24,14 +34,34 @@ _KINDS = {
 }
 _SOLID = 3
 
+_PLACE = ["x", "y", "z"]
+_CONTACT = ["area", "normal_x", "normal_y", "normal_z", "gap"]
+_COLUMNS = ["node", *_PLACE, "sets"]
 
-def read_gmsh(path: Path) -> Deck:
+
+def read_mesh_file(path: Path) -> Deck:
+    """The mesh of a file by its ending: .inp (CalculiX, Abaqus), .msh (Gmsh), .cdb (ANSYS), or a table of nodes, .csv.
+
+    Hexahedra of 8 nodes in .msh and .cdb are read as C3D8I, the project's own. Of .msh, node numbers are the places of
+    nodes in the file and element numbers count its solid elements, both from 1; a physical group gives a set of its
+    nodes, and one of volumes a set of its elements as well.
+
+    Raises SceneError about "model": another ending, a library that is not installed, or what is wrong in the file.
+    """
+    readers = {".inp": read_deck, ".msh": _read_gmsh, ".cdb": read_cdb, ".csv": _read_node_table}
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise SceneError("model", f"{path.name} is no mesh that is known", "give .inp, .msh, .cdb or .csv")
+    return reader(path)
+
+
+def _read_gmsh(path: Path) -> Deck:
     """The mesh of a .msh file, whether all of it belongs to physical groups or not. Raises SceneError."""
     with library_errors(path, "meshio", "meshio", "model"):
-        return _deck(path, _read(path))
+        return _gmsh_deck(path, _read_gmsh_file(path))
 
 
-def _read(path: Path) -> Any:
+def _read_gmsh_file(path: Path) -> Any:
     import meshio
     from meshio._mesh import topological_dimension
     from meshio.gmsh import _gmsh41
@@ -51,7 +81,7 @@ def _read(path: Path) -> Any:
         return meshio.read(path, file_format="gmsh")
 
 
-def _deck(path: Path, mesh: Any) -> Deck:
+def _gmsh_deck(path: Path, mesh: Any) -> Deck:
     from meshio._mesh import topological_dimension
 
     points = np.asarray(mesh.points, dtype=np.float64)
@@ -79,7 +109,7 @@ def _deck(path: Path, mesh: Any) -> Deck:
             node_sets.setdefault(name, []).append(np.unique(nodes[members]))
             if numbers is not None:
                 element_sets.setdefault(name, []).append(numbers[members])
-    return build_deck(
+    return deck_of_arrays(
         path.name,
         (np.arange(1, len(points) + 1), points),
         {kind: (np.concatenate([n for n, _ in b]), np.concatenate([e for _, e in b])) for kind, b in blocks.items()},
@@ -104,3 +134,31 @@ def _groups(mesh: Any, place: int, n_cells: int) -> list[tuple[str, IntArray]]:
         if members.size and members.max() < n_cells:
             found.append((name, members))
     return found
+
+
+def _read_node_table(path: Path) -> Deck:
+    """The table as a deck without elements. Raises SceneError about "model"."""
+    with library_errors(path, "pandas", "pandas", "model"):
+        table = pd.read_csv(path, skipinitialspace=True)
+        missing = [name for name in _COLUMNS if name not in table]
+        if missing:
+            listed = f"{', '.join(_COLUMNS)} and, of nodes in contact, {', '.join(_CONTACT)}"
+            raise SceneError("model", f"{path.name} has no column {missing[0]}", f"give {listed}")
+        table = table.sort_values("node")
+        places = table[_PLACE].to_numpy(dtype=np.float64)
+        contact = table.reindex(columns=_CONTACT).to_numpy(dtype=np.float64)
+        numbers = table["node"].to_numpy()
+    if numbers.dtype.kind != "i" or len(np.unique(numbers)) < len(numbers):
+        found = f"{path.name}: a node is no whole number, or there twice"
+        raise SceneError("model", found, "give a line for each node")
+    if not np.isfinite(places).all():
+        raise SceneError("model", f"{path.name}: a coordinate is not a finite number", "give x, y and z of each node")
+    sets: dict[str, list[int]] = {}
+    for number, names in zip(numbers.tolist(), table["sets"].fillna("").astype(str), strict=True):
+        for name in names.upper().split():
+            sets.setdefault(name, []).append(number)
+    length = np.linalg.norm(contact[:, 1:4], axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        nodes = ContactNodes(contact[:, 0], contact[:, 1:4] / length, contact[:, 4])
+    node_sets = {name: np.array(members, dtype=np.int64) for name, members in sets.items()}
+    return Deck(path.name, numbers.astype(np.int64), places, (), node_sets, contact_nodes=nodes)

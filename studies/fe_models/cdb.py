@@ -1,0 +1,261 @@
+"""Meshes of ANSYS (`CDWRITE, DB, model, cdb`) by ansys-mapdl-reader, and what their commands say.
+
+Commands that may change the model and are not acted upon are refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from studies.fe_models.deck.contents import Boundary, Deck
+from studies.fe_models.deck.model import deck_of_arrays
+from studies.fe_models.library_errors import library_errors
+from studies.fe_models.text import IntArray, Place, shown
+from studies.scene_error import SceneError
+
+# which of the nodes of an element of ANSYS are those of which kind: bricks may be collapsed to wedges or tetrahedra
+_BRICK = {
+    8: (
+        ("C3D4", (0, 1, 2, 4), ((2, 3), (4, 5), (4, 6), (4, 7))),
+        ("C3D6", (0, 1, 2, 4, 5, 6), ((2, 3), (6, 7))),
+    ),
+    20: (
+        ("C3D10", (0, 1, 2, 4, 8, 9, 11, 16, 17, 18), ((2, 3), (4, 5), (4, 6), (4, 7))),
+        ("C3D15", (0, 1, 2, 4, 5, 6, 8, 9, 11, 12, 13, 15, 16, 17, 18), ((2, 3), (6, 7))),
+    ),
+}
+# numbers of nodes of the solid elements that are read, by the number in their names
+_TYPES = {45: 8, 185: 8, 95: 20, 186: 20, 92: 10, 187: 10, 285: 4}
+_WHOLE = {8: "C3D8I", 20: "C3D20R", 10: "C3D10", 4: "C3D4"}
+_PASSED_OVER = (151, 152, 153, 154, 156, 200)  # without a stiffness of their own: surface effects, and those that mesh
+_TARGETS, _CONTACTS = range(169, 171), range(171, 179)
+_HEADER = 10  # numbers of an element before its nodes
+_LETTERS = 4  # of a command; what follows is left out by some programs
+
+
+def _short(names: str) -> frozenset[str]:
+    return frozenset(name[:_LETTERS] for name in names.split())
+
+
+WITHOUT_INFLUENCE = _short(
+    # comments, titles, what is printed and where the program stands
+    "/COM /TITLE /STITLE /PREP7 /SOLU /POST1 /NOPR /GOPR /GO /OUT /OUTPUT /NERR /UNITS /VIEW /WB /BATCH FINISH EOF "
+    # parameters and numbering
+    "*SET *IF *ELSE *ENDIF *ELSEIF NUMOFF SHPP DOF CM CMSEL CMGRP CMDELE ALLSEL NSEL ESEL "
+    # coordinate systems of elements and displays; nodes have angles of their own, which are looked at
+    "CSYS DSYS RSYS ESYS LOCAL CSCIR "
+    # attributes of elements; the material is that of the study
+    "MAT TYPE REAL SECNUM TSHAP R RMORE RLBLOCK SECTYPE SECDATA SECOFFSET SECCONTROL SECCONTROLS SECBLOCK SECMODIF "
+    "MP MPTEMP MPDATA MPDE UIMP TREF "
+    # how an analysis is run and what it writes; the damping is that of the study
+    "ANTYPE MODOPT MODCONTROL QRDOPT MXPAND EQSLV NLGEOM NROPT KBC TIME TIMINT NSUBST DELTIM AUTOTS NCNV NEQIT "
+    "CNVTOL CUTCONTROL "
+    "OUTRES OUTPR ERESX RESCONTROL RATE CRPLIM LNSRCH PRED KUSE IRLF LSCLEAR EXTOPT SOLCONTROL WRFULL HBMAT HROPT "
+    "HROUT HARFRQ TRNOPT BUCOPT SUBOPT RIGID THOPT CGLOC ALPHAD BETAD DMPRAT DMPSTR MDAMP"
+)
+"""Commands that are skipped."""
+
+_BLOCKS = ("ETBL", "NBLO", "EBLO", "CMBL")  # what the library reads
+_WHERE_ZERO = _short("OMEGA DOMEGA CGOMGA DCGOMG ACEL CMOMEGA CMDOMEGA CMACEL BFUNIF TUNIF")  # CDWRITE writes them
+_WITH_LABEL = _short("CMOMEGA CMDOMEGA CMACEL BFUNIF")  # of these the first field is no number
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+_DIRECTIONS = {"UX": (1, 1), "UY": (2, 2), "UZ": (3, 3), "ALL": (1, 3)}
+# key options of 1 that make other elements of some kinds than those that are read
+_OPTIONS = {
+    "2": ((45, 185), "elements of reduced integration (key option 2)", "use full integration, or enhanced strains"),
+    "3": ((185, 186, 190), "elements of layers (key option 3)", "use homogeneous solid elements"),
+}
+_FREE = "export without constraint equations: CEDELE,ALL and CPDELE,ALL"
+_LOADS = "delete it, and give `preload` in the study"
+_REMEDIES = {
+    **dict.fromkeys(_short("CE CEINTF CERIG CP CPINTF CPLGEN CECYC RBE3"), _FREE),
+    **dict.fromkeys(_short("OMEGA DOMEGA CMOMEGA CGOMGA"), "delete it, and give `rotation_speed` and `axis`"),
+    **dict.fromkeys(_short("PSTRES SSTIF INISTATE ISFILE"), "delete it, and give `rotation_speed`, or `matrices`"),
+    **dict.fromkeys(_short("F SF SFE SFA BF BFE BFUNIF TUNIF ACEL CMACEL"), _LOADS),
+    **dict.fromkeys(_short("N EN E EMORE"), "write nodes and elements in blocks: CDWRITE,DB,file,cdb"),
+    "LUMP": "delete it: the mass is consistent",
+    "CYCL": "delete it, and give `n_sectors` and `axis` in the study",
+    "TB": "delete it, and give `material` in the study: isotropic and elastic",
+}
+
+
+def read_cdb(path: Path) -> Deck:
+    """The mesh of a .cdb file with the displacements that it holds. Raises SceneError."""
+    with library_errors(path, "ansys.mapdl.reader", "ansys-mapdl-reader", "model"):
+        from ansys.mapdl import reader
+
+        commands = _read_commands(path)
+        return _deck(path, reader.Archive(str(path), parse_vtk=False), commands)
+
+
+def _deck(path: Path, archive: Any, commands: _Commands) -> Deck:
+    if np.any(archive.node_angles):
+        found = f"{path.name} has nodes with coordinate systems of their own"
+        raise SceneError("model", found, "write it with NROTAT to the global one: its directions are x, y and z")
+    rows: dict[str, list[tuple[int, IntArray]]] = {}
+    passed: set[int] = set()
+    materials: set[int] = set()
+    for element in archive.elem:
+        number = int(element[1])
+        kind = commands.kinds.get(number)
+        if kind is None:
+            found = f"{path.name} has elements of the type {number}, which neither ET nor ETBLOCK gives"
+            raise SceneError("model", found, "write it again with CDWRITE,DB,file,cdb")
+        if kind in _PASSED_OVER:
+            passed.add(kind)
+            continue
+        if kind in _TARGETS or kind in _CONTACTS:
+            name = f"{'TARGE' if kind in _TARGETS else 'CONTA'}{kind}"
+            remedy = "delete these elements (EDELE), and name the surfaces in `contact` of the study"
+            raise commands.places[number].wrong(f"contact elements ({name})", remedy)
+        if kind not in _TYPES:
+            remedy = f"use solid elements: {', '.join(map(str, sorted(_TYPES)))}"
+            raise commands.places[number].wrong(f"elements of type {kind}", remedy)
+        # without any midside node an element is written by its corners
+        name, chosen = _sort_out(np.trim_zeros(np.asarray(element[_HEADER:], dtype=np.int64)[: _TYPES[kind]], "b"))
+        if not name or chosen.min() < 1:
+            remedy = "mesh with whole hexahedra, wedges and tetrahedra, with all their midside nodes or none"
+            raise SceneError("model", f"{path.name}: element {int(element[8])} has an unusual shape", remedy)
+        rows.setdefault(name, []).append((int(element[8]), chosen))
+        materials.add(int(element[0]))
+    several = f"{path.name} has materials {' and '.join(map(str, sorted(materials)))}, of which the study gives one"
+    node_sets, element_sets = (
+        {name: np.asarray(members, dtype=np.int64) for name, members in each.items()}
+        for each in (archive.node_components, archive.element_components)
+    )
+    deck = deck_of_arrays(
+        path.name,
+        (np.asarray(archive.nnum, dtype=np.int64), np.asarray(archive.nodes, dtype=np.float64)[:, :3]),
+        {name: (np.array([n for n, _ in found]), np.stack([e for _, e in found])) for name, found in rows.items()},
+        node_sets,
+        element_sets,
+    )
+    return replace(
+        deck,
+        boundaries=commands.boundaries,
+        notes=tuple(f"Elements of type {kind} are passed over." for kind in sorted(passed)),
+        unassembled=(several,) if len(materials) > 1 else (),
+    )
+
+
+def _sort_out(nodes: IntArray) -> tuple[str, IntArray]:
+    """Kind and nodes of an element; "" where it is a pyramid, or some of its midside nodes are missing."""
+    for name, chosen, equal in _BRICK.get(nodes.size, ()):
+        if all(nodes[one] == nodes[other] for one, other in equal):
+            return name, nodes[list(chosen)]
+    corners = nodes[: 8 if nodes.size in _BRICK else 4]
+    return (_WHOLE.get(nodes.size, "") if np.unique(corners).size == corners.size else ""), nodes
+
+
+@dataclass
+class _Commands:
+    """Numbers of elements (185 of SOLID185) by their types, the line of each type, and nodes that are held."""
+
+    kinds: dict[int, int] = field(default_factory=dict)
+    places: dict[int, Place] = field(default_factory=dict)
+    held: dict[tuple[str, float], list[int]] = field(default_factory=dict)
+
+    @property
+    def boundaries(self) -> tuple[Boundary, ...]:
+        """Displacements that are given."""
+        return tuple(
+            Boundary(f"D,{label}", np.unique(nodes).astype(np.int64), *_DIRECTIONS[label], value)
+            for (label, value), nodes in self.held.items()
+        )
+
+    def add_type(self, fields: list[str], place: Place) -> None:
+        """fields: number of the type, number or name of its elements, and its key options from the first on."""
+        name = re.search(r"\d+$", fields[1]) if len(fields) > 1 else None
+        if name is None or not fields[0].isdigit():
+            raise place.wrong("a type of elements that is no number", "write the file with CDWRITE,DB,file,cdb")
+        self.kinds[int(fields[0])], self.places[int(fields[0])] = int(name[0]), place
+        for option, value in enumerate(fields[2:], 1):
+            self.check_option(int(fields[0]), str(option), value, place)
+
+    def check_option(self, number: int, option: str, value: str, place: Place) -> None:
+        """Raises SceneError where a key option makes other elements of a type than those that are read."""
+        kinds, found, remedy = _OPTIONS.get(option, ((), "", ""))
+        if value == "1" and self.kinds.get(number) in kinds:
+            raise place.wrong(found, remedy)
+
+    def add_displacement(self, fields: list[str], place: Place) -> None:
+        """A command D."""
+        fields = [*fields, *[""] * 8]
+        node, label, value = fields[1:4]
+        if (
+            not node.isdigit()
+            or label not in _DIRECTIONS
+            or any(fields[5:])
+            or (value and not _NUMBER.fullmatch(value))
+        ):
+            found = f"D of {shown(node)}, {shown(label)} = {shown(value)}"
+            raise place.wrong(found, "delete it, and give `clamp` in the study: nodes with UX, UY, UZ or ALL are read")
+        self.held.setdefault((label, float(value.replace("D", "E") or 0.0)), []).append(int(node))
+
+
+def _read_commands(path: Path) -> _Commands:
+    """What the commands of a file say beside its blocks of nodes, elements and components.
+
+    Raises SceneError where a command that is not acted upon may change the model.
+    """
+    found = _Commands()
+    types_left = False
+    for fields, place in _lines(path):
+        command = fields[0][:_LETTERS]
+        if command == "":  # a line of numbers
+            types_left = types_left and fields[1] != "-1"
+            if types_left and fields[1].isdigit():
+                found.add_type(fields[1:], place)
+            continue
+        types_left = command == "ETBL"
+        if command == "ET":
+            found.add_type(fields[1:], place)
+        elif command == "KEYO":
+            if fields[1:] and fields[1].isdigit():
+                option, value, *_ = [*fields[2:4], "", ""]
+                found.check_option(int(fields[1]), option, value, place)
+        elif command == "D":
+            found.add_displacement(fields, place)
+        elif command == "EBLO" and "SOLID" not in fields:
+            raise place.wrong("EBLOCK without SOLID", "write the elements with CDWRITE,DB,file,cdb")
+        elif not _is_skipped(command, fields):
+            text = f"{shown(fields[0])} may change the model, and is not acted upon"
+            raise place.wrong(text, _REMEDIES.get(command, "delete it if it does not"))
+    return found
+
+
+def _lines(path: Path) -> Iterator[tuple[list[str], Place]]:
+    """Fields in capitals and place of each command; of lines of numbers between ETBLOCK and its end behind a ""."""
+    in_types = False
+    with path.open(encoding="latin-1") as file:
+        for number, text in enumerate(file, 1):
+            start = text.lstrip()[:1]
+            if start in "-.0123456789(!":
+                if in_types and start not in "(!":
+                    yield ["", *text.split()], Place(path.name, number)
+                continue
+            for each in [text] if start == "/" else text.split("!")[0].split("$"):  # titles may have a $
+                fields = [part.strip().upper() for part in each.split("!")[0].split(",")]
+                fields[0] = fields[0].split()[0] if fields[0] else ""
+                in_types = fields[0][:_LETTERS] == "ETBL"
+                if fields[0]:
+                    yield fields, Place(path.name, number)
+
+
+def _is_skipped(command: str, fields: list[str]) -> bool:
+    if command in WITHOUT_INFLUENCE or command in _BLOCKS or "=" in fields[0]:
+        return True
+    if command in ("PSTR", "SSTI", "LUMP"):
+        return fields[1:2] in (["OFF"], ["0"])
+    if command in ("N", "EN"):  # the end of a block
+        return fields[-1 if fields[-1] else -2] == "-1"
+    # _TINY is the number that stands for no temperature
+    values = [part for part in fields[2 if command in _WITH_LABEL else 1 :] if part not in ("", "_TINY")]
+    zero = all(_NUMBER.fullmatch(value) and not float(value.replace("D", "E")) for value in values)
+    return command in _WHERE_ZERO and zero

@@ -1,0 +1,262 @@
+"""The contents of a deck: frozen dataclasses of arrays, in the units of the file. Nothing is read here.
+
+Node and element numbers are those of the file, not indices of an array. Names of sets, surfaces, materials and
+interactions are in capitals, as the programs ignore case. A `place` is where something stands, for messages, as
+"deck.inp, line 7: *KEYWORD".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from studies.fe_models.text import FloatArray, IntArray
+from studies.finite_element.elements import ELEMENT_KINDS
+
+NODES_OF_KIND: Mapping[str, int] = {kind: len(each.reference.nodes) for kind, each in ELEMENT_KINDS.items()}
+"""Kinds of elements that a mesh may hold, by their names in CalculiX and Abaqus, and their numbers of nodes."""
+
+_MOST_NAMED = 20  # keywords in one line
+
+
+@dataclass(frozen=True)
+class ElementBlock:
+    """Elements of one kind, a key of NODES_OF_KIND: their numbers (m,) and node numbers (m, k)."""
+
+    kind: str
+    numbers: IntArray
+    nodes: IntArray
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Faces (f,), 1 to 6 for S1 to S6, of elements (f,); or nodes (p,), ascending. The other of the two is empty."""
+
+    elements: IntArray
+    faces: IntArray
+    nodes: IntArray
+
+    @property
+    def of_nodes(self) -> bool:
+        """Whether the surface is one of nodes."""
+        return self.nodes.size > 0
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Two glued surfaces by name, slave first, or the cut faces of a sector (cyclic).
+
+    tolerance: largest distance of a tied node; None where the deck gives none, or 0.
+    """
+
+    name: str
+    dependent: str
+    independent: str
+    tolerance: float | None
+    cyclic: bool
+
+
+@dataclass(frozen=True)
+class ContactPair:
+    """Two surfaces in contact by name, slave first.
+
+    friction_coefficient: None where the deck gives none. clearance: distance of the surfaces, negative for an
+    interference; None for the distances in the mesh. Places, "" where there is nothing of the kind: problem of a law
+    that is not read, glued where surfaces do not part, fitted of a clearance or interference, adjusted where nodes are
+    moved.
+    """
+
+    dependent: str
+    independent: str
+    interaction: str
+    friction_coefficient: float | None
+    problem: str = ""
+    glued: str = ""
+    fitted: str = ""
+    clearance: float | None = None
+    adjusted: str = ""
+
+
+@dataclass(frozen=True)
+class CyclicSymmetry:
+    """A sector. ties: names of those of the cut faces, if the deck gives some. axis (2, 3): two points on the axis."""
+
+    n_sectors: int
+    ties: tuple[str, ...]
+    axis: FloatArray
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """Prescribed displacements of nodes (p,); value 0 for held ones.
+
+    name: the set, or the node number as text. first_dof, last_dof: 1 to 3 are displacements along x, y and z, or along
+    the directions of a `Transform`; 4 to 6 rotations of reference points; larger numbers are possible.
+    """
+
+    name: str
+    nodes: IntArray
+    first_dof: int
+    last_dof: int
+    value: float
+    place: str = ""
+
+
+@dataclass(frozen=True)
+class Transform:
+    """Directions of the displacements 1 to 3 of nodes (p,).
+
+    points (2, 3): cylindrical: on the axis; directions are radial, tangential and axial. Else one vector along the
+    first direction, and another in the plane of the first two.
+    """
+
+    place: str
+    nodes: IntArray
+    cylindrical: bool
+    points: FloatArray
+
+
+@dataclass(frozen=True)
+class Equation:
+    """`sum(coefficients * u) = 0` of nodes and dofs (t,) as in `Boundary`; the first term depends on the others."""
+
+    place: str
+    nodes: IntArray
+    dofs: IntArray
+    coefficients: FloatArray
+
+
+@dataclass(frozen=True)
+class RigidMotion:
+    """Nodes (p,) that follow a reference node: `u = u_reference + theta x (x - x_reference)`.
+
+    dofs: 1 to 3, those that follow. rotation: the node whose displacements are theta; 0 where the reference node has
+    dofs 4 to 6 of its own. turns: whether there is theta.
+    """
+
+    place: str
+    nodes: IntArray
+    dofs: tuple[int, ...]
+    reference: int
+    rotation: int = 0
+    turns: bool = True
+
+
+@dataclass(frozen=True)
+class NodalForce:
+    """A constant force on each of some nodes (p,) along a dof as in `Boundary`."""
+
+    place: str
+    nodes: IntArray
+    dof: int
+    value: float
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """A constant pressure on faces (f,) of elements (f,), positive into the body."""
+
+    place: str
+    elements: IntArray
+    faces: IntArray
+    value: float
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic linear elastic material; None where the deck gives no value. problem: place of what is not read."""
+
+    young: float | None
+    poisson: float | None
+    density: float | None
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class SolidSection:
+    """Names of a set of elements and of their material."""
+
+    element_set: str
+    material: str
+
+
+@dataclass(frozen=True)
+class CentrifugalLoad:
+    """Centrifugal load of elements (m,). name: the set, or the element number as text.
+
+    omega_squared: rad2/s2. point (3,): on the axis. axis (3,): unit vector.
+    """
+
+    name: str
+    elements: IntArray
+    omega_squared: float
+    point: FloatArray
+    axis: FloatArray
+
+
+@dataclass(frozen=True)
+class ContactNodes:
+    """Nodes of a table: area (n,), unit normal (n, 3) out of the body, initial gap (n,); NaN where none is given."""
+
+    area: FloatArray
+    normals: FloatArray
+    gap: FloatArray
+
+
+@dataclass(frozen=True)
+class Deck:
+    """All that is read of a model's mesh file: the model as its steps leave it that do not write matrices.
+
+    path: name of the file. node_numbers (n,), coordinates (n, 3): numbers ascending. No element number is in two
+    blocks; all numbers in sets exist. Ties to rigid motions, forces and pressures stand in the order of the file.
+    centrifugal: loads of the last step that has some. gravity (3,): acceleration of all elements in static steps.
+    unassembled: places of what only matrices of another program hold. removed: what *MODEL CHANGE takes away, a
+    sentence each; it is not among the rest. n_instances: where there are several, numbers are not those of the file.
+    skipped: places of keywords that cannot change the model. notes: what was read in a way that may be asked for, a
+    sentence each. included: files relative to the deck's folder. contact_nodes: of a table of nodes, which has no
+    elements; None of a mesh.
+    """
+
+    path: str
+    node_numbers: IntArray
+    coordinates: FloatArray
+    blocks: tuple[ElementBlock, ...]
+    node_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    element_sets: Mapping[str, IntArray] = field(default_factory=dict)
+    surfaces: Mapping[str, Surface] = field(default_factory=dict)
+    ties: tuple[Tie, ...] = ()
+    contact_pairs: tuple[ContactPair, ...] = ()
+    cyclic: CyclicSymmetry | None = None
+    boundaries: tuple[Boundary, ...] = ()
+    transforms: tuple[Transform, ...] = ()
+    equations: tuple[Equation, ...] = ()
+    rigid_motions: tuple[RigidMotion, ...] = ()
+    materials: Mapping[str, Material] = field(default_factory=dict)
+    sections: tuple[SolidSection, ...] = ()
+    centrifugal: tuple[CentrifugalLoad, ...] = ()
+    forces: tuple[NodalForce, ...] = ()
+    pressures: tuple[Pressure, ...] = ()
+    gravity: FloatArray | None = None
+    unassembled: tuple[str, ...] = ()
+    removed: tuple[str, ...] = ()
+    n_instances: int = 0
+    skipped: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    included: tuple[str, ...] = ()
+    contact_nodes: ContactNodes | None = None
+
+    @property
+    def remarks(self) -> tuple[tuple[str, str], ...]:
+        """Label and text of lines for the user: what was skipped, where there is something, and the notes."""
+        more = len(self.skipped) - _MOST_NAMED
+        skipped = "; ".join(self.skipped[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+        notes = (("note", text) for text in (*self.notes, *self.removed))
+        return (*((("skipped", skipped),) if skipped else ()), *notes)
+
+    def rows_of_nodes(self, numbers: IntArray) -> IntArray:
+        """Places of nodes in `coordinates`, of the shape of `numbers`; all of them must exist."""
+        rows = np.searchsorted(self.node_numbers, numbers)
+        assert np.array_equal(self.node_numbers[np.minimum(rows, self.node_numbers.size - 1)], numbers)
+        return rows.astype(np.int64)

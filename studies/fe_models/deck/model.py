@@ -1,0 +1,279 @@
+"""What a deck says beside its mesh, while it is read and put together once all of it is read."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from studies.fe_models.deck.contents import (
+    NODES_OF_KIND,
+    ContactPair,
+    CyclicSymmetry,
+    Deck,
+    ElementBlock,
+    Material,
+    SolidSection,
+    Surface,
+)
+from studies.fe_models.deck.draft import Draft, Records, refused
+from studies.fe_models.deck.mesh import Mesh
+from studies.fe_models.deck.sets import Reference, read_reference
+from studies.fe_models.text import Block, FloatArray, IntArray, Place, shown
+from studies.scene_error import SceneError
+
+_SAME_AXIS = 1e-6  # distance of two axes over the distance of the points that give them
+_NONE = np.empty(0, dtype=np.int64)
+
+
+@dataclass
+class MaterialRows:
+    """A material: rows of *ELASTIC and *DENSITY, the temperature last, and where they stand."""
+
+    elastic: list[list[float]] = field(default_factory=list)
+    density: list[list[float]] = field(default_factory=list)
+    places: dict[str, Place] = field(default_factory=dict)
+    problem: str = ""
+
+
+@dataclass
+class Interaction:
+    """Friction of an interaction; places where it glues, and of a law that is not read."""
+
+    friction: float | None = None
+    glued: str = ""
+    problem: str = ""
+
+
+@dataclass
+class Step:
+    """A step. before: the fields before it. writes: whether it writes matrices. fresh: without centrifugal load yet."""
+
+    before: dict[str, dict[Hashable, list[Any]]]
+    kind: str = ""
+    writes: bool = False
+    fresh: bool = True
+
+    @property
+    def loads_count(self) -> bool:
+        """Whether its loads are static ones."""
+        return self.kind in ("", "STATIC", "VISCO")
+
+
+@dataclass
+class Model:
+    """All that was read so far. scope: name of the instance of the keyword that is read, else "".
+
+    fields: entries of the fields of the deck in the order of the file, by a key for those that may be replaced.
+    interaction, material: those that the next keywords are about. thermal: where temperatures and expansion stand.
+    """
+
+    mesh: Mesh
+    scope: str = ""
+    fields: dict[str, dict[Hashable, list[Any]]] = field(default_factory=dict)
+    interactions: dict[str, Interaction] = field(default_factory=dict)
+    interaction: Interaction | None = None
+    materials: dict[str, MaterialRows] = field(default_factory=dict)
+    material: MaterialRows | None = None
+    thermal: dict[str, Place] = field(default_factory=dict)
+    coupling: Block | None = None
+    step: Step | None = None
+    skipped: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, name: str, items: Iterable[Any], key: Hashable = None) -> None:
+        """Adds entries of a field of the deck; those of the same key, which is not None, are replaced."""
+        entries = self.fields.setdefault(name, {})
+        entries[len(entries) if key is None else key] = list(items)
+
+    def get(self, name: str) -> list[Any]:
+        """Entries of a field."""
+        return [item for items in self.fields.get(name, {}).values() for item in items]
+
+    def end_step(self) -> None:
+        """Of a step that writes matrices nothing stays, of one that is not static no load."""
+        step, self.step = self.step, None
+        if step is None:
+            return
+        for name in list(self.fields):
+            if step.writes or (name in ("forces", "pressures", "gravity") and not step.loads_count):
+                self.fields[name] = step.before.get(name, {})
+
+    def skip(self, block: Block) -> None:
+        """Notes a keyword that cannot change the model."""
+        if len(self.skipped) < 1000:
+            self.skipped.append(f"{block.place}: *{block.written}")
+
+    def named(self, block: Block, parameter: str) -> Reference:
+        """What the name in a parameter points to. Raises SceneError."""
+        return self.refer(f'"{block.name(parameter)}"', block.place)
+
+    def refer(self, text: str, place: Place) -> Reference:
+        """What a name or number of a data line points to. Raises SceneError."""
+        return read_reference(text, self.scope, self.mesh.draft.placed, place)
+
+    def check_coupling(self) -> None:
+        """Raises SceneError where a coupling does not say what it couples."""
+        if self.coupling is not None:
+            raise refused(self.coupling, "no *KINEMATIC below it", "write it there, or remove the coupling")
+
+    def deck(self) -> Deck:
+        """The deck. Raises SceneError where names are missing or do not fit."""
+        mesh = self.mesh
+        gone = _NONE
+        for removed, elements, _ in self.get("removed"):
+            gone = np.union1d(gone, elements) if removed else np.setdiff1d(gone, elements)
+        blocks = [_without(block, gone) for block in mesh.blocks if block.kind in NODES_OF_KIND]
+        kept = np.setdiff1d(mesh.all_elements[mesh.solid], gone)
+        names = ("ties", "boundaries", "transforms", "equations", "rigid_motions", "forces", "pressures")
+        fields: dict[str, Any] = {name: tuple(self.get(name)) for name in names}
+        loads = [load for load in self.get("centrifugal") if np.isin(load.elements, kept).any() or not kept.size]
+        changes = (*self.get("removed"), *self.get("apart"))
+        return Deck(
+            path=mesh.draft.name,
+            node_numbers=mesh.numbers,
+            coordinates=mesh.coordinates,
+            blocks=tuple(block for block in blocks if block.numbers.size),
+            node_sets=mesh.node_sets,
+            element_sets={name: np.intersect1d(members, kept) for name, members in mesh.element_sets.items()},
+            surfaces={name: _surface_without(surface, gone) for name, surface in mesh.surfaces.items()},
+            contact_pairs=tuple(self._contact_pairs()),
+            cyclic=self._cyclic(),
+            materials={name: self._material(each) for name, each in self.materials.items()},
+            sections=tuple(self._sections()),
+            centrifugal=tuple(loads),
+            gravity=self._gravity(kept),
+            removed=tuple(text for taken, _, text in changes if taken),
+            n_instances=len(mesh.draft.placed),
+            unassembled=tuple(text for text, _ in self.get("unassembled")),
+            skipped=(*self.skipped, *self._idle()),
+            notes=(*mesh.notes, *self.notes, *mesh.numbering),
+            included=tuple(mesh.draft.included),
+            **fields,
+        )
+
+    def _idle(self) -> Iterator[str]:
+        """Elements that are not read, and carry nothing as no section has them."""
+        carry = np.concatenate([_NONE, *(own for _, own in self.get("unassembled"))])
+        for each in self.mesh.draft.elements:
+            own = each.numbers + self.mesh.offsets[each.scope]
+            if each.kind not in NODES_OF_KIND and not np.isin(own, carry).all():
+                yield f"{each.place}: *ELEMENT of type {each.kind} without a section"
+
+    def _sections(self) -> Iterator[SolidSection]:
+        for elements, material, place in self.get("sections"):
+            if material not in self.materials:
+                raise place.wrong(f"there is no material {shown(material)}", "define it with *MATERIAL")
+            yield SolidSection(elements, material)
+
+    def _gravity(self, kept: IntArray) -> FloatArray | None:
+        total = None
+        for elements, acceleration, place in self.get("gravity"):
+            if not np.isin(kept, elements).all():
+                raise place.wrong("*DLOAD, GRAV on a part of the elements", "give it to all of them")
+            total = acceleration + (0.0 if total is None else total)
+        return total
+
+    def _material(self, rows: MaterialRows) -> Material:
+        """Values at the temperature of all nodes; of several temperatures without one they are a problem."""
+        given, thermal = self.get("temperatures"), self.thermal
+        if thermal.keys() >= {"TEMPERATURE", "EXPANSION"}:
+            found = "*TEMPERATURE strains materials with *EXPANSION"
+            raise thermal["TEMPERATURE"].wrong(found, "remove one of them")
+        solid = [each.nodes.ravel() for each in self.mesh.blocks if each.kind in NODES_OF_KIND]
+        warm = np.concatenate([_NONE, *(nodes for nodes, _ in given)])
+        everywhere = np.isin(np.concatenate([_NONE, *solid]), warm).all() and "TEMPERATURE" not in thermal
+        values = {value for _, value in given} if everywhere else set()
+        problem, found_values = rows.problem, []
+        for name, table, column, n_values in (
+            ("ELASTIC", rows.elastic, 0, 2),
+            ("ELASTIC", rows.elastic, 1, 2),
+            ("DENSITY", rows.density, 0, 1),
+        ):
+            own = {(row[n_values] if len(row) > n_values else 0.0): row[column] for row in table}
+            if len(set(own.values())) > 1 and len(values) != 1:
+                several = f"*{name} at several temperatures, of which none is given"
+                problem = problem or f"{rows.places[name]}: {several}"
+            at = sorted(own)
+            value = np.interp(min(values, default=0.0), at, [own[each] for each in at]) if own else None
+            found_values.append(None if value is None else float(value))
+        young, poisson, density = found_values
+        return Material(young, poisson, density, problem)
+
+    def _contact_pairs(self) -> Iterator[ContactPair]:
+        """Contact pairs with laws and clearances, without those that *MODEL CHANGE takes away."""
+        apart: set[frozenset[str]] = set()
+        for removed, names, _ in self.get("apart"):
+            apart = apart | {frozenset(names)} if removed else apart - {frozenset(names)}
+        pairs = self.get("contact_pairs")
+        known = {frozenset(names) for names, *_ in pairs}
+        fits: dict[frozenset[str], tuple[str, float | None]] = {}
+        for names, text, value, place in self.get("fits"):
+            if frozenset(names) not in known:
+                found = f"there is no contact pair of {names[0]} and {names[1]}"
+                raise place.wrong(found, "give the surfaces of a *CONTACT PAIR")
+            fits[frozenset(names)] = text, value
+        for names, interaction, glued, adjusted, place in pairs:
+            if interaction and interaction not in self.interactions:
+                found = f"there is no interaction {shown(interaction)}"
+                raise place.wrong(found, "define it with *SURFACE INTERACTION")
+            law = self.interactions.get(interaction, Interaction())
+            if frozenset(names) not in apart:
+                one, other = names
+                fitted, clearance = fits.get(frozenset(names), ("", None))
+                laws = law.friction, law.problem, glued or law.glued
+                yield ContactPair(one, other, interaction, *laws, fitted, clearance, adjusted)
+
+    def _cyclic(self) -> CyclicSymmetry | None:
+        """Cyclic symmetry of one number of sectors and one axis, whose cut faces may be several ties."""
+        ties = [tie.name for tie in self.get("ties") if tie.cyclic]
+        named: list[str] = []
+        first: tuple[int, FloatArray] | None = None
+        for number, name, axis, place in self.get("cyclic"):
+            if name and name not in ties:
+                raise place.wrong(f"there is no tie {shown(name)} of cut faces", "give *TIE, CYCLIC SYMMETRY this name")
+            named += [name] if name else []
+            first = first or (number, axis)
+            own = (first[1][1] - first[1][0]) / np.linalg.norm(first[1][1] - first[1][0])
+            apart = np.cross(axis - first[1][0], own) / np.linalg.norm(axis[1] - axis[0])
+            if number != first[0] or np.abs(apart).max() > _SAME_AXIS or (axis[1] - axis[0]) @ own < 0:
+                found = (
+                    f"*CYCLIC SYMMETRY MODEL with {number} sectors, another one with {first[0]}, or about other axes"
+                )
+                raise place.wrong(found, "give all of them one N and one axis: several stages are not supported")
+        return None if first is None else CyclicSymmetry(first[0], tuple(named or ties), first[1])
+
+
+def _without(block: ElementBlock, gone: IntArray) -> ElementBlock:
+    keep = ~np.isin(block.numbers, gone)
+    return ElementBlock(block.kind, block.numbers[keep], block.nodes[keep])
+
+
+def _surface_without(surface: Surface, gone: IntArray) -> Surface:
+    keep = ~np.isin(surface.elements, gone)
+    return Surface(surface.elements[keep], surface.faces[keep], surface.nodes)
+
+
+def deck_of_arrays(
+    name: str,
+    nodes: tuple[IntArray, FloatArray],
+    blocks: Mapping[str, tuple[IntArray, IntArray]],
+    node_sets: Mapping[str, IntArray],
+    element_sets: Mapping[str, IntArray],
+) -> Deck:
+    """A deck of node numbers (n,) with coordinates (n, 3), and numbers and nodes of elements by kind.
+
+    Raises SceneError where numbers do not fit, or there are no elements.
+    """
+    place = Place(name, 1)
+    if not blocks or not np.isfinite(nodes[1]).all():
+        found = f"{name}: a coordinate is not a finite number" if blocks else f"{name} has no solid elements"
+        raise SceneError("model", found, "write the volumes of the mesh again")
+    draft = Draft(name, [Records("", *nodes, place)])
+    draft.elements += [Records("", numbers, own, place, kind) for kind, (numbers, own) in blocks.items()]
+    for sets, given in ((draft.node_sets, node_sets), (draft.element_sets, element_sets)):
+        for key, members in given.items():
+            sets.add("", key.strip().upper(), members)
+    return Model(Mesh(draft)).deck()

@@ -1,1 +1,0 @@
-"""Files that other libraries read: meshio, ansys-mapdl-reader."""
