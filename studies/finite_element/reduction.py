@@ -70,7 +70,9 @@ class Reduction:
         """Stiffness with the pairs glued, and its factors."""
         stiffness = _on(coordinates.glued, self.forms["stiffness"])
         if not self._dissections:
-            everything = _on(abs(coordinates.glued), sum(abs(form) for form in self.forms.values()))
+            # where phases cancel at one of these diameters they do not at the other
+            glued = sum(abs(self.structure.coordinates(diameter).glued) for diameter in (0, 1))
+            everything = _on(glued.tocsr(), sum(abs(form) for form in self.forms.values()))
             self._dissections.append(dissect(everything, coordinates.node, self.positions))
         return stiffness, factorise(stiffness, self._dissections[0])
 
